@@ -44,7 +44,10 @@ class SolferError(Exception):
     exit_code = 2
 
     def __init__(self, what: str, *, where: str = "", expected: str = "", names: Sequence[str] = ()):
-        self.what, self.where, self.expected, self.names = what, where, expected, tuple(names)
+        self.what = what
+        self.where = where
+        self.expected = expected
+        self.names = tuple(names)
         super().__init__(what)
 
     def at(self, where: str) -> "SolferError":
@@ -83,7 +86,8 @@ class UnknownName(SolferError, LookupError):
             shown = ", ".join(known[:12]) + (f" and {len(known) - 12} more" if len(known) > 12 else "")
             expected = f"one of {shown}" if known else f"there is no {kind} here at all"
         super().__init__(f"unknown {kind} '{name}'", where=where, expected=expected, names=close)
-        self.kind, self.name = kind, name
+        self.kind = kind
+        self.name = name
 
 
 class ConfigError(SolferError):

@@ -18,7 +18,8 @@ class Throttle:
     """
 
     def __init__(self, logger: logging.Logger, interval: float = 1.0):
-        self._logger, self._interval = logger, interval
+        self._logger = logger
+        self._interval = interval
         self._last: dict[str, float] = {}
         self._held: dict[str, int] = {}
 

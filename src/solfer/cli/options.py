@@ -17,7 +17,10 @@ class Number:
     """
 
     def __init__(self, low: float, high: float, unit: str, kind: type = float, zero: bool = False):
-        self._low, self._high, self._kind, self._zero = low, high, kind, zero
+        self._low = low
+        self._high = high
+        self._kind = kind
+        self._zero = zero
         what = f"{'0, or ' if zero else ''}{'a whole number' if kind is int else 'a number'}"
         self.expected = f"{what} from {low:g} to {high:g} [{unit}]"
 

@@ -61,7 +61,8 @@ def configurations_of(report: CheckReport) -> Iterator[Configuration]:
 
 def component_of(configuration: Configuration) -> str:
     """Return the name of a configuration's component: its class, or the known plugin that the configuration is for."""
-    module, registry = configuration.module, Registry()
+    module = configuration.module
+    registry = Registry()
     if module.class_ == EMPTY:
         return "no algorithm"
     if module.class_ is not None:
@@ -77,7 +78,8 @@ def generator_of(configuration: Configuration) -> type[Generator]:
     Raises:
         SolferError: There is none.
     """
-    module, registry = configuration.module, Registry()
+    module = configuration.module
+    registry = Registry()
     available = registry.names()
     runs = sorted(registry.of_configuration(module.name), key=lambda name: name not in available)
     return registry.find(runs[0] if runs else module.name, module.class_, module.where())
@@ -89,7 +91,8 @@ def known_generator_of(configuration: Configuration) -> type[Generator] | None:
     Raises:
         SolferError: There is no such class.
     """
-    registry, class_ = Registry(), configuration.module.class_
+    registry = Registry()
+    class_ = configuration.module.class_
     runs = [name for name in registry.of_configuration(configuration.name) if name in registry.names()]
     return generator_of(configuration) if runs or class_ else None
 
@@ -101,7 +104,9 @@ def declared_by(configuration: Configuration) -> tuple[Declared, ...]:
         SolferError: The robot is not known, or a part of the plugin cannot be made.
         SolferErrors: Several of these.
     """
-    files, module, generator = robot_files(configuration), configuration.module, known_generator_of(configuration)
+    files = robot_files(configuration)
+    module = configuration.module
+    generator = known_generator_of(configuration)
     if generator is None:
         return ()
     if files is None:

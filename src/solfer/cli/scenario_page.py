@@ -15,10 +15,13 @@ def scenario_page(trace: ScenarioTrace) -> "Figure":
     """Draw the ways of base and vertices from above, the base, and the vertices' distances from their begins."""
     figure = new_figure(9.0, 6.0)
     above, base, moved = figure.subplot_mosaic([["above", "base"], ["above", "moved"]]).values()
-    cos, sin = np.cos(trace.base[:, 3]), np.sin(trace.base[:, 3])
-    x, y = trace.base[:, 0], trace.base[:, 1]
+    cos = np.cos(trace.base[:, 3])
+    sin = np.sin(trace.base[:, 3])
+    x = trace.base[:, 0]
+    y = trace.base[:, 1]
     for leg in range(trace.scenario.legs):
-        along, across = trace.vertices[:, leg, 0], trace.vertices[:, leg, 1]
+        along = trace.vertices[:, leg, 0]
+        across = trace.vertices[:, leg, 1]
         above.plot(x + cos * along - sin * across, y + sin * along + cos * across, color=WANTED, linewidth=0.7)
     above.plot(x, y, color=FIRST)
     ends = np.cumsum((0, *trace.scenario.periods))

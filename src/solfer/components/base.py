@@ -49,7 +49,9 @@ class Component:
 
     def __init__(self, robot: "Robot", tags: Any = None, name: str = ""):
         self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
-        self.kinematics, self.dynamics, self.modify = True, False, False
+        self.kinematics = True
+        self.dynamics = False
+        self.modify = False
         self.period = self.passed = self.time_lost = 0.0
         self.pace = 1.0
         self.start_position = robot.state.position

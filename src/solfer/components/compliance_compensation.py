@@ -38,7 +38,8 @@ class ComplianceCompensation(Component):
         super().__init__(robot, tags or ComplianceTags(), name or "compliance_compensation")
         self.kinematics = False
         self._compliance = _compliance(robot, self.tags)
-        self._wanted, self._position = WantedPositions(robot), np.zeros(robot.size)
+        self._wanted = WantedPositions(robot)
+        self._position = np.zeros(robot.size)
         self._deflection = np.zeros(robot.size)
 
     def init(self) -> None:
@@ -71,7 +72,8 @@ def _compliance(robot: Robot, tags: ComplianceTags) -> np.ndarray:
         chain = robot.selectors[tags.chain].indices
     except UnknownName as error:
         raise error.at(tags.where("chain")) from None
-    stiffness, compliance = robot.actuators.stiffness, np.zeros(robot.size)
+    stiffness = robot.actuators.stiffness
+    compliance = np.zeros(robot.size)
     springs = chain[stiffness[chain] > 0.0]
     if not len(springs):
         if "chain" not in tags.model_fields_set:

@@ -52,7 +52,8 @@ def live_gains(
     """
     present = [gain for gain in GAINS if np.isfinite(_numbers(robot, gain, groups)).any()]
     for gain, (_, dofs, numbers) in zip(present, gains, strict=True):
-        write, of_tags = partial(np.copyto, numbers), partial(_numbers_of_tags, robot, gain, dofs)
+        write = partial(np.copyto, numbers)
+        of_tags = partial(_numbers_of_tags, robot, gain, dofs)
         for index, group in enumerate(groups):
             if getattr(group, gain) is not None:
                 yield LiveParameter(("gains", index, gain), write, of_tags)

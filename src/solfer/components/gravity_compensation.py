@@ -86,14 +86,17 @@ class GravityCompensation(Component):
         self._carrying = CarryingTorques(robot.dynamics, free)
         robot.dynamics.subscribe(BIAS)
         self._gains = configured_gains(robot, self.tags.gains)
-        self._before, self._torque, self._left = np.zeros(robot.size), np.zeros(robot.size), 0.0
+        self._before = np.zeros(robot.size)
+        self._torque = np.zeros(robot.size)
+        self._left = 0.0
         self._fade = self.tags.fade
         self._wanted = WantedPositions(robot)
         self._springs = np.zeros(robot.size)
 
     def _tracked(self) -> dict[str, Point]:
         """Return the contacts of the group `track` by name."""
-        contacts, tracked = self.model.contacts, self.model.contacts.group(self.tags.track)
+        contacts = self.model.contacts
+        tracked = self.model.contacts.group(self.tags.track)
         if not tracked and "track" in self.tags.model_fields_set:
             raise ComponentError(
                 f"no contact of '{self.tags.track}' carries '{self.model.name}'",

@@ -66,15 +66,19 @@ class JointStates(Component):
         self._ramp = Ramp(len(self._joints))
         self._time = self._duration = 0.0
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))
-        self._ramped, self._ramp_velocity = np.zeros(len(self._joints)), np.zeros(len(self._joints))
+        self._ramped = np.zeros(len(self._joints))
+        self._ramp_velocity = np.zeros(len(self._joints))
         self._by_ramp = np.ones(len(self._joints), dtype=bool)
         self._follower = TrajectoryFollower(robot, self._joints, self._position, self._velocity)
-        self._wheel_velocity, self._wheel_goal = np.zeros(len(self._wheels)), np.zeros(len(self._wheels))
-        self._step, self._error = np.zeros(len(self._wheels)), np.zeros(len(self._joints))
+        self._wheel_velocity = np.zeros(len(self._wheels))
+        self._wheel_goal = np.zeros(len(self._wheels))
+        self._step = np.zeros(len(self._wheels))
+        self._error = np.zeros(len(self._joints))
 
     def _group(self, tag: str) -> np.ndarray:
         """Return the DoFs of a tag's group; a group that exists only by default may be missing in the robot."""
-        name, selectors = getattr(self.tags, tag), self.model.selectors
+        name = getattr(self.tags, tag)
+        selectors = self.model.selectors
         if name not in selectors and tag not in self.tags.model_fields_set:
             return np.zeros(0, dtype=int)
         try:
@@ -211,7 +215,8 @@ class JointStates(Component):
         if self._goals.moves_joints(request):
             self._follower.leave("a request of the service has taken over")
             self._plan(goal, np.minimum(speed, self._limit))
-        self._goal[:], self._wheel_goal[:] = goal, wheel_goal
+        self._goal[:] = goal
+        self._wheel_goal[:] = wheel_goal
         spin = np.abs(wheel_goal - self._wheel_velocity).max(initial=0.0) / self.tags.wheel_acceleration
         return Reply(duration=float(max(self._duration - self._time, spin)))
 
@@ -231,7 +236,9 @@ class JointStates(Component):
     def _plan(self, goal: np.ndarray, limits: np.ndarray) -> None:
         """Begin a ramp of all joints, from how they move at present."""
         self._duration = self._ramp.plan(self._position, self._velocity, goal, limits)
-        self._time, self._by_ramp[:], self._goal[:] = 0.0, True, goal
+        self._time = 0.0
+        self._by_ramp[:] = True
+        self._goal[:] = goal
 
     def _brake(self) -> None:
         """Stop all joints, those of a trajectory too."""
@@ -240,7 +247,9 @@ class JointStates(Component):
 
     def _slow_down(self) -> None:
         """Begin a ramp that brings all joints to rest within its `stop_time`, none of them faster than it is."""
-        robot, joints, position = self.model, self._joints, self._position
+        robot = self.model
+        joints = self._joints
+        position = self._position
         lower, upper = (each.position[joints] for each in (robot.lower_limits, robot.upper_limits))
         rest = position + 0.5 * self._ramp.stop_time * self._velocity
         goal = np.clip(rest, np.minimum(lower, position), np.maximum(upper, position))

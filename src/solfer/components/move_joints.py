@@ -78,10 +78,13 @@ class JointGoals:
     """
 
     def __init__(self, robot: Robot, joints: np.ndarray, wheels: np.ndarray, chain: str):
-        self._robot, self._joints, self._chain = robot, joints, chain
+        self._robot = robot
+        self._joints = joints
+        self._chain = chain
         self._place = {robot.dofs[dof]: index for index, dof in enumerate(joints)}
         self._wheel_place = {robot.dofs[dof]: index for index, dof in enumerate(wheels)}
-        self._lower, self._upper = robot.lower_limits.position[joints], robot.upper_limits.position[joints]
+        self._lower = robot.lower_limits.position[joints]
+        self._upper = robot.upper_limits.position[joints]
         self._wheel_limit = robot.upper_limits.velocity[wheels]
 
     def moves_joints(self, request: MoveJoints) -> bool:
@@ -127,7 +130,8 @@ class JointGoals:
             NotFinite: A value is NaN or infinite.
             ComponentError: A value is beyond the robot's limits, or the request contradicts itself.
         """
-        new, new_wheels = goal.copy(), wheel_goal.copy()
+        new = goal.copy()
+        new_wheels = wheel_goal.copy()
         if request.state:
             if request.joints:
                 raise ComponentError(f"both state '{request.state}' and joints are given", expected="one of the two")
@@ -176,7 +180,9 @@ class JointGoals:
     def _check_joints(self, goal: np.ndarray, moved: np.ndarray, state: str) -> None:
         targets_of = f" of state '{state}'" if state else ""
         for joint, index in self._place.items():
-            value, lower, upper = goal[index], self._lower[index], self._upper[index]
+            value = goal[index]
+            lower = self._lower[index]
+            upper = self._upper[index]
             if moved[index] and not lower <= value <= upper:
                 raise ComponentError(
                     f"position {value:.6g} rad{targets_of} is beyond the limits of joint '{joint}'",

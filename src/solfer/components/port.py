@@ -27,7 +27,9 @@ class Port:
     def __init__(self, quantity: str, count: int | None = None, required: bool = False):
         if quantity not in QUANTITIES:
             raise UnknownName("quantity", quantity, QUANTITIES)
-        self.quantity, self.count, self.required = quantity, count, required
+        self.quantity = quantity
+        self.count = count
+        self.required = required
         self.value = np.zeros(QUANTITIES[quantity] if count is None else (count, QUANTITIES[quantity]))
         if quantity in ("orientation", "pose"):
             self.value[..., -1] = 1.0

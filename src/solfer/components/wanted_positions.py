@@ -20,7 +20,8 @@ class WantedPositions:
     """
 
     def __init__(self, robot: Robot):
-        self._robot, self._command = robot, robot.command.position
+        self._robot = robot
+        self._command = robot.command.position
         self.values, self._sent = np.full((2, robot.size), np.nan)
         self._own, self._changed = np.zeros((2, robot.size), dtype=bool)
         self._command[:] = np.nan

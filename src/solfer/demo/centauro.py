@@ -14,7 +14,8 @@ from solfer.robot import Robot
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.transport import Middleware
 
-LOW, HIGH = "mammal_wide_straight", "mammal_wide_high"
+LOW = "mammal_wide_straight"
+HIGH = "mammal_wide_high"
 DISTANCE = 0.5
 """Distance that the robot drives [m]."""
 
@@ -42,7 +43,8 @@ class Progress:
     """One line on the terminal with the present step; a line for each step where there is no terminal."""
 
     def __init__(self) -> None:
-        self._live, self._open = sys.stdout.isatty(), False
+        self._live = sys.stdout.isatty()
+        self._open = False
 
     def __call__(self, title: str, passed: float, duration: float) -> None:
         """Show that `passed` of `duration` [s] of a step are over."""
@@ -78,7 +80,8 @@ def tell(
     Raises:
         SolferError: The robot does not start, or a plugin refuses.
     """
-    middleware, recorder = show.middleware, MotionRecorder(show.robot)
+    middleware = show.middleware
+    recorder = MotionRecorder(show.robot)
     storyteller = story.StoryTeller(middleware, recorder, Progress(), asked)
     storyteller.wait_for_robot(60.0, show.check)
     if not middleware.running():
@@ -109,7 +112,8 @@ def conclude(show: story.Show, robot: Robot, recorder: MotionRecorder, plugin: s
     """Print the table and draw the pictures of a story that is over; return the exit code."""
     forward, _ = wheels(robot, recorder)
     show.output.mkdir(parents=True, exist_ok=True)
-    picture, tracking = show.output / "demo.png", show.output / "demo_tracking.png"
+    picture = show.output / "demo.png"
+    tracking = show.output / "demo_tracking.png"
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
         renderer.save(posture(robot, recorder), picture)
     report.plot(recorder, DRAWN, tuple(forward), tracking)
@@ -132,7 +136,8 @@ def parts(robot: Robot) -> dict[str, set[str]]:
 def posture(robot: Robot, recorder: "Latest") -> np.ndarray:
     """Return the robot's DoFs as they were measured last, shape (n,)."""
     position = np.zeros(robot.size)
-    joints, base = recorder.newest("measured"), recorder.newest("base")
+    joints = recorder.newest("measured")
+    base = recorder.newest("base")
     for name, value in zip(joints.names, joints.position, strict=True):
         position[robot.dof(name)] = value
     robot.kinematics.base.from_pose(base.position, base.orientation, position[:6])

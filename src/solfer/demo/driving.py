@@ -92,8 +92,11 @@ class Driving:
     """
 
     def __init__(self, middleware: Middleware, recorder: DrivingRecorder, robot: Robot, legs: Robot, course: Path):
-        self._middleware, self._recorder, self.taken = middleware, recorder, 0.0
-        self.robot, self.legs = robot, legs
+        self._middleware = middleware
+        self._recorder = recorder
+        self.taken = 0.0
+        self.robot = robot
+        self.legs = legs
         self._player = Player(read_scenario(course), 1.0 / RATE)
 
     def run(self, progress: Progress, check: Callable[[], None] = lambda: None) -> int:
@@ -107,7 +110,10 @@ class Driving:
         course = ScenarioCourse(middleware, self._player, "locomotion", "odometry/odom", positions=True)
         navigation = Navigation(middleware, course, "navigation", RATE)
         waving = Waving(middleware, "hands", hands_of(self.robot))
-        begin, whole, cycles, told = middleware.now(), course.left, 0, ""
+        begin = middleware.now()
+        whole = course.left
+        cycles = 0
+        told = ""
         robot_begin = robot_time(self._recorder)
         complaints = Complaints(middleware)
 
@@ -139,7 +145,8 @@ class Driving:
 
     def _rest(self, course: ScenarioCourse) -> None:
         """Let the robot come to rest, as far as it does so soon."""
-        end, looks = time.monotonic() + BRAKING, 0
+        end = time.monotonic() + BRAKING
+        looks = 0
         while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(MANY) >= AT_REST):
             course.rest()
             time.sleep(1.0 / RATE)
@@ -162,7 +169,8 @@ def wait_for_robot(
     Raises:
         MiddlewareError: It takes longer.
     """
-    end, told = time.monotonic() + timeout, ""
+    end = time.monotonic() + timeout
+    told = ""
     while middleware.running() and (missing := recorder.missing()):
         if missing != told:
             print(f"waits for {missing}", flush=True)

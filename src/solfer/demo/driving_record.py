@@ -29,7 +29,8 @@ class DrivingRecorder:
     """
 
     def __init__(self, middleware: Middleware):
-        self.clock, self._now = ArrivalClock(), middleware.now
+        self.clock = ArrivalClock()
+        self._now = middleware.now
         self._queues = {name: middleware.queue(topic, carries, 4000) for name, (topic, carries, _) in TOPICS.items()}
         self._messages: dict[str, list[JointMessage | BodyMessage | PointsMessage]] = {name: [] for name in TOPICS}
 

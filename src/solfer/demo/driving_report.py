@@ -58,10 +58,13 @@ class Seen:
 def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
     """Compute what the robot, and its legs, did from joints and the true base."""
     joints = recorder.messages("measured")
-    times, places = np.array([each.stamp for each in joints]), np.array([each.position for each in joints])
-    dofs, kinematics = [robot.dof(name) for name in joints[0].names], robot.kinematics
+    times = np.array([each.stamp for each in joints])
+    places = np.array([each.position for each in joints])
+    dofs = [robot.dof(name) for name in joints[0].names]
+    kinematics = robot.kinematics
     of_legs = [robot.dof(name) for name in legs.dofs]
-    rows, last = [], -math.inf
+    rows = []
+    last = -math.inf
     for message in recorder.messages("base"):
         if message.stamp - last < EVERY or message.stamp > times[-1]:
             continue
@@ -70,9 +73,11 @@ def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
         q[dofs] = places[min(int(np.searchsorted(times, last)), len(times) - 1)]
         kinematics.base.from_pose(message.position, message.orientation, q[:6])
         robot.update()
-        rotation, place = kinematics.rotation("pelvis"), kinematics.position("pelvis")
+        rotation = kinematics.rotation("pelvis")
+        place = kinematics.position("pelvis")
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
-        cos, sin = math.cos(heading), math.sin(heading)
+        cos = math.cos(heading)
+        sin = math.sin(heading)
         turn = np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))
         legs.kinematics.update(q[of_legs])
         tracked = legs.kinematics.center_of_mass[:2].copy()
@@ -95,8 +100,10 @@ def _vertex(robot: Robot, wheel: str) -> np.ndarray:
 def _from_begin(base: np.ndarray) -> np.ndarray:
     """Return places and headings as seen from the first one, shape (k, 3) [m, rad]."""
     x, y, heading = base[0]
-    cos, sin = math.cos(heading), math.sin(heading)
-    dx, dy = base[:, 0] - x, base[:, 1] - y
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    dx = base[:, 0] - x
+    dy = base[:, 1] - y
     return np.stack((cos * dx + sin * dy, cos * dy - sin * dx, np.unwrap(base[:, 2]) - heading), axis=1)
 
 
@@ -122,7 +129,8 @@ def table(
         recording: What plugins wanted.
         reports: Health of the nodes.
     """
-    times, way = recorder.clock.times(seen.time), float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
+    times = recorder.clock.times(seen.time)
+    way = float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
     wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
     base = np.linalg.norm(wanted - wanted[0] - (seen.tracked - seen.tracked[0]), axis=1)
@@ -153,7 +161,8 @@ def _drift(recorder: DrivingRecorder, seen: Seen, way: float) -> str:
     estimates = recorder.messages("odometry")
     poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in estimates])
     x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
-    off, turned = math.hypot(x, y), math.degrees(math.remainder(heading, math.tau))
+    off = math.hypot(x, y)
+    turned = math.degrees(math.remainder(heading, math.tau))
     part = 100.0 * off / way if way > 0.1 else 0.0
     share = f", {part:.2f} % of the way" if part else ""
     figure = f"{1e3 * off:.1f} mm{share}, {turned:.2f} degrees at the end"
@@ -175,20 +184,24 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
     """Compute the way that the wheels' material slid over the ground, as a share of the way of their centres."""
     joints = recorder.messages("measured")
     times = np.array([each.stamp for each in joints])
-    dofs, kinematics, last = [robot.dof(name) for name in joints[0].names], robot.kinematics, -math.inf
+    dofs = [robot.dof(name) for name in joints[0].names]
+    kinematics = robot.kinematics
+    last = -math.inf
     slid = gone = 0.0
     for message in recorder.messages("base"):
         if message.stamp - last < EVERY or message.stamp > times[-1]:
             continue
         last = message.stamp
-        q, v = robot.state.position, robot.state.velocity
+        q = robot.state.position
+        v = robot.state.velocity
         near = joints[min(int(np.searchsorted(times, last)), len(joints) - 1)]
         q[dofs], v[dofs] = near.position, near.velocity
         kinematics.base.from_pose(message.position, message.orientation, q[:6])
         v[:6] = 0.0
         robot.update()
         place = kinematics.position("pelvis")
-        linear, angular = message.linear, message.angular
+        linear = message.linear
+        angular = message.angular
         for wheel in WHEELS:
             rates = kinematics.jacobian(wheel) @ v
             center = rates[:3] + linear + np.cross(angular, kinematics.position(wheel) - place)

@@ -27,9 +27,11 @@ class ArrivalClock:
         """Return when messages arrived, or would have, by their stamps, shape (k,) [s]."""
         if not self._stamps:
             return np.array(stamps, float)
-        known, arrivals = np.array(self._stamps), np.array(self._arrivals)
+        known = np.array(self._stamps)
+        arrivals = np.array(self._arrivals)
         delays = arrivals - known
-        begins, ends = np.searchsorted(arrivals, arrivals - WINDOW), np.searchsorted(arrivals, arrivals + WINDOW)
+        begins = np.searchsorted(arrivals, arrivals - WINDOW)
+        ends = np.searchsorted(arrivals, arrivals + WINDOW)
         fastest = [delays[begin:end].min() for begin, end in zip(begins, ends, strict=True)]
         return stamps + np.interp(stamps, known, fastest)
 
@@ -67,7 +69,8 @@ class MotionRecorder:
             "base": middleware.queue("floating_base", "nav_msgs/Odometry", 4000),
         }
         self._messages: dict[str, list[JointMessage | BodyMessage]] = {name: [] for name in self._queues}
-        self._clocks, self._now = {name: ArrivalClock() for name in self._queues}, middleware.now
+        self._clocks = {name: ArrivalClock() for name in self._queues}
+        self._now = middleware.now
 
     def collect(self) -> None:
         """Store the messages that have arrived."""

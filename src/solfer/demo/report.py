@@ -27,13 +27,15 @@ def joint_error(measured: Trace, desired: Trace, joints: Collection[str]) -> tup
         joints: Joints to compare.
     """
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
-    worst, joint = 0.0, ""
+    worst = 0.0
+    joint = ""
     for name in (name for name in desired.names if name in joints):
         goal = np.interp(times, desired.time, desired.column(name, "position"))
         after = measured.time >= desired.time[0]
         error = np.abs(measured.column(name, "position") - goal)[after].max(initial=0.0)
         if error > worst:
-            worst, joint = float(error), name
+            worst = float(error)
+            joint = name
     return worst, joint
 
 
@@ -53,7 +55,8 @@ def table(
         plugin: Name of the report of the plugin that commands the robot.
         simulator: Name of the simulator's report.
     """
-    measured, desired = recorder.joints("measured"), recorder.joints("desired")
+    measured = recorder.joints("measured")
+    desired = recorder.joints("desired")
     errors = {part: joint_error(measured, desired, joints) for part, joints in parts.items()}
     base = recorder.base().values["position"]
     drift = 1e3 * float(np.hypot(*(base[-1, :2] - base[0, :2])))
@@ -113,7 +116,9 @@ def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, .
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    measured, desired, base = recorder.joints("measured"), recorder.joints("desired"), recorder.base()
+    measured = recorder.joints("measured")
+    desired = recorder.joints("desired")
+    base = recorder.base()
     start = measured.time[0]
     figure = Figure(figsize=(10, 9), layout="constrained")
     FigureCanvasAgg(figure)

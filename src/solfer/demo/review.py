@@ -60,7 +60,9 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
     Raises:
         SolferError: The recording cannot be read, or something cannot be written.
     """
-    robot, recording, world = found.robot, read(file), read_world(find_world(WORLD))
+    robot = found.robot
+    recording = read(file)
+    world = read_world(find_world(WORLD))
     seen = driving_report.see(robot, found.legs, found.recorder)
     rows = driving_report.table(robot, found.recorder, seen, recording, found.reports)
     if warning := driving_report.warning(found.reports, seen, found.taken, found.waited):
@@ -73,7 +75,8 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
     plots = list(canvas.saved(pages, output / "demo_plots.png"))
     print(f"pictures: {', '.join(map(str, (output / 'demo.png', *plots)))}")
     if films:
-        path, progress = output / "demo.gif", Progress()
+        path = output / "demo.gif"
+        progress = Progress()
         film(robot, seen.time, seen.position, world, path, lambda done, count: progress("draws the film", done, count))
         print(f"film: {path}")
     return MISSED if warning or any(driving_report.OUTSIDE in figure for _, figure in rows) else 0

@@ -77,7 +77,9 @@ def watch(
 
     `actor` makes of the Robot what is called with the time that has passed [s].
     """
-    middleware, recorder, progress = show.middleware, MotionRecorder(show.robot), centauro.Progress()
+    middleware = show.middleware
+    recorder = MotionRecorder(show.robot)
+    progress = centauro.Progress()
     teller = story.StoryTeller(middleware, recorder, progress, ())
     teller.wait_for_robot(60.0, show.check)
     if not middleware.running():
@@ -86,7 +88,9 @@ def watch(
     robot = centauro.load_robot(middleware)
     robot.state.position[:] = centauro.posture(robot, recorder)
     robot.update()
-    act, begin, passed = actor(robot), robot_time(recorder), 0.0
+    act = actor(robot)
+    begin = robot_time(recorder)
+    passed = 0.0
     while middleware.running() and passed < duration:
         passed = robot_time(recorder) - begin
         act(passed)

@@ -116,7 +116,9 @@ class StoryTeller:
         plugins: tuple[str, ...] = (UPPER, LOWER),
     ):
         self._plugins = plugins
-        self._middleware, self._recorder, self._progress = middleware, recorder, progress
+        self._middleware = middleware
+        self._recorder = recorder
+        self._progress = progress
 
     def wait_for_robot(self, timeout: float, check: Callable[[], None] = lambda: None) -> None:
         """Wait until the robot is received and commanded, and the plugins accept requests, or the middleware ends.

@@ -77,5 +77,6 @@ def robot_time(recorder: MeasurementRecorder) -> float:
 def hands_of(robot: Robot) -> dict[str, np.ndarray]:
     """Return where the hands are as seen from the base, by task, each of shape (3,) [m]; the Robot is up to date."""
     kinematics = robot.kinematics
-    place, rotation = kinematics.position(BASE), kinematics.rotation(BASE)
+    place = kinematics.position(BASE)
+    rotation = kinematics.rotation(BASE)
     return {name: rotation.T @ (kinematics.position(link) - place) for name, link in HANDS.items()}

@@ -42,11 +42,15 @@ class CarryingTorques:
     """
 
     def __init__(self, model: DynamicModel, free: np.ndarray):
-        size, count = model.robot.kinematics.size, len(free)
-        self.model, self.torque = model, np.zeros(size)
+        size = model.robot.kinematics.size
+        count = len(free)
+        self.model = model
+        self.torque = np.zeros(size)
         self.rank = self.carried = 0
         self._free = np.array(free, dtype=np.int64)
-        self._span, self._squares, self._along = np.zeros((size, size)), np.zeros((2, size)), np.zeros(size)
+        self._span = np.zeros((size, size))
+        self._squares = np.zeros((2, size))
+        self._along = np.zeros(size)
         self._held, self._factor = np.zeros((2, count, count))
         self._load, self._shares, self._ratios = np.zeros((3, count))
         self._well = np.zeros(count, dtype=bool)
@@ -60,7 +64,8 @@ class CarryingTorques:
         Raises:
             SizeMismatch: `jacobian` has another shape.
         """
-        bias, size = self.model.bias, len(self.torque)
+        bias = self.model.bias
+        size = len(self.torque)
         if jacobian.ndim != 2 or jacobian.shape[1] != size or len(jacobian) > size:
             raise SizeMismatch(f"a matrix of shape {jacobian.shape}, expected (k, {size}), k <= {size}")
         self.rank, is_held = carry(

@@ -35,7 +35,10 @@ def _span(jacobian, tolerance, span, squares):
     Gram and Schmidt's method with the longest of the remaining rows first, which shows the rank as a QR decomposition
     with column pivoting does: remainders shorter than `tolerance` times the first row count as zero.
     """
-    count, longest, left, whole = len(jacobian), 0.0, squares[0], squares[1]
+    count = len(jacobian)
+    longest = 0.0
+    left = squares[0]
+    whole = squares[1]
     for i in range(count):
         span[i] = jacobian[i]
         left[i] = whole[i] = _dot(span[i], span[i])
@@ -44,7 +47,8 @@ def _span(jacobian, tolerance, span, squares):
         for i in range(r + 1, count):
             if left[i] > left[best]:
                 best = i
-        row, other = span[r], span[best]
+        row = span[r]
+        other = span[best]
         if best != r:
             for k in range(len(row)):
                 row[k], other[k] = other[k], row[k]
@@ -130,7 +134,8 @@ def _carry(jacobian, bias, free, tolerance, weak, span, squares, held, factor, l
     Returns:
         The rank, and whether all is held well; if not, `torque` is not written, and `load` is what has to be borne.
     """
-    size, rank = len(free), _span(jacobian, tolerance, span, squares)
+    size = len(free)
+    rank = _span(jacobian, tolerance, span, squares)
     for r in range(rank):
         along[r] = _dot(span[r], bias)
     for i in range(size):
@@ -156,7 +161,9 @@ def _bear(bias, free, span, rank, load, along, torque):
     _torque(bias, free, span, rank, load, along, torque)
 
 
-_MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
+_MATRIX = "float64[:, ::1]"
+_VECTOR = "float64[::1]"
+_INDICES = "int64[::1]"
 
 carry = cached(
     f"Tuple((int64, boolean))({_MATRIX}, {_VECTOR}, {_INDICES}, float64, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, "

@@ -20,8 +20,10 @@ class DynamicModel(Elements):
 
     def __init__(self, robot: RobotView):
         self.robot = robot
-        self._recursion, self._placed = Recursion(robot), -1
-        self._bias, self._inertia = self._recursion.bias, self._recursion.inertia
+        self._recursion = Recursion(robot)
+        self._placed = -1
+        self._bias = self._recursion.bias
+        self._inertia = self._recursion.inertia
         self._inertia_inverse = self._recursion.inertia_inverse
         super().__init__(self.stamp)
 

@@ -10,13 +10,19 @@ import math
 
 from solfer.numerics.compilation import REORDERED, cached
 
-_MATRIX, _NUMBERS, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
+_MATRIX = "float64[:, ::1]"
+_NUMBERS = "float64[::1]"
+_INDICES = "int64[::1]"
 
 
 def _place(placements, masses, levers, inertias, spatial):
     """Write the spatial inertia of each body: mass, mass times centre, and xx, yy, zz, xy, xz, yz about the origin."""
     for k in range(len(spatial)):
-        pose, mass, lever, inertia, out = placements[k + 1], masses[k + 1], levers[k + 1], inertias[k + 1], spatial[k]
+        pose = placements[k + 1]
+        mass = masses[k + 1]
+        lever = levers[k + 1]
+        inertia = inertias[k + 1]
+        out = spatial[k]
         x = pose[0] * lever[0] + pose[3] * lever[1] + pose[6] * lever[2] + pose[9]
         y = pose[1] * lever[0] + pose[4] * lever[1] + pose[7] * lever[2] + pose[10]
         z = pose[2] * lever[0] + pose[5] * lever[1] + pose[8] * lever[2] + pose[11]
@@ -27,8 +33,12 @@ def _place(placements, masses, levers, inertias, spatial):
         for i in range(3):
             for j in range(3):
                 entry = inertia[i, j]
-                ax, ay, az = pose[3 * i], pose[3 * i + 1], pose[3 * i + 2]
-                bx, by, bz = pose[3 * j], pose[3 * j + 1], pose[3 * j + 2]
+                ax = pose[3 * i]
+                ay = pose[3 * i + 1]
+                az = pose[3 * i + 2]
+                bx = pose[3 * j]
+                by = pose[3 * j + 1]
+                bz = pose[3 * j + 2]
                 out[4] += ax * entry * bx
                 out[5] += ay * entry * by
                 out[6] += az * entry * bz
@@ -43,23 +53,40 @@ def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
     `motion` is velocity and acceleration of each body, `force` the force on it; linear first.
     """
     for k in range(len(parents)):
-        joint, rate, above = joints[k], velocity[k], parents[k]
-        here, needed, body = motion[k], force[k], spatial[k]
+        joint = joints[k]
+        rate = velocity[k]
+        above = parents[k]
+        here = motion[k]
+        needed = force[k]
+        body = spatial[k]
         if above < 0:
             ux = uy = uz = wx = wy = wz = 0.0
-            ax, ay, az, bx, by, bz = -gravity[0], -gravity[1], -gravity[2], 0.0, 0.0, 0.0
+            ax = -gravity[0]
+            ay = -gravity[1]
+            az = -gravity[2]
+            bx = 0.0
+            by = 0.0
+            bz = 0.0
         else:
             before = motion[above]
-            ux, uy, uz, wx, wy, wz = before[0], before[1], before[2], before[3], before[4], before[5]
-            ax, ay, az, bx, by, bz = before[6], before[7], before[8], before[9], before[10], before[11]
-        sx, sy, sz, tx, ty, tz = (
-            rate * joint[0],
-            rate * joint[1],
-            rate * joint[2],
-            rate * joint[3],
-            rate * joint[4],
-            rate * joint[5],
-        )
+            ux = before[0]
+            uy = before[1]
+            uz = before[2]
+            wx = before[3]
+            wy = before[4]
+            wz = before[5]
+            ax = before[6]
+            ay = before[7]
+            az = before[8]
+            bx = before[9]
+            by = before[10]
+            bz = before[11]
+        sx = rate * joint[0]
+        sy = rate * joint[1]
+        sz = rate * joint[2]
+        tx = rate * joint[3]
+        ty = rate * joint[4]
+        tz = rate * joint[5]
         # the joint's axis moves along with the body that carries it: V x S
         ax += wy * sz - wz * sy + uy * tz - uz * ty
         ay += wz * sx - wx * sz + uz * tx - ux * tz
@@ -67,12 +94,32 @@ def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
         bx += wy * tz - wz * ty
         by += wz * tx - wx * tz
         bz += wx * ty - wy * tx
-        ux, uy, uz, wx, wy, wz = ux + sx, uy + sy, uz + sz, wx + tx, wy + ty, wz + tz
-        here[0], here[1], here[2], here[3], here[4], here[5] = ux, uy, uz, wx, wy, wz
-        here[6], here[7], here[8], here[9], here[10], here[11] = ax, ay, az, bx, by, bz
-        mass, hx, hy, hz = body[0], body[1], body[2], body[3]
+        ux = ux + sx
+        uy = uy + sy
+        uz = uz + sz
+        wx = wx + tx
+        wy = wy + ty
+        wz = wz + tz
+        here[0] = ux
+        here[1] = uy
+        here[2] = uz
+        here[3] = wx
+        here[4] = wy
+        here[5] = wz
+        here[6] = ax
+        here[7] = ay
+        here[8] = az
+        here[9] = bx
+        here[10] = by
+        here[11] = bz
+        mass = body[0]
+        hx = body[1]
+        hy = body[2]
+        hz = body[3]
         # momentum, and the force that the acceleration takes
-        px, py, pz = mass * ux + wy * hz - wz * hy, mass * uy + wz * hx - wx * hz, mass * uz + wx * hy - wy * hx
+        px = mass * ux + wy * hz - wz * hy
+        py = mass * uy + wz * hx - wx * hz
+        pz = mass * uz + wx * hy - wy * hx
         lx = hy * uz - hz * uy + body[4] * wx + body[7] * wy + body[8] * wz
         ly = hz * ux - hx * uz + body[7] * wx + body[5] * wy + body[9] * wz
         lz = hx * uy - hy * ux + body[8] * wx + body[9] * wy + body[6] * wz
@@ -89,7 +136,9 @@ def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
             hx * ay - hy * ax + body[8] * bx + body[9] * by + body[6] * bz + wx * ly - wy * lx + ux * py - uy * px
         )
     for k in range(len(parents) - 1, -1, -1):
-        joint, needed, above = joints[k], force[k], parents[k]
+        joint = joints[k]
+        needed = force[k]
+        above = parents[k]
         bias[k] = (
             joint[0] * needed[0]
             + joint[1] * needed[1]
@@ -107,10 +156,22 @@ def _inertia(joints, parents, spatial, composite, inertia):
     """Write both triangles of the inertia matrix: the composite-rigid-body algorithm. Zeros are not written."""
     composite[:] = spatial
     for k in range(len(parents) - 1, -1, -1):
-        joint, body, above = joints[k], composite[k], parents[k]
-        mass, hx, hy, hz = body[0], body[1], body[2], body[3]
-        ux, uy, uz, wx, wy, wz = joint[0], joint[1], joint[2], joint[3], joint[4], joint[5]
-        fx, fy, fz = mass * ux + wy * hz - wz * hy, mass * uy + wz * hx - wx * hz, mass * uz + wx * hy - wy * hx
+        joint = joints[k]
+        body = composite[k]
+        above = parents[k]
+        mass = body[0]
+        hx = body[1]
+        hy = body[2]
+        hz = body[3]
+        ux = joint[0]
+        uy = joint[1]
+        uz = joint[2]
+        wx = joint[3]
+        wy = joint[4]
+        wz = joint[5]
+        fx = mass * ux + wy * hz - wz * hy
+        fy = mass * uy + wz * hx - wx * hz
+        fz = mass * uz + wx * hy - wy * hx
         nx = hy * uz - hz * uy + body[4] * wx + body[7] * wy + body[8] * wz
         ny = hz * ux - hx * uz + body[7] * wx + body[5] * wy + body[9] * wz
         nz = hx * uy - hy * ux + body[8] * wx + body[9] * wy + body[6] * wz
@@ -150,7 +211,8 @@ def _inverse(inertia, parents, last, factor, roots, inverse):
             i = parents[i]
         i = parents[k]
         while i >= 0:
-            entry, j = factor[k, i], i
+            entry = factor[k, i]
+            j = i
             while j >= 0:
                 factor[i, j] -= entry * factor[k, j]
                 j = parents[j]
@@ -158,7 +220,8 @@ def _inverse(inertia, parents, last, factor, roots, inverse):
     for j in range(size):
         factor[j, j] = roots[j]
         for k in range(j + 1, last[j] + 1):
-            total, i = 0.0, parents[k]
+            total = 0.0
+            i = parents[k]
             while i >= j:
                 total += factor[k, i] * factor[j, i]
                 i = parents[i]
@@ -167,7 +230,8 @@ def _inverse(inertia, parents, last, factor, roots, inverse):
     for j in range(size):
         column = factor[j, j : last[j] + 1]
         for a in range(len(column)):
-            entry, row = column[a], inverse[j + a, j : last[j] + 1]
+            entry = column[a]
+            row = inverse[j + a, j : last[j] + 1]
             for b in range(len(column)):
                 row[b] += entry * column[b]
     return -1

@@ -34,11 +34,14 @@ class ProjectedDynamics(Elements):
     def __init__(self, model: DynamicModel):
         size = model.robot.kinematics.size
         self.model = model
-        self._space, self._constrained = NullSpace(size), 0
-        self._vector, self._turned = np.zeros(size), np.zeros((size, size), order="F")
+        self._space = NullSpace(size)
+        self._constrained = 0
+        self._vector = np.zeros(size)
+        self._turned = np.zeros((size, size), order="F")
         self._square = np.zeros((size, size), order="F")
         # one block of memory each, that is cut anew when the rank changes
-        self._factors, self._solutions = np.zeros(size * size), np.zeros(size * size)
+        self._factors = np.zeros(size * size)
+        self._solutions = np.zeros(size * size)
         self._fit()
         super().__init__(lambda name: self._with_constraints(model.stamp(name)))
 
@@ -74,10 +77,12 @@ class ProjectedDynamics(Elements):
 
     def _fit(self) -> None:
         """Cut the work space to the number of free directions."""
-        size, free = self._space.size, self._space.size - self.rank
+        size = self._space.size
+        free = self._space.size - self.rank
         self._factor = self._factors[: free * free].reshape((free, free), order="F")
         self._solution = self._solutions[: free * size].reshape((free, size), order="F")
-        self._bias, self._inertia = self._vector[:free], self._turned[self.rank :]
+        self._bias = self._vector[:free]
+        self._inertia = self._turned[self.rank :]
         self._inertia_inverse = self._solution.T
 
     def _with_constraints(self, stamp: Callable[[], Hashable]) -> Callable[[], Hashable]:

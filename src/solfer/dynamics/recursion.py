@@ -27,12 +27,14 @@ class Recursion:
     """
 
     def __init__(self, robot: RobotView):
-        self._robot, self._tree = robot, robot.kinematics.tree
+        self._robot = robot
+        self._tree = robot.kinematics.tree
         self._gravity = np.array(robot.kinematics.gravity)
         size = robot.kinematics.size
         self.bias, self.inertia, self.inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
         # entries that are always zero are not written: what is folded is not the array that the recursion writes
-        self._followers, self._folds = self._tree.followers, bool(self._tree.followers)
+        self._followers = self._tree.followers
+        self._folds = bool(self._tree.followers)
         self._unfolded = np.zeros((size, size)) if self._folds else self.inertia
         self._diagonal = self._unfolded.reshape(-1)[:: size + 1]
         self._has_rotors = bool(self._tree.armature.any())
@@ -41,13 +43,16 @@ class Recursion:
         for body in range(size - 1, -1, -1):
             if self._parents[body] >= 0:
                 self._last[self._parents[body]] = max(self._last[self._parents[body]], self._last[body])
-        self._line, self._ends = np.arange(-1, size - 1), np.full(size, size - 1)
+        self._line = np.arange(-1, size - 1)
+        self._ends = np.full(size, size - 1)
         self._spatial, self._composite = np.zeros((2, size, 10))
-        self._motion, self._force = np.zeros((size, 12)), np.zeros((size, 6))
+        self._motion = np.zeros((size, 12))
+        self._force = np.zeros((size, 6))
         products = np.sum((self._last - np.arange(size) + 1) ** 2)
         self._dense = products > DENSE_CALL + DENSE_SHARE * size**3
         # LAPACK's own order, so that it works in place
-        self._factor, self._roots = np.zeros((size, size), order="F" if self._dense else "C"), np.zeros(size)
+        self._factor = np.zeros((size, size), order="F" if self._dense else "C")
+        self._roots = np.zeros(size)
         self._inverse_diagonal = self.inertia_inverse.reshape(-1)[:: size + 1]
 
     def place(self) -> None:
@@ -95,9 +100,11 @@ class Recursion:
 
     def _invert_tree(self) -> int:
         """Invert by the factors of the tree; return the DoF at which that fails, or -1."""
-        parents, last = self._parents, self._last
+        parents = self._parents
+        last = self._last
         if self._folds:  # a leader moves what other branches carry, too: no entry is surely zero
-            parents, last = self._line, self._ends
+            parents = self._line
+            last = self._ends
         return kernel.inverse(self.inertia, parents, last, self._factor, self._roots, self.inertia_inverse)
 
     def _invert_dense(self) -> int:

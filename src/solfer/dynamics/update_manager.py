@@ -13,7 +13,8 @@ class _Element:
     """An element: its computation, the stamp of its inputs, and its counts."""
 
     def __init__(self, compute: Callable[[], None], stamp: Callable[[], Hashable]):
-        self.compute, self.stamp = compute, stamp
+        self.compute = compute
+        self.stamp = stamp
         self.used: Hashable = None
         self.subscribed = self.left = self.computed = 0
 

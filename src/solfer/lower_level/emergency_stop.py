@@ -13,7 +13,9 @@ class EmergencyStop:
     """
 
     def __init__(self, fade: float):
-        self._fade, self.reason, self.factor = fade, "", 1.0
+        self._fade = fade
+        self.reason = ""
+        self.factor = 1.0
 
     def __bool__(self) -> bool:
         return bool(self.reason)
@@ -24,7 +26,8 @@ class EmergencyStop:
 
     def reset(self) -> None:
         """Release the latch."""
-        self.reason, self.factor = "", 1.0
+        self.reason = ""
+        self.factor = 1.0
 
     def advance(self, dt: float) -> None:
         """Fade for `dt` [s]."""

@@ -80,7 +80,8 @@ class LowerLevel:
         self.refusals = Refusals()
         self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
-        self._measured, self.starts = np.zeros(kinematics.size), 0
+        self._measured = np.zeros(kinematics.size)
+        self.starts = 0
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import keep_turns, unwrap
 
@@ -239,7 +240,8 @@ class LowerLevel:
         commands from within this process, and knows of the start.
         """
         self._measured[:] = q
-        self._before[:], self._added[:] = q, 0.0
+        self._before[:] = q
+        self._added[:] = 0.0
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:
@@ -278,7 +280,8 @@ class LowerLevel:
         if not target.running:
             raise Suspended(f"controller '{target.name}' is stopped", where=f"command of '{owner}'", expected=STARTS)
         indices, given = target.check(message)
-        names, modes = tuple(message.names), tuple(given)
+        names = tuple(message.names)
+        modes = tuple(given)
         if not self.claims.renew(owner, target.name, names, modes):
             self.claims.claim_by_command(owner, names, ClaimedJoints(target.name, indices, modes))
             self._warn_distance(target, owner, indices, given)

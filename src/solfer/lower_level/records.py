@@ -12,8 +12,10 @@ from solfer.transport.messages import LARGEST_GAIN
 
 LEASE = 0.3  # [s]
 FADE = 0.5  # [s]
-TILT, TILT_TIME = 1.0472, 0.5  # 60 degrees [rad], [s]
-OVERSPEED, OVERSPEED_TIME = 2.0, 0.05  # [s]
+TILT = 1.0472
+TILT_TIME = 0.5  # 60 degrees [rad], [s]
+OVERSPEED = 2.0
+OVERSPEED_TIME = 0.05  # [s]
 
 MOST, LARGEST = 10_000, 2**24
 """Largest numbers of a ration: of messages, and of bytes."""

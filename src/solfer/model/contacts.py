@@ -79,7 +79,8 @@ class ContactRecord(Record):
             return self
         if not any(self.offset):
             return self
-        length, radius = math.hypot(*self.offset), self.minor_axis + self.major_axis
+        length = math.hypot(*self.offset)
+        radius = self.minor_axis + self.major_axis
         if abs(length - radius) > _CLOSE * radius:
             raise ValueError(
                 f"an 'offset' of {length:g} m from a wheel's centre to the ground; expected the sum of its radii, "

@@ -28,8 +28,10 @@ class History:
     """
 
     def __init__(self, interfaces: Sequence[str], dofs: np.ndarray, size: int):
-        self.interfaces, self.dofs = tuple(interfaces), dofs
-        self.stamps, self.arrivals = np.zeros(size), np.zeros(size)
+        self.interfaces = tuple(interfaces)
+        self.dofs = dofs
+        self.stamps = np.zeros(size)
+        self.arrivals = np.zeros(size)
         self.values = np.zeros((size, len(self.interfaces), len(dofs)))
         self.count = self.dropped = 0
         self.sender = ""

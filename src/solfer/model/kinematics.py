@@ -254,7 +254,8 @@ class Kinematics:
 
     def _find_base(self, floating_base: bool | None) -> None:
         floating = self.description.floating
-        self.base, self.base_link = None, None
+        self.base = None
+        self.base_link = None
         if floating_base or (floating is not None and floating_base is not False):
             origin = self._model.jointPlacements[1]
             self.base = BaseChart(origin.translation, origin.rotation)
@@ -270,17 +271,21 @@ class Kinematics:
 
     def _bound_leaders(self) -> None:
         """Give the limits of followers to their leaders; efforts of followers do not exist."""
-        lower, upper, velocity = self.lower_position, self.upper_position, self.velocity_limit
+        lower = self.lower_position
+        upper = self.upper_position
+        velocity = self.velocity_limit
         followers = self.followers
         for dof, leader, ratio, offset in zip(
             followers.dofs, followers.leaders, followers.ratios, followers.offsets, strict=True
         ):
             if ratio:
                 low, high = sorted(((lower[dof] - offset) / ratio, (upper[dof] - offset) / ratio))
-                lower[leader], upper[leader] = max(lower[leader], low), min(upper[leader], high)
+                lower[leader] = max(lower[leader], low)
+                upper[leader] = min(upper[leader], high)
                 velocity[leader] = min(velocity[leader], velocity[dof] / abs(ratio))
             if lower[leader] > upper[leader]:
-                name, other = self.dofs[dof], self.dofs[leader]
+                name = self.dofs[dof]
+                other = self.dofs[leader]
                 raise ModelError(
                     f"joint '{name}' follows '{other}', and no position is within the limits of both",
                     where=f"{self.description.where}: joint '{name}'",
@@ -321,7 +326,8 @@ def _build(description: Description, floating_base: bool | None) -> pin.Model:
 
 def _tree(model: pin.Model, data: pin.Data, followers: Followers) -> KinematicTree:
     """Return views of Pinocchio's own arrays, which contain one DoF a joint: joint k + 1 moves DoF k."""
-    first, bodies = data.oMi[0].rotation, model.nv + 1
+    first = data.oMi[0].rotation
+    bodies = model.nv + 1
     placements = as_strided(first, (bodies, 12), (12 * first.itemsize, first.itemsize))
     addresses = [data.oMi[joint].rotation.ctypes.data for joint in range(bodies)]
     if model.njoints != bodies or addresses != [placements[joint].ctypes.data for joint in range(bodies)]:

@@ -31,7 +31,9 @@ class BidirectionalMap:
     """
 
     def __init__(self, name: str, robot_names: Sequence[str], external_names: Sequence[str]):
-        self.name, self.robot_names, self.external = name, tuple(robot_names), tuple(external_names)
+        self.name = name
+        self.robot_names = tuple(robot_names)
+        self.external = tuple(external_names)
         place = _places(name, "Robot's DoFs", self.robot_names)
         _places(name, "outside names", self.external)
         pairs = [(place[dof], index) for index, dof in enumerate(self.external) if dof in place]
@@ -92,7 +94,9 @@ class UnidirectionalMap:
     """
 
     def __init__(self, name: str, robot_names: Sequence[str], members: Sequence[str]):
-        self.name, self.robot_names, self.names = name, tuple(robot_names), tuple(members)
+        self.name = name
+        self.robot_names = tuple(robot_names)
+        self.names = tuple(members)
         place = _places(name, "Robot's DoFs", self.robot_names)
         _places(name, "members", self.names)
         for member in self.names:
@@ -137,7 +141,8 @@ class Maps(Generic[Map]):
     """
 
     def __init__(self, kind: str, robot_names: Sequence[str]):
-        self._kind, self._robot_names = kind, tuple(robot_names)
+        self._kind = kind
+        self._robot_names = tuple(robot_names)
         self._maps: dict[str, Map] = {}
 
     def add(self, new: Map, name: str | None = None) -> Map:

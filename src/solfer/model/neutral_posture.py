@@ -38,9 +38,11 @@ def neutral_posture(kinematics: Kinematics) -> np.ndarray:
 
 def _bent_chains(kinematics: Kinematics, posture: np.ndarray) -> tuple[list[str], np.ndarray]:
     """Find outermost links behind a joint that is not at zero, and the DoFs of the other joints on the way there."""
-    description, dofs = kinematics.description, kinematics.dofs
+    description = kinematics.description
+    dofs = kinematics.dofs
     parents = {joint.parent for joint in description.joints.values()}
-    tips, free = [], np.zeros(kinematics.size, dtype=bool)
+    tips = []
+    free = np.zeros(kinematics.size, dtype=bool)
     for link in description.subtree(kinematics.base_link):
         if link in parents:
             continue
@@ -53,7 +55,8 @@ def _bent_chains(kinematics: Kinematics, posture: np.ndarray) -> tuple[list[str]
 
 def _way(kinematics: Kinematics, link: str) -> list[str]:
     """Return the moving joints between a link and the floating base."""
-    description, way = kinematics.description, []
+    description = kinematics.description
+    way = []
     while link != kinematics.base_link:
         joint = description.joints[description.links[link].parent]
         if joint.moving:

@@ -20,7 +20,8 @@ def observed(
         after: Is called after each call, with its result and its arguments.
         before: Is called before each call, with its arguments.
     """
-    original, own = getattr(thing, method), method in vars(thing)
+    original = getattr(thing, method)
+    own = method in vars(thing)
 
     def call(*arguments: Any) -> Any:
         if before is not None:

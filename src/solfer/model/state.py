@@ -50,7 +50,10 @@ class State:
         histories: What pipes hand over message by message, in the order of the pipes; those with `history` alone.
     """
 
-    position, velocity, acceleration, torque = _Interface(), _Interface(), _Interface(), _Interface()
+    position = _Interface()
+    velocity = _Interface()
+    acceleration = _Interface()
+    torque = _Interface()
 
     def __init__(self, dofs: Sequence[str]):
         self.dofs = tuple(dofs)
@@ -66,8 +69,11 @@ class State:
         Only `add` tells them apart: each user may add an interface of the same name and size, and both get one array.
         """
         other = State.__new__(State)
-        other.dofs, other._arrays, other._versions = self.dofs, self._arrays, self._versions
-        other.defaults, other.histories = self.defaults, self.histories
+        other.dofs = self.dofs
+        other._arrays = self._arrays
+        other._versions = self._versions
+        other.defaults = self.defaults
+        other.histories = self.histories
         other._added = set(State(()).interfaces)
         return other
 
@@ -114,7 +120,8 @@ class State:
             UnknownName: There is no such interface.
             SizeMismatch: `values` and its destination differ in size.
         """
-        array, values = self[name], np.asarray(values, dtype=float)
+        array = self[name]
+        values = np.asarray(values, dtype=float)
         part = array if indices is None else array[indices]
         if values.shape != part.shape:
             raise SizeMismatch(f"'{name}' has numbers of shape {part.shape}, got shape {values.shape}")

@@ -18,7 +18,9 @@ def working_data(model: pin.Model) -> pin.Data:
 
 
 def _lean(model: pin.Model) -> pin.Data:
-    data, bodies, size = pin.Data(), model.njoints, model.nv
+    data = pin.Data()
+    bodies = model.njoints
+    size = model.nv
     for joint in model.joints:
         data.joints.append(joint.createData())
     for poses, count in ((data.oMi, bodies), (data.liMi, bodies), (data.oMf, model.nframes)):
@@ -32,20 +34,22 @@ def _lean(model: pin.Model) -> pin.Data:
     for vectors in (data.com, data.vcom, data.acom):
         vectors.extend([np.zeros(3)] * bodies)
     data.mass.extend([0.0] * bodies)
-    data.J, data.dJ, data.Ag, data.Jcom = (
-        np.zeros((6, size)),
-        np.zeros((6, size)),
-        np.zeros((6, size)),
-        np.zeros((3, size)),
-    )
-    data.M, data.nle, data.tau, data.g = np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros(size)
+    data.J = np.zeros((6, size))
+    data.dJ = np.zeros((6, size))
+    data.Ag = np.zeros((6, size))
+    data.Jcom = np.zeros((3, size))
+    data.M = np.zeros((size, size))
+    data.nle = np.zeros(size)
+    data.tau = np.zeros(size)
+    data.g = np.zeros(size)
     _index(model, data)
     return data
 
 
 def _index(model: pin.Model, data: pin.Data) -> None:
     """Write what Pinocchio looks up about the tree; joint k + 1 moves DoF k."""
-    parents, size = list(model.parents), model.nv
+    parents = list(model.parents)
+    size = model.nv
     last = list(range(size + 1))
     for joint in range(size, 0, -1):
         last[parents[joint]] = max(last[parents[joint]], last[joint])

@@ -105,7 +105,8 @@ class MeasuredPose:
         self._now = middleware.now
         self._localisation = localisation
         self.x = self.y = self.z = self.heading = self.still = 0.0
-        self._stood, self._stood_since = (math.inf, math.inf, math.inf), 0.0
+        self._stood = (math.inf, math.inf, math.inf)
+        self._stood_since = 0.0
         self._before = 0.0, 0.0, 0.0
         self._located_at: float | None = None
         self._age = 0.0
@@ -136,7 +137,8 @@ class MeasuredPose:
     def _measure_rest(self, place: tuple[float, float, float]) -> None:
         now = self._now()
         if max(abs(new - old) for new, old in zip(place, self._stood, strict=True)) > STILL:
-            self._stood, self._stood_since = place, now
+            self._stood = place
+            self._stood_since = now
         self.still = now - self._stood_since
 
     def _move_to(self, x: float, y: float, heading: float) -> None:
@@ -170,7 +172,8 @@ class MeasuredPose:
 
 
 def _rotated(x: float, y: float, angle: float) -> tuple[float, float]:
-    cos, sin = math.cos(angle), math.sin(angle)
+    cos = math.cos(angle)
+    sin = math.sin(angle)
     return cos * x - sin * y, sin * x + cos * y
 
 
@@ -188,7 +191,9 @@ class FollowedPace:
 
     def __init__(self, middleware: Middleware, topic: str):
         self._reader: Reader = middleware.reader(topic, "std_msgs/Float64")
-        self.value, self.topic, self._is_known = 1.0, topic, False
+        self.value = 1.0
+        self.topic = topic
+        self._is_known = False
 
     def awaits(self) -> str:
         """Read the newest message; returns what is missing of a module that has published its pace before."""

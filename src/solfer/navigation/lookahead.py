@@ -45,7 +45,8 @@ class Lookahead:
         """Go on by a period of the file."""
         begin = self._scout.elapsed
         self._scout.step()
-        now, before = self._velocities(), self._before
+        now = self._velocities()
+        before = self._before
         self._before = now
         if any(np.abs(new - old).max() > most for new, old, most in zip(now, before, JUMPS, strict=True)):
             self._jumps.append(begin)

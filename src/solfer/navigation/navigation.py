@@ -66,10 +66,14 @@ class Navigation:
     """
 
     def __init__(self, middleware: Middleware, course: Course, name: str, rate: float):
-        self._middleware, self._course, self._rate = middleware, course, rate
+        self._middleware = middleware
+        self._course = course
+        self._rate = rate
         self._period, self._throttle, self._inbox = 1.0 / rate, Throttle(logger, 5.0), Inbox()
         self.done = self.paused = False
-        self.pace, self.elapsed, self.waits = 0.0, 0.0, ""
+        self.pace = 0.0
+        self.elapsed = 0.0
+        self.waits = ""
         self._progress = middleware.writer(f"{name}/progress", PROGRESS)
         self._reported = -EVERY
         self._number = -1
@@ -150,7 +154,8 @@ class Navigation:
             return "the topics of others"  # which answer in the next cycle at the earliest, on every middleware
         if not self._asked.done():
             return "the topics of others"
-        topics, self._asked = self._asked.result(), None
+        topics = self._asked.result()
+        self._asked = None
         for writer in self._course.writers:
             missing = topics.missing_subscriber(writer.topic, writer.carries)
             if missing is None:

@@ -53,17 +53,23 @@ class ScenarioCourse(Course):
         contacts: Sequence[str] = (),
         positions: bool = False,
     ):
-        self._player, self._middleware = player, middleware
+        self._player = player
+        self._middleware = middleware
         name = f"{target}/" if target else ""
         kind = ScenarioPositions if positions else ScenarioVelocities
         self._motion = kind(middleware, player, name, odometry)
         self._lookahead = Lookahead(player.scenario)
         self._followed = FollowedPace(middleware, f"{name}pace")
-        self._lift, self._contacts = f"{name}lift", tuple(contacts)
-        self._grounded, self._asked = player.grounded.copy(), 0
+        self._lift = f"{name}lift"
+        self._contacts = tuple(contacts)
+        self._grounded = player.grounded.copy()
+        self._asked = 0
         self._answer: Future[LiftReply] | None = None
-        self._is_held, self._moves, self._pace = False, True, 0.0
-        self.writers, self.count = self._motion.writers, len(player.scenario.pattern)
+        self._is_held = False
+        self._moves = True
+        self._pace = 0.0
+        self.writers = self._motion.writers
+        self.count = len(player.scenario.pattern)
         self._require_contacts()
 
     def awaits(self) -> str:
@@ -80,7 +86,8 @@ class ScenarioCourse(Course):
             return missing
         if not self._answer.done():
             return f"an answer of {self._lift}"
-        answer, self._answer = self._answer.result(), None
+        answer = self._answer.result()
+        self._answer = None
         if not answer.success:
             raise ComponentError(f"{self._lift} refuses: {answer.message}", expected="a contact that can change")
         self._grounded[self._asked] = not self._grounded[self._asked]

@@ -17,7 +17,8 @@ from solfer.scenarios import Player
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage, PointsMessage, VectorMessage
 
-SUPPORT, STATE = "solfer/WheelsSupport", "solfer/WheelsState"
+SUPPORT = "solfer/WheelsSupport"
+STATE = "solfer/WheelsState"
 
 JUMP, SPEED = (0.05, 0.1), (2.0, 3.0)
 """Margins [m, rad], and largest speeds [m/s, rad/s], beyond which an odometry has jumped, as plugins have them."""
@@ -67,7 +68,8 @@ class ScenarioVelocities(ScenarioMotion):
         self._support = middleware.writer(f"{name}wheels_support", SUPPORT)
         self._state = middleware.writer(f"{name}wheels_state", STATE)
         self._pose = MeasuredPose(middleware, odometry) if odometry else None
-        self._cos, self._sin = 1.0, 0.0
+        self._cos = 1.0
+        self._sin = 0.0
         self.writers = self._support, self._state
 
     def awaits(self) -> str:
@@ -76,7 +78,8 @@ class ScenarioVelocities(ScenarioMotion):
             return ""
         missing = self._pose.awaits()
         if not missing:
-            self._cos, self._sin = math.cos(self._pose.heading), math.sin(self._pose.heading)
+            self._cos = math.cos(self._pose.heading)
+            self._sin = math.sin(self._pose.heading)
             self._pose = None
         return missing
 
@@ -87,7 +90,8 @@ class ScenarioVelocities(ScenarioMotion):
         """See `ScenarioMotion.publish`."""
         player = self._player
         x, y, z, rate = (pace * player.base_velocity).tolist()
-        along, across = self._cos * x - self._sin * y, self._sin * x + self._cos * y
+        along = self._cos * x - self._sin * y
+        across = self._sin * x + self._cos * y
         vertices = tuple((pace * player.vertex_velocity).ravel().tolist())
         self._support.write(FieldsMessage({"position": (), "velocity": vertices}))
         camber = tuple(player.camber.tolist())
@@ -119,7 +123,9 @@ class ScenarioPositions(ScenarioMotion):
             raise SolferError("positions without odometry", where="--positions", expected="a topic of the odometry")
         if any(getattr(step, "cs", None) is not None for step in player.scenario.pattern):
             raise SolferError("positions carry no camber", where="--positions", expected="a scenario without `cs`")
-        self._player, self._middleware, self._service = player, middleware, f"{name}get_reference"
+        self._player = player
+        self._middleware = middleware
+        self._service = f"{name}get_reference"
         self._base_writer = middleware.writer(f"{name}{BASE_PORT}", "geometry_msgs/PoseStamped")
         self._vertices_writer = middleware.writer(f"{name}{VERTICES_PORT}", "solfer/RobotPoints")
         self._pose = MeasuredPose(middleware, odometry)
@@ -127,7 +133,8 @@ class ScenarioPositions(ScenarioMotion):
         self._begin: dict[str, np.ndarray] = {}
         self._answer: Future[ReferenceReply] | None = None
         self._heading = self._ended = 0.0
-        self._base, self._vertices = np.zeros(4), np.zeros_like(player.vertex_velocity)
+        self._base = np.zeros(4)
+        self._vertices = np.zeros_like(player.vertex_velocity)
         self._measured, self._step = np.zeros((2, 4))
         self._measured_at = -math.inf
 
@@ -150,9 +157,11 @@ class ScenarioPositions(ScenarioMotion):
         """See `ScenarioMotion.publish`."""
         if len(self._begin) < 2:
             return
-        begin, player = self._begin[BASE_PORT], self._player
+        begin = self._begin[BASE_PORT]
+        player = self._player
         x, y, z, turn = (self._base + LEAD * pace * player.base_velocity).tolist()
-        cos, sin = math.cos(self._heading), math.sin(self._heading)
+        cos = math.cos(self._heading)
+        sin = math.sin(self._heading)
         place = begin[0] + cos * x - sin * y, begin[1] + sin * x + cos * y, begin[2] + z
         half = 0.5 * (self._heading + turn)
         self._base_writer.write(VectorMessage("world", np.array((*place, 0.0, 0.0, math.sin(half), math.cos(half)))))
@@ -170,7 +179,8 @@ class ScenarioPositions(ScenarioMotion):
             self._answer = self._middleware.request(self._service, GET, GetReference(task), ReferenceReply, PATIENCE)
         if not self._answer.done():
             return f"an answer of {self._service}"
-        reply, self._answer = self._answer.result(), None
+        reply = self._answer.result()
+        self._answer = None
         if not reply.success:  # it may not have started yet
             return f"{self._service}, which refuses: {reply.message}"
         values = np.array(reply.values)
@@ -186,10 +196,14 @@ class ScenarioPositions(ScenarioMotion):
 
     def _move_with_odometry(self) -> None:
         """Move the course as the odometry has jumped: from where it would be if it had gone on as before."""
-        pose, now = self._pose, self._middleware.now()
+        pose = self._pose
+        now = self._middleware.now()
         measured = np.array((pose.x, pose.y, pose.z, pose.heading))
-        expected, passed = self._measured + self._step, now - self._measured_at
-        self._step, self._measured, self._measured_at = measured - self._measured, measured, now
+        expected = self._measured + self._step
+        passed = now - self._measured_at
+        self._step = measured - self._measured
+        self._measured = measured
+        self._measured_at = now
         turn = float(measured[3] - expected[3])
         move = PlanarMove(expected[:3], measured[:3], turn)
         if move.distance > JUMP[0] + SPEED[0] * passed or abs(turn) > JUMP[1] + SPEED[1] * passed:

@@ -40,7 +40,8 @@ class WaypointCourse(Course):
         self._settles = 0.0 if localisation is None else SMOOTHED
         self._rested = 0.0
         self._twist = middleware.writer(f"{target}/cmd_vel" if target else "cmd_vel", TWIST)
-        self.writers, self.count = (self._twist,), len(follower.waypoints)
+        self.writers = (self._twist,)
+        self.count = len(follower.waypoints)
 
     def awaits(self) -> str:
         """See `Course.awaits`; without odometry the base stops."""
@@ -51,12 +52,14 @@ class WaypointCourse(Course):
 
     def step(self, period: float, pace: float) -> bool:
         """See `Course.step`."""
-        pose, follower = self._pose, self._follower
+        pose = self._pose
+        follower = self._follower
         place = pose.x, pose.y, pose.heading
         moves = follower.step(place, period, pace)
         self._rested = 0.0 if moves else self._rested + period
         x, y, rate = follower.velocity
-        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        cos = math.cos(pose.heading)
+        sin = math.sin(pose.heading)
         self._publish(cos * x + sin * y, cos * y - sin * x, rate)
         if moves:
             return True
@@ -86,5 +89,6 @@ class WaypointCourse(Course):
         return self._follower.left
 
     def _publish(self, x: float, y: float, rate: float) -> None:
-        linear, angular = {"x": x, "y": y, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": rate}
+        linear = {"x": x, "y": y, "z": 0.0}
+        angular = {"x": 0.0, "y": 0.0, "z": rate}
         self._twist.write(FieldsMessage({"linear": linear, "angular": angular}))

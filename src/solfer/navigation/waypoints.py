@@ -80,8 +80,10 @@ class WaypointFollower:
     def __init__(self, waypoints: Sequence[Waypoint], limits: DriveLimits):
         if not waypoints:
             raise SolferError("there is no way-point", expected="at least one")
-        self.waypoints, self.limits = tuple(waypoints), limits
-        self.velocity, self.index = (0.0, 0.0, 0.0), 0
+        self.waypoints = tuple(waypoints)
+        self.limits = limits
+        self.velocity = (0.0, 0.0, 0.0)
+        self.index = 0
         places = [(each.x, each.y) for each in waypoints]
         legs = [math.dist(*pair) for pair in zip(places, places[1:], strict=False)]
         self._after = [sum(legs[index:]) for index in range(len(places))]
@@ -100,9 +102,12 @@ class WaypointFollower:
         while self.index < len(self.waypoints) - 1 and self._distance(x, y) <= PASSED:
             self.index += 1
         if self.index >= len(self.waypoints) or (self._has_arrived(x, y, heading) and not any(self.velocity)):
-            self.index, self.velocity = len(self.waypoints), (0.0, 0.0, 0.0)
+            self.index = len(self.waypoints)
+            self.velocity = (0.0, 0.0, 0.0)
             return False
-        goal, distance, limits = self.waypoints[self.index], self._distance(x, y), self.limits
+        goal = self.waypoints[self.index]
+        distance = self._distance(x, y)
+        limits = self.limits
         arrived = self.index == len(self.waypoints) - 1 and distance <= ARRIVED
         speed = 0.0 if arrived else pace * self._speed(distance)
         turn = self._turn(heading)
@@ -117,7 +122,8 @@ class WaypointFollower:
         if self.index >= len(self.waypoints):
             return 0.0
         x, y, heading = self._pose
-        limits, way = self.limits, self._distance(x, y) + self._after[self.index]
+        limits = self.limits
+        way = self._distance(x, y) + self._after[self.index]
         turn = abs(self._turn(heading))
         return max(_duration(way, limits.speed, limits.acceleration),
                    _duration(turn, limits.turn_speed, limits.turn_acceleration))  # fmt: skip
@@ -150,7 +156,8 @@ class WaypointFollower:
 
     def _speed(self, distance: float) -> float:
         """Return the speed at a distance from the next way-point [m/s]."""
-        limits, through = self.limits, self._through[self.index]
+        limits = self.limits
+        through = self._through[self.index]
         if self.index == len(self.waypoints) - 1:
             return _approach(distance, limits.speed, limits.acceleration)
         left = max(0.0, distance - PASSED)
@@ -169,7 +176,8 @@ class WaypointFollower:
     def _change(self, desired: tuple[float, float], rate: float, period: float) -> None:
         """Let the velocity go to the desired one within the acceleration."""
         vx, vy, turn = self.velocity
-        change, most = math.hypot(desired[0] - vx, desired[1] - vy), self.limits.acceleration * period
+        change = math.hypot(desired[0] - vx, desired[1] - vy)
+        most = self.limits.acceleration * period
         share = 1.0 if change <= most else most / change
         step = self.limits.turn_acceleration * period
         self.velocity = (

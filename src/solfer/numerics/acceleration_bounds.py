@@ -68,13 +68,16 @@ class AccelerationBounds:
 def _bound_all(position, velocity, lower_position, upper_position, speed, braking, horizon, lower, upper):
     """See `AccelerationBounds.update`; a NaN stays one."""
     for k in range(len(position)):
-        up, down = upper_position[k] - position[k], position[k] - lower_position[k]
-        up, down = 0.0 if up < 0.0 else up, 0.0 if down < 0.0 else down
+        up = upper_position[k] - position[k]
+        down = position[k] - lower_position[k]
+        up = 0.0 if up < 0.0 else up
+        down = 0.0 if down < 0.0 else down
         fastest = min(math.sqrt(braking * up), 0.5 * up / horizon)
         slowest = min(math.sqrt(braking * down), 0.5 * down / horizon)
         fastest = speed[k] if fastest > speed[k] else fastest
         slowest = speed[k] if slowest > speed[k] else slowest
-        most, least = (fastest - velocity[k]) / horizon, (-slowest - velocity[k]) / horizon
+        most = (fastest - velocity[k]) / horizon
+        least = (-slowest - velocity[k]) / horizon
         upper[k] = -braking if most < -braking else most
         lower[k] = braking if least > braking else least
 

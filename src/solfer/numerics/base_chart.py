@@ -26,7 +26,12 @@ def angles_of(rotation):
 
 def rotation_of(rx, ry, rz):
     """Compute Rx(rx) Ry(ry) Rz(rz), nine numbers row by row."""
-    cx, sx, cy, sy, cz, sz = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry), math.cos(rz), math.sin(rz)
+    cx = math.cos(rx)
+    sx = math.sin(rx)
+    cy = math.cos(ry)
+    sy = math.sin(ry)
+    cz = math.cos(rz)
+    sz = math.sin(rz)
     return (
         cy * cz,
         -cy * sz,
@@ -42,7 +47,10 @@ def rotation_of(rx, ry, rz):
 
 def rates_of(rx, ry, wx, wy, wz):
     """Compute rates of the three angles [rad/s] from an angular velocity in the axes of the chart's origin."""
-    cx, sx, cy, sy = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry)
+    cx = math.cos(rx)
+    sx = math.sin(rx)
+    cy = math.cos(ry)
+    sy = math.sin(ry)
     if abs(cy) < SMALLEST_COSINE:
         cy = math.copysign(SMALLEST_COSINE, cy)
     yaw = (cx * wz - sx * wy) / cy
@@ -111,7 +119,10 @@ class BaseChart:
     def twist_from_rates(self, base: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute linear [m/s] and angular velocity [rad/s] of the base in world axes, shape (3,) each."""
         rx, ry, _ = base[3:6].tolist()
-        cx, sx, cy, sy = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry)
+        cx = math.cos(rx)
+        sx = math.sin(rx)
+        cy = math.cos(ry)
+        sy = math.sin(ry)
         roll, pitch, yaw = rates[3:6]
         angular = (roll + sy * yaw, cx * pitch - sx * cy * yaw, sx * pitch + cx * cy * yaw)
         return self.rotation @ rates[:3], self.rotation @ angular

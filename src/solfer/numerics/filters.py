@@ -13,8 +13,11 @@ def _filter_values(values, first, second, factors, started):
     for i in range(len(values)):
         if not math.isfinite(values[i]):
             return False
-    b0, b1, b2 = factors[0], factors[1], factors[2]
-    a1, a2 = factors[3], factors[4]
+    b0 = factors[0]
+    b1 = factors[1]
+    b2 = factors[2]
+    a1 = factors[3]
+    a2 = factors[4]
     for i in range(len(values)):
         value = values[i]
         if not started:  # as if the input had always been this

@@ -60,7 +60,8 @@ def _gather(numbers, rows, source, places, out):
 
     Returns the index, row by row, of the first one that is not finite; -1 if all are.
     """
-    wrong, count = -1, len(source)
+    wrong = -1
+    count = len(source)
     for row in range(len(rows)):
         for index in range(count):
             number = numbers[rows[row], source[index]]
@@ -80,7 +81,8 @@ def _scatter(values, places, dofs, arrays):
         out = carray(floats(arrays[row]), (1,))
         for index in range(len(places)):
             place = places[index]
-            dof, value = dofs[place], values[row, place]
+            dof = dofs[place]
+            value = values[row, place]
             if out[dof] != value:
                 changed |= 1 << row
             out[dof] = value
@@ -114,7 +116,8 @@ def _unwrap(position, part, before, turns, added):
     for k in part:
         if turns[k]:
             came = position[k]
-            least, largest = min(before[1, k], came), max(before[2, k], came)
+            least = min(before[1, k], came)
+            largest = max(before[2, k], came)
             if before[0, k] == before[0, k] and largest - least <= turns[k] * (1.0 + 1e-6):
                 added[k] = turns[k] * math.floor((before[0, k] - came) / turns[k] + 0.5)
             position[k] = came + added[k]
@@ -221,7 +224,9 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
         if wrong < 0 and abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
             wrong = k
         if len(velocity) and fastest[k] < math.inf:
-            fast, slow, passed = velocity[k], before[3, k], stamp - before[4, k]
+            fast = velocity[k]
+            slow = before[3, k]
+            passed = stamp - before[4, k]
             if wrong < 0 and abs(fast) > FASTER + 3.0 * fastest[k]:
                 wrong = k + len(position)
             is_frozen = fast == slow and fast != 0.0 and position[k] == before[5, k]
@@ -234,14 +239,16 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                 if abs(before[6, k]) <= before[9, k]:
                     before[9, k] = 0.0
             elif 0.0 < passed < KNOWN and (fast != 0.0 or slow != 0.0 or before[7, k] > 0.0):
-                keep, speed = SUMMED / (SUMMED + passed), max(abs(fast), abs(slow))
+                keep = SUMMED / (SUMMED + passed)
+                speed = max(abs(fast), abs(slow))
                 doubt = passed * (STRAY_SHARE * speed + abs(fast - slow))
                 before[6, k], before[7, k] = keep * before[6, k] + step, keep * before[7, k] + doubt
                 if abs(before[6, k]) > STRAY + before[7, k]:
                     before[9, k] = STRAY + before[7, k]
                 doubt += STEP + LATE * speed + HIDDEN * passed * passed
                 if abs(step) > doubt:
-                    before[6, k], before[9, k] = step, doubt
+                    before[6, k] = step
+                    before[9, k] = doubt
             if wrong < 0 and before[9, k] > 0.0:
                 wrong = k + 2 * len(position)
             if passed > 0.0 or passed < -LATEST:
@@ -249,7 +256,9 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                 before[8, k] = before[8, k] + passed if is_frozen else 0.0
     if wrong < 0:
         for k in part:
-            before[0, k], before[1, k], before[2, k] = position[k], arrival, stamp
+            before[0, k] = position[k]
+            before[1, k] = arrival
+            before[2, k] = stamp
     return wrong
 
 
@@ -294,8 +303,14 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
         1 and an angle: the tilt leaps by it. 2: it turns by this angle, and otherwise by its rates. 3: the specific
         force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow. 0: none.
     """
-    x, y, z, w = values[0], values[1], values[2], values[3]
-    u, v, s, c = before[0], before[1], before[2], before[3]
+    x = values[0]
+    y = values[1]
+    z = values[2]
+    w = values[3]
+    u = before[0]
+    v = before[1]
+    s = before[2]
+    c = before[3]
     elapsed = max(arrival - before[4], min(stamp - before[5], LATEST))
     known = before[4] > -math.inf
     passed = stamp - before[5]
@@ -308,7 +323,12 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
         tilt = math.acos(min(1.0, max(-1.0, upright)))
         if tilt > TILTED + TILTING * min(elapsed, TILT_TIME):
             return 1, tilt
-    before[0], before[1], before[2], before[3], before[4], before[5] = x, y, z, w, arrival, stamp
+    before[0] = x
+    before[1] = y
+    before[2] = z
+    before[3] = w
+    before[4] = arrival
+    before[5] = stamp
     if not known:
         before[14] = SUMMED * GRAVITY  # a robot that starts by accelerating is not askew
     is_frozen = x == u and y == v and z == s and w == c
@@ -319,11 +339,15 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     if not (known and 0.0 < passed < GAP):
         return 0, 0.0
     keep = SUMMED / (SUMMED + passed)
-    fx, fy, fz = force[0], force[1], force[2]
+    fx = force[0]
+    fy = force[1]
+    fz = force[2]
     rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
     if rate < TURNED and abs(math.sqrt(fx * fx + fy * fy + fz * fz) - GRAVITY) < UNEVEN:
         # R f = f + 2 w (a x f) + 2 a x (a x f), where a is the axis of the quaternion
-        px, py, pz = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+        px = y * fz - z * fy
+        py = z * fx - x * fz
+        pz = x * fy - y * fx
         before[12] = keep * before[12] + passed * (fx + 2.0 * (w * px + y * pz - z * py))
         before[13] = keep * before[13] + passed * (fy + 2.0 * (w * py + z * px - x * pz))
         before[14] = keep * before[14] + passed * (fz + 2.0 * (w * pz + x * py - y * px))
@@ -338,7 +362,9 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     tx = sign * (c * x - w * u - side * (v * z - s * y))
     ty = sign * (c * y - w * v - side * (s * x - u * z))
     tz = sign * (c * z - w * s - side * (u * y - v * x))
-    dx, dy, dz = tx - passed * values[10], ty - passed * values[11], tz - passed * values[12]
+    dx = tx - passed * values[10]
+    dy = ty - passed * values[11]
+    dz = tz - passed * values[12]
     if rate > TURNING and math.sqrt(dx * dx + dy * dy + dz * dz) > FOLLOWED * passed * rate:
         return 4, rate
     if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + TURNING * passed:
@@ -418,7 +444,9 @@ def _find_stuck(desired, measured, dofs, places, record, passed):
     return -1
 
 
-_ROW, _DOFS, _ROWS = "float64[::1]", "int64[::1]", "float64[:, ::1]"
+_ROW = "float64[::1]"
+_DOFS = "int64[::1]"
+_ROWS = "float64[:, ::1]"
 find_astray = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, {_ROW}, float64)", _find_astray)
 find_stuck = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, float64)", _find_stuck)
 

@@ -28,7 +28,8 @@ class PlanarMove:
         self.rise = float(after[2] - before[2])
         self._before = np.array(before, dtype=float)
         self._after = np.array(after, dtype=float)
-        self._cos, self._sin = math.cos(turn), math.sin(turn)
+        self._cos = math.cos(turn)
+        self._sin = math.sin(turn)
         self._quaternion = 0.0, 0.0, math.sin(0.5 * turn), math.cos(0.5 * turn)
 
     @property
@@ -45,7 +46,8 @@ class PlanarMove:
 
     def rotate(self, vector: np.ndarray) -> None:
         """Rotate a vector in the world, of whose numbers the first two are x and y."""
-        x, y = vector[0], vector[1]
+        x = vector[0]
+        y = vector[1]
         vector[0], vector[1] = self._cos * x - self._sin * y, self._sin * x + self._cos * y
 
     def turn_orientation(self, quaternion: np.ndarray) -> None:

@@ -28,11 +28,16 @@ class Ramp:
     """
 
     def __init__(self, size: int, stop_time: float = 0.2):
-        self.size, self.stop_time, self.duration = size, stop_time, 0.0
-        self._start, self._start_velocity, self._goal = np.zeros(size), np.zeros(size), np.zeros(size)
+        self.size = size
+        self.stop_time = stop_time
+        self.duration = 0.0
+        self._start = np.zeros(size)
+        self._start_velocity = np.zeros(size)
+        self._goal = np.zeros(size)
         # v0 T; coefficients of u^3, u^4, u^5 of the position; those of u^2, u^3, u^4 of the velocity
         self._leap = np.zeros(size)
-        self._motion, self._speed = np.zeros((3, size)), np.zeros((3, size))
+        self._motion = np.zeros((3, size))
+        self._speed = np.zeros((3, size))
 
     def plan(self, start: np.ndarray, start_velocity: np.ndarray, goal: np.ndarray, limits: np.ndarray) -> float:
         """Plan the shortest motion that keeps all velocity limits; all arguments have shape (n,).
@@ -52,7 +57,9 @@ class Ramp:
             NotFinite: A value is NaN or infinite, or no limit bounds the motion.
         """
         start, start_velocity, goal, limits = self._checked(start, start_velocity, goal, limits)
-        self._start[:], self._start_velocity[:], self._goal[:] = start, start_velocity, goal
+        self._start[:] = start
+        self._start_velocity[:] = start_velocity
+        self._goal[:] = goal
         self.duration = self._shortest(goal - start, limits)
         if self.duration > 0.0:
             distance = goal - start
@@ -122,7 +129,8 @@ def _fastest_mean(ratio: np.ndarray) -> np.ndarray:
     It is the least value over u of (1 - ratio a(u)) / b(u), for a start towards the goal; its derivative has one zero,
     found by bisection.
     """
-    low, high = np.zeros_like(ratio), np.ones_like(ratio)
+    low = np.zeros_like(ratio)
+    high = np.ones_like(ratio)
     for _ in range(_BISECTIONS):
         u = 0.5 * (low + high)
         slope = 6.0 * ratio * (5.0 * u - 3.0) * (u - u * u) ** 2 + (1.0 - ratio * _decay(u)) * (1.0 - 2.0 * u)

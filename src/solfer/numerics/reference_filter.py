@@ -57,15 +57,20 @@ class ReferenceFilter:
         self.target[:, 6] = self.value[:, 6] = 1.0
         self.rate = np.zeros((size, 6))
         # velocity of the target; time since the last one, and that between the last two
-        self._stream, self._age, self._gap = np.zeros((size, 6)), np.zeros(size), np.zeros(size)
-        self._is_still, self.all_still = np.ones(size, dtype=np.bool_), True
+        self._stream = np.zeros((size, 6))
+        self._age = np.zeros(size)
+        self._gap = np.zeros(size)
+        self._is_still = np.ones(size, dtype=np.bool_)
+        self.all_still = True
         self._work = np.zeros((3, 7))
 
     def start(self, index: int, value: np.ndarray) -> None:
         """Put a reference and its target somewhere, at rest; shape (7,)."""
         self.value[index] = self.target[index] = value
-        self.rate[index], self._stream[index] = 0.0, 0.0
-        self._age[index], self._gap[index] = np.inf, 0.0
+        self.rate[index] = 0.0
+        self._stream[index] = 0.0
+        self._age[index] = np.inf
+        self._gap[index] = 0.0
         self._is_still[index] = True
 
     def aim(self, index: int, numbers: np.ndarray, first: int, stream: bool = False) -> int:
@@ -105,7 +110,9 @@ class ReferenceFilter:
 
     def halt(self, index: int) -> None:
         """Let a reference come to rest as soon as it may: its target becomes the place where it will."""
-        target, value, rate = self.target[index], self.value[index], self.rate[index]
+        target = self.target[index]
+        value = self.value[index]
+        rate = self.rate[index]
         self._stream[index], self._age[index] = 0.0, np.inf
         _halt(target, value, rate, self.limits[index], self.period, self._work[0])
 
@@ -132,8 +139,14 @@ class ReferenceFilter:
 @part
 def _turn_to(target, value, out):
     """Write the rotation vector that turns one quaternion into another, in world axes, at most a half turn."""
-    ax, ay, az, aw = target[3], target[4], target[5], target[6]
-    bx, by, bz, bw = value[3], value[4], value[5], value[6]
+    ax = target[3]
+    ay = target[4]
+    az = target[5]
+    aw = target[6]
+    bx = value[3]
+    by = value[4]
+    bz = value[5]
+    bw = value[6]
     w = aw * bw + ax * bx + ay * by + az * bz
     x = -aw * bx + ax * bw - ay * bz + az * by
     y = -aw * by + ay * bw - az * bx + ax * bz
@@ -147,13 +160,21 @@ def _turn_to(target, value, out):
 @part
 def _turn_by(value, rate, time):
     """Turn a quaternion by an angular velocity in world axes for some time."""
-    x, y, z = 0.5 * time * rate[3], 0.5 * time * rate[4], 0.5 * time * rate[5]
+    x = 0.5 * time * rate[3]
+    y = 0.5 * time * rate[4]
+    z = 0.5 * time * rate[5]
     half = math.sqrt(x * x + y * y + z * z)
     if half == 0.0:
         return
-    scale, w = math.sin(half) / half, math.cos(half)
-    x, y, z = scale * x, scale * y, scale * z
-    bx, by, bz, bw = value[3], value[4], value[5], value[6]
+    scale = math.sin(half) / half
+    w = math.cos(half)
+    x = scale * x
+    y = scale * y
+    z = scale * z
+    bx = value[3]
+    by = value[4]
+    bz = value[5]
+    bw = value[6]
     value[3] = w * bx + x * bw + y * bz - z * by
     value[4] = w * by + y * bw + z * bx - x * bz
     value[5] = w * bz + z * bw + x * by - y * bx
@@ -198,7 +219,10 @@ def _approach(error, stream, rate, speed, acceleration, period, wanted):
 
 def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, gap, still, work):
     """See `ReferenceFilter.aim`."""
-    limits, target, velocity, last = all_limits[index], targets[index], streams[index], first + len(numbers)
+    limits = all_limits[index]
+    target = targets[index]
+    velocity = streams[index]
+    last = first + len(numbers)
     for k in range(len(numbers)):
         if not numbers[k] - numbers[k] == 0.0:
             return NOT_FINITE
@@ -207,7 +231,8 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
         length = math.sqrt(numbers[-4] ** 2 + numbers[-3] ** 2 + numbers[-2] ** 2 + numbers[-1] ** 2)
         if abs(length - 1.0) > UNIT:
             return NOT_A_TURN
-    new, turn = work[0], work[1]
+    new = work[0]
+    turn = work[1]
     for k in range(7):
         new[k] = target[k] if k < first or k >= last else numbers[k - first] / (length if k > 2 else 1.0)
     _turn_to(new, target, turn)
@@ -229,7 +254,10 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
 
 def _follow_all(target, stream, age, gap, value, rate, limits, period, still, work):
     """See `ReferenceFilter.update`; return whether all are still."""
-    error, wanted, aim, all_still = work[0], work[1], work[2], True
+    error = work[0]
+    wanted = work[1]
+    aim = work[2]
+    all_still = True
     for i in range(len(target)):
         if age[i] > PATIENCE * gap[i]:
             stream[i] = 0.0
@@ -256,7 +284,8 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
 def _halt_at(target, value, rate, limits, period, way):
     """See `ReferenceFilter.halt`."""
     for first in (0, 3):
-        speed, acceleration = _norm(rate[first : first + 3]), limits[2 * first // 3 + 1]
+        speed = _norm(rate[first : first + 3])
+        acceleration = limits[2 * first // 3 + 1]
         time = 0.5 * (speed / acceleration - period) if acceleration < math.inf else 0.0
         for k in range(first, first + 3):
             way[k] = rate[k] * max(time, 0.0)
@@ -266,7 +295,8 @@ def _halt_at(target, value, rate, limits, period, way):
     _turn_by(target, way, 1.0)
 
 
-_ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
+_ROW = "float64[::1]"
+_ROWS = "float64[:, ::1]"
 
 _aim = cached(
     f"int64(int64, {_ROW}, int64, boolean, {_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, {_ROW}, boolean[::1], {_ROWS})",

@@ -27,14 +27,12 @@ ORTHONORMAL = 1e-6
 def rotation_from_rpy(rpy: Sequence[float] | np.ndarray) -> np.ndarray:
     """Compute the rotation matrix Rz(yaw) Ry(pitch) Rx(roll) of a URDF's `rpy` [rad], shape (3, 3)."""
     roll, pitch, yaw = rpy
-    cr, sr, cp, sp, cy, sy = (
-        math.cos(roll),
-        math.sin(roll),
-        math.cos(pitch),
-        math.sin(pitch),
-        math.cos(yaw),
-        math.sin(yaw),
-    )
+    cr = math.cos(roll)
+    sr = math.sin(roll)
+    cp = math.cos(pitch)
+    sp = math.sin(pitch)
+    cy = math.cos(yaw)
+    sy = math.sin(yaw)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -127,7 +125,9 @@ def rotated(
     """Rotate a vector of plain numbers, of length 3, by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     vx, vy, vz = vector
     ux, uy, uz, w = quaternion
-    tx, ty, tz = 2.0 * (uy * vz - uz * vy), 2.0 * (uz * vx - ux * vz), 2.0 * (ux * vy - uy * vx)
+    tx = 2.0 * (uy * vz - uz * vy)
+    ty = 2.0 * (uz * vx - ux * vz)
+    tz = 2.0 * (ux * vy - uy * vx)
     return (
         vx + w * tx + uy * tz - uz * ty,
         vy + w * ty + uz * tx - ux * tz,
@@ -150,7 +150,9 @@ def rotation_from_angles(angles: Sequence[float] | np.ndarray, axes: Sequence[in
 
 
 def _about_axis(axis: int, angle: float) -> np.ndarray:
-    rotation, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+    rotation = np.eye(3)
+    i = (axis + 1) % 3
+    j = (axis + 2) % 3
     rotation[i, i] = rotation[j, j] = math.cos(angle)
     rotation[j, i] = math.sin(angle)
     rotation[i, j] = -rotation[j, i]

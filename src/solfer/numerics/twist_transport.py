@@ -42,7 +42,10 @@ class Carried:
     """
 
     def __init__(self, base_chart: BaseChart, values: np.ndarray, mount: np.ndarray):
-        self._values, self._mount, self.base, self.rates = values, mount, np.zeros(6), np.zeros(6)
+        self._values = values
+        self._mount = mount
+        self.base = np.zeros(6)
+        self.rates = np.zeros(6)
         self.world = np.concatenate((np.eye(3).ravel(), np.zeros(3)))
         self._chart = np.concatenate((base_chart.rotation.ravel(), base_chart.position))
 
@@ -88,7 +91,10 @@ def _turned(matrix, vector):
 
 def _matrix(quaternion):
     """Compute the rotation of a quaternion (x, y, z, w), of any length but zero; see `rotation_from_quaternion`."""
-    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    x = quaternion[0]
+    y = quaternion[1]
+    z = quaternion[2]
+    w = quaternion[3]
     scale = 2.0 / (x * x + y * y + z * z + w * w)
     return np.array(
         (
@@ -105,8 +111,13 @@ def _matrix(quaternion):
     )
 
 
-_transposed, _times, _turned, _matrix = part(_transposed), part(_times), part(_turned), part(_matrix)
-_angles, _rates, _rotation = part(chart.angles_of), part(chart.rates_of), part(chart.rotation_of)
+_transposed = part(_transposed)
+_times = part(_times)
+_turned = part(_turned)
+_matrix = part(_matrix)
+_angles = part(chart.angles_of)
+_rates = part(chart.rates_of)
+_rotation = part(chart.rotation_of)
 
 
 def _compile(sources: str):
@@ -115,7 +126,8 @@ def _compile(sources: str):
     def update(values, mount, world, origin, base, rates, options):
         """Update the base; see `Carried.update`."""
         sources  # noqa: B018 it has to be used to be in the closure
-        to_chart, sensor = _transposed(origin), world
+        to_chart = _transposed(origin)
+        sensor = world
         if options & ORIENTED:
             sensor = _times(world, _matrix(values))
         if options & POSE:

@@ -50,7 +50,8 @@ class VelocityBounds:
         if not 0.0 < horizon < np.inf:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
         self.lower_position, self.upper_position, speed = limits
-        self._horizon, self._rate = horizon, 1.0 / horizon
+        self._horizon = horizon
+        self._rate = 1.0 / horizon
         self.limits = np.stack((-speed, speed, speed))
         self.lower, self.upper, self.speed = self.limits
 
@@ -66,8 +67,10 @@ class VelocityBounds:
 def _bound_all(position, lower_position, upper_position, speed, rate, lower, upper):
     """See `VelocityBounds.update`; a NaN stays one."""
     for k in range(len(position)):
-        up, down = upper_position[k] - position[k], lower_position[k] - position[k]
-        up, down = rate * (0.0 if up < 0.0 else up), rate * (0.0 if down > 0.0 else down)
+        up = upper_position[k] - position[k]
+        down = lower_position[k] - position[k]
+        up = rate * (0.0 if up < 0.0 else up)
+        down = rate * (0.0 if down > 0.0 else down)
         upper[k] = speed[k] if up > speed[k] else up
         lower[k] = -speed[k] if down < -speed[k] else down
 

@@ -42,7 +42,8 @@ class ViaPoints:
         accelerations: np.ndarray | None = None,
     ):
         self._times, self.last, self.end = times.tolist(), positions[-1].copy(), float(times[-1])
-        self._durations, self._piece = np.diff(times), 0
+        self._durations = np.diff(times)
+        self._piece = 0
         self._coefficients = np.zeros((len(times) - 1, 6, positions.shape[1]))
         self._coefficients[:, 0] = positions[:-1]
         step = self._durations[:, None]
@@ -82,7 +83,8 @@ class ViaPoints:
             self._piece += 1
         if time < self._times[self._piece]:
             self._piece = max(bisect_right(self._times, time) - 1, 0)
-        c, t = self._coefficients[self._piece], max(time - self._times[self._piece], 0.0)
+        c = self._coefficients[self._piece]
+        t = max(time - self._times[self._piece], 0.0)
         position[:] = c[5]
         velocity.fill(0.0)
         for power in (4, 3, 2, 1, 0):  # Horner, of the polynomial and of its derivative

@@ -24,11 +24,19 @@ def _shift(wrenches, taken, contacts, members, origins, sign, out, put, places):
     for place in places:
         if members[place] < 0:
             continue
-        wrench, moved = wrenches[taken[place]], out[put[place]]
-        contact, origin = contacts[members[place]], origins[place]
-        rx, ry, rz = contact[0] - origin[0], contact[1] - origin[1], contact[2] - origin[2]
-        fx, fy, fz = wrench[0], wrench[1], wrench[2]
-        moved[0], moved[1], moved[2] = fx, fy, fz
+        wrench = wrenches[taken[place]]
+        moved = out[put[place]]
+        contact = contacts[members[place]]
+        origin = origins[place]
+        rx = contact[0] - origin[0]
+        ry = contact[1] - origin[1]
+        rz = contact[2] - origin[2]
+        fx = wrench[0]
+        fy = wrench[1]
+        fz = wrench[2]
+        moved[0] = fx
+        moved[1] = fy
+        moved[2] = fz
         moved[3] = wrench[3] + sign * (ry * fz - rz * fy)
         moved[4] = wrench[4] + sign * (rz * fx - rx * fz)
         moved[5] = wrench[5] + sign * (rx * fy - ry * fx)

@@ -22,7 +22,9 @@ class CommandPipe(abc.ABC):
     """
 
     def __init__(self, name: str, writer: Writer, sent: Message):
-        self.name, self.writer, self.sent = name, writer, sent
+        self.name = name
+        self.writer = writer
+        self.sent = sent
         self._filters: list[tuple[LowPass, np.ndarray]] = []
         writer.prepare(sent)
 

@@ -93,7 +93,8 @@ def message_of(record: PipeRecord, known: Iterable[str], what: str) -> str:
         UnknownName: There is no such message.
     """
     where = record.where("message")
-    message, known = canonical(record.travels_as, where), tuple(known)
+    message = canonical(record.travels_as, where)
+    known = tuple(known)
     if message not in known:
         raise PipeError(f"{message} carries no {what}", where=where, expected=" or ".join(known))
     return message

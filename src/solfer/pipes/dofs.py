@@ -60,7 +60,8 @@ def require_base(record: FeedbackRecord, robot: Robot) -> str:
         PipeError: The record has no link, the robot has no floating base, or chain or map are without it.
         UnknownName: An unknown link, chain or map.
     """
-    dofs, pipe = record.dofs, record.name
+    dofs = record.dofs
+    pipe = record.name
     link = require_link(dofs, robot)
     if record.reads_sensor:
         link = _known_link(record.sensor, robot, record.where("sensor"))

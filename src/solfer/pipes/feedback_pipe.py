@@ -61,9 +61,15 @@ class FeedbackPipe(abc.ABC):
     refused_at = -math.inf
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
-        self.name, self.reader, self.required = name, reader, required
-        self.accepted, self.received, self.arrival, self.stamp = 0, False, math.inf, 0.0
-        self._refused, self._throttle = 0, Throttle(logger)
+        self.name = name
+        self.reader = reader
+        self.required = required
+        self.accepted = 0
+        self.received = False
+        self.arrival = math.inf
+        self.stamp = 0.0
+        self._refused = 0
+        self._throttle = Throttle(logger)
         self._accepted_before = -1  # number of accepted messages before `refusal`
         self._doubt: tuple[str, Contradiction] | None = None  # sender and error that is not logged yet
         self._doubted = math.inf  # its arrival
@@ -143,7 +149,8 @@ class FeedbackPipe(abc.ABC):
 
     def restart(self) -> None:
         """Begin anew: discard what was received so far. Written values stay."""
-        self.received, self.arrival = False, math.inf
+        self.received = False
+        self.arrival = math.inf
         if self._doubt is not None:
             self._doubt = None
             self._accepted_before = -1
@@ -151,7 +158,8 @@ class FeedbackPipe(abc.ABC):
     def repeat(self, arrival: float) -> None:
         """Count numbers that were written where messages are decoded to as all of a message of `arrival` [s]."""
         self.accepted += 1
-        self.arrival, self.received = arrival, True
+        self.arrival = arrival
+        self.received = True
 
     def _complete(self) -> bool:
         """Return whether all values of the pipe have been received."""
@@ -261,8 +269,11 @@ class StateFeedbackPipe(FeedbackPipe):
         from solfer.numerics.kernels import scatter
         from solfer.numerics.pointers import address
 
-        self._state, self._filtered, self._scatter = state, low_pass is not None, scatter
-        self.values, self._passed = np.zeros((len(fields), len(dofs))), np.zeros((len(fields), len(dofs)))
+        self._state = state
+        self._filtered = low_pass is not None
+        self._scatter = scatter
+        self.values = np.zeros((len(fields), len(dofs)))
+        self._passed = np.zeros((len(fields), len(dofs)))
         self.state_fields = tuple(
             StateField(field, dofs, values, passed, low_pass(len(dofs)) if low_pass else None)
             for field, values, passed in zip(fields, self.values, self._passed, strict=True)
@@ -298,7 +309,8 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
-        precedence, reader = self._precedence, self.reader
+        precedence = self._precedence
+        reader = self.reader
         if precedence is None:
             status = super().run()
             if status is NEW:
@@ -306,7 +318,8 @@ class StateFeedbackPipe(FeedbackPipe):
         elif self.history is not None:
             status = self._take_all(self.history)
         else:
-            publishers, sole = reader.update(), precedence.sole
+            publishers = reader.update()
+            sole = precedence.sole
             if len(publishers) == 1 and sole is not None and sole.name == publishers[0].name:
                 status = reader.read_from(publishers[0])
                 if status is NEW and not self._accept():
@@ -365,11 +378,13 @@ class StateFeedbackPipe(FeedbackPipe):
     def be_patient(self, timeout: float, strikes: int) -> None:
         """See `FeedbackPipe.be_patient`."""
         if self._precedence is not None:
-            self._precedence.timeout, self._precedence.strikes = timeout, strikes
+            self._precedence.timeout = timeout
+            self._precedence.strikes = strikes
 
     def _arbitrate(self, publishers: Sequence[Publisher]) -> MessageStatus:
         """Read and accept the newest message of each publisher, where there are several, or an unknown one."""
-        reader, arrival = self.reader, -math.inf if self.arrival == math.inf else self.arrival
+        reader = self.reader
+        arrival = -math.inf if self.arrival == math.inf else self.arrival
         parts = []
         for publisher in publishers:
             if reader.read_from(publisher) is NEW and self._take(publisher):
@@ -415,7 +430,8 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def _counts(self, publisher: Publisher) -> bool:
         """Return whether the message that was read last is from a publisher that counts."""
-        precedence, reader = self._precedence, self.reader
+        precedence = self._precedence
+        reader = self.reader
         try:
             self._match(reader.message)
         except UNFIT as error:

@@ -84,7 +84,8 @@ class NameOrder:
             if len(self._remembered) == REMEMBERED:
                 self._remembered.clear()
             self._remembered[names] = order
-        self._names, self._order = names, order
+        self._names = names
+        self._order = order
         return order
 
     def require_all(self, names: tuple[str, ...]) -> None:

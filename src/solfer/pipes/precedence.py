@@ -26,13 +26,16 @@ class Owner:
     """
 
     def __init__(self, name: str, size: int):
-        self.name, self.arrival, self.strikes = name, -math.inf, 0
+        self.name = name
+        self.arrival = -math.inf
+        self.strikes = 0
         self.part: object = NEVER
         self.dofs = np.zeros(size, dtype=bool)
 
     def note(self, part: np.ndarray | None, arrival: float) -> None:
         """Record an accepted message with the DoFs `part` that arrived at `arrival` [s]."""
-        self.arrival, self.strikes = arrival, 0
+        self.arrival = arrival
+        self.strikes = 0
         if part is not self.part:
             self.part = part
             self.dofs[slice(None) if part is None else part] = True
@@ -56,8 +59,10 @@ class Precedence:
     """
 
     def __init__(self, size: int):
-        self.timeout, self.strikes = RIVALRY, 1
-        self.ignored, self.handovers = 0, 0
+        self.timeout = RIVALRY
+        self.strikes = 1
+        self.ignored = 0
+        self.handovers = 0
         self.sole: Owner | None = None
         self._size = size
         self._owners: dict[str, Owner] = {}

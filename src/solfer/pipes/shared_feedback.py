@@ -42,9 +42,12 @@ class Source:
     """
 
     def __init__(self, pipe: FeedbackPipe, turns: Turns):
-        self.pipe, self.turns, self.turn = pipe, turns, -1
+        self.pipe = pipe
+        self.turns = turns
+        self.turn = -1
         self._shares: list[SharedFeedbackPipe] = []
-        self._timeout, self._strikes = 0.0, 1
+        self._timeout = 0.0
+        self._strikes = 1
 
     def share(self, record: FeedbackRecord) -> "SharedFeedbackPipe":
         """Make the pipe of one plugin that configures this feedback by `record`."""
@@ -60,7 +63,8 @@ class Source:
 
     def be_patient(self, timeout: float, strikes: int) -> None:
         """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
-        self._timeout, self._strikes = max(self._timeout, timeout), max(self._strikes, strikes)
+        self._timeout = max(self._timeout, timeout)
+        self._strikes = max(self._strikes, strikes)
         self.pipe.be_patient(self._timeout, self._strikes)
 
 
@@ -80,7 +84,10 @@ class SharedFeedbackPipe(FeedbackPipe):
     def __init__(self, source: Source, name: str, required: bool):
         pipe = source.pipe
         super().__init__(name, pipe.reader, required)
-        self.source, self.turn, self._pipe, self._seen = source, -1, pipe, 0
+        self.source = source
+        self.turn = -1
+        self._pipe = pipe
+        self._seen = 0
         self._turns = source.turns
         self._not_received: np.ndarray | None = None
 
@@ -142,7 +149,8 @@ class SharedFeedbackPipe(FeedbackPipe):
 
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
-        source, pipe = self.source, self._pipe
+        source = self.source
+        pipe = self._pipe
         self.turn = turn = self._turns.number
         if source.turn != turn:  # the first of the pipes in this cycle
             source.turn = turn
@@ -152,7 +160,8 @@ class SharedFeedbackPipe(FeedbackPipe):
             return OLD if self._seen else NONE
         self._seen = pipe.accepted
         self.accepted += 1
-        self.arrival, self.stamp = pipe.arrival, pipe.stamp
+        self.arrival = pipe.arrival
+        self.stamp = pipe.stamp
         if not self.received:
             self.received = self._complete()
         return NEW
@@ -192,7 +201,10 @@ class Written:
     """
 
     def __init__(self, now: Callable[[], float]):
-        self.count, self.time, self._now, self.heard = 0, -math.inf, now, False
+        self.count = 0
+        self.time = -math.inf
+        self._now = now
+        self.heard = False
 
     def note(self) -> None:
         """Note that it was published."""
@@ -213,7 +225,10 @@ class NotedWriter(Writer):
     """
 
     def __init__(self, writer: Writer, written: Written):
-        self.topic, self.carries, self._writer, self._written = writer.topic, writer.carries, writer, written
+        self.topic = writer.topic
+        self.carries = writer.carries
+        self._writer = writer
+        self._written = written
 
     @property
     def heard(self) -> bool:  # type: ignore[override]
@@ -239,7 +254,9 @@ class WrittenReader(Reader):
     """
 
     def __init__(self, topic: str, written: Written):
-        self.topic, self._written, self._seen = topic, written, 0
+        self.topic = topic
+        self._written = written
+        self._seen = 0
         written.heard = True
 
     def read(self) -> MessageStatus:
@@ -247,7 +264,8 @@ class WrittenReader(Reader):
         written = self._written
         if written.count == self._seen:
             return OLD if self._seen else NONE
-        self._seen, self.arrival = written.count, written.time
+        self._seen = written.count
+        self.arrival = written.time
         return NEW
 
     def update(self) -> tuple[Publisher, ...]:

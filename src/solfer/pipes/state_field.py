@@ -31,7 +31,9 @@ class StateField:
         self, field: str, dofs: np.ndarray, values: np.ndarray, passed: np.ndarray, low_pass: LowPass | None = None
     ):
         self.field, self.interface, self.dofs = field, interface_of(field), dofs
-        self.values, self._passed, self._low_pass = values, passed, low_pass
+        self.values = values
+        self._passed = passed
+        self._low_pass = low_pass
         self._held = np.zeros(len(dofs))
 
     def accept(self, part: np.ndarray | None) -> None:

@@ -45,11 +45,14 @@ class BaseJumps:
     def find(self, passed: float) -> PlanarMove | None:
         """Return how the base has jumped since the cycle before, which was `passed` [s] ago; None: it has not."""
         self._elapsed += passed
-        base, last = self._base.tolist(), self._last
+        base = self._base.tolist()
+        last = self._last
         if base == last:
             return None
-        limits, elapsed = self._limits, self._elapsed
-        self._last, self._elapsed = base, 0.0
+        limits = self._limits
+        elapsed = self._elapsed
+        self._last = base
+        self._elapsed = 0.0
         distance = math.dist(base[:3], last[:3])
         rx, ry, rz = last[3:]
         angle = max(
@@ -60,7 +63,8 @@ class BaseJumps:
         if distance <= limits.distance + limits.speed * elapsed and angle <= limits.angle + limits.turn_speed * elapsed:
             return None
         self.count += 1
-        before, after = np.array(last), np.array(base)
+        before = np.array(last)
+        after = np.array(base)
         place, _ = self._chart.to_pose(before)
         new_place, _ = self._chart.to_pose(after)
         rotation = self._chart.to_rotation(after) @ self._chart.to_rotation(before).T

@@ -40,17 +40,21 @@ class PassedPeriods:
     """
 
     def __init__(self, period: float):
-        self._rate, self._before, self._owed = 1.0 / period, 0.0, 0.0
+        self._rate = 1.0 / period
+        self._before = 0.0
+        self._owed = 0.0
 
     def restart(self, now: float) -> None:
         """Begin `now` [s]."""
-        self._before, self._owed = now, 0.0
+        self._before = now
+        self._owed = 0.0
 
     def count(self, now: float) -> int:
         """Return how many periods have passed at the cycle that begins `now` [s]."""
         owed = max(0.0, self._owed + (now - self._before) * self._rate - 1.0)
         left_out = int(owed + CLOSE)
-        self._before, self._owed = now, max(0.0, owed - left_out)
+        self._before = now
+        self._owed = max(0.0, owed - left_out)
         return 1 + left_out
 
 

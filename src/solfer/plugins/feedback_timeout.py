@@ -61,13 +61,22 @@ class FeedbackTimeout:
     """
 
     def __init__(self, feedback: FeedbackPipe, timeout: float, strikes: int, action: str, where: str = ""):
-        self.feedback, self.action, self.where = feedback, action, where
-        self.timed_out, self.timeouts, self.doubt = False, 0, ""
-        self.timeout, self._strikes, self._count = timeout, strikes, 0
+        self.feedback = feedback
+        self.action = action
+        self.where = where
+        self.timed_out = False
+        self.timeouts = 0
+        self.doubt = ""
+        self.timeout = timeout
+        self._strikes = strikes
+        self._count = 0
         # the newest change, its stamp, and the commanded way until then
-        self._changed, self._stamp, self._moved = math.inf, 0.0, 0.0
+        self._changed = math.inf
+        self._stamp = 0.0
+        self._moved = 0.0
         self._young = False  # whether a message came in time since the start
-        self._handovers, self._handed_over = feedback.handovers, False
+        self._handovers = feedback.handovers
+        self._handed_over = False
         feedback.be_patient(timeout, strikes)
 
     @classmethod
@@ -91,9 +100,12 @@ class FeedbackTimeout:
             way: How far joints have been commanded to move so far [rad, m].
         """
         feedback = self.feedback
-        status, late = feedback.run(), now - feedback.arrival > self.timeout
+        status = feedback.run()
+        late = now - feedback.arrival > self.timeout
         if feedback.changed != self._changed:
-            self._changed, self._stamp, self._moved = feedback.changed, feedback.stamp, way
+            self._changed = feedback.changed
+            self._stamp = feedback.stamp
+            self._moved = way
         # in a simulation that pauses the stamps stay, too
         stays = self._changed < math.inf and feedback.stamp - self._stamp > FROZEN
         frozen = stays and way - self._moved > STEPS and feedback.measures
@@ -104,7 +116,8 @@ class FeedbackTimeout:
             self.restart()
             return False
         if status is NEW and not late:
-            self._count, self._young = 0, True
+            self._count = 0
+            self._young = True
             if self.timed_out:
                 self._recover()
         elif late:
@@ -131,7 +144,9 @@ class FeedbackTimeout:
     def restart(self) -> None:
         """Begin anew: discard all that was received so far."""
         self.feedback.restart()
-        self._count, self.timed_out, self._young = 0, False, False
+        self._count = 0
+        self.timed_out = False
+        self._young = False
 
     def refusal(self, now: float) -> str:
         """Return why messages were refused lately, before the time `now` [s]; empty: none was, or the reader knows."""
@@ -165,14 +180,16 @@ class FeedbackTimeout:
             level = Health.WARNING if self.action == "keep" else Health.ERROR
             summary = f"nothing new on {feedback.reader.topic}: {ACTIONS[self.action]}"
         elif feedback.required and not feedback.received:
-            level, summary = Health.WARNING, complaint or f"nothing received on {feedback.reader.topic} yet"
+            level = Health.WARNING
+            summary = complaint or f"nothing received on {feedback.reader.topic} yet"
         else:
             level = Health.WARNING if complaint else Health.GOOD
             summary = complaint or ("received" if feedback.received else "not received yet")
         return HealthReport(level, summary, self.figures(now))
 
     def _time_out(self, now: float, frozen: bool) -> None:
-        self.timed_out, self.timeouts = True, self.timeouts + 1
+        self.timed_out = True
+        self.timeouts = self.timeouts + 1
         feedback = self.feedback
         logger.warning(
             "feedback '%s' (%s): %s for %.3f s: %s",

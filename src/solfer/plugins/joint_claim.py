@@ -76,8 +76,11 @@ class JointClaim:
         publishes: Sequence[str] = (),
         position: Callable[[], np.ndarray] | None = None,
     ):
-        self._position, self._pipes = position, tuple(pipes)
-        self._plugin, self._middleware, self.reason = plugin, middleware, ""
+        self._position = position
+        self._pipes = tuple(pipes)
+        self._plugin = plugin
+        self._middleware = middleware
+        self.reason = ""
         pairs = [(pipe.controller, field) for pipe in pipes for field, _ in pipe.fields]
         joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
         self._claim = ClaimRequest(
@@ -90,13 +93,19 @@ class JointClaim:
         self._topics = frozenset(f"{TOPIC}{_bare(topic)}" for topic in publishes)
         self._answer: Future[Any] | None = None
         self._release: Future[Any] | None = None
-        self._commands, self._granted = bool(pairs), not pairs
-        self._since, self._next, self._settled = -math.inf, -math.inf, -math.inf
+        self._commands = bool(pairs)
+        self._granted = not pairs
+        self._since = -math.inf
+        self._next = -math.inf
+        self._settled = -math.inf
         self._refusals = middleware.queue(REFUSED, REFUSALS)
-        self.began_anew, self.is_taken, self.refused = False, False, 0
+        self.began_anew = False
+        self.is_taken = False
+        self.refused = 0
         self.note: Callable[[str, str], None] = lambda kind, text: None
         self._told = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
-        self._complaint, self._throttle = "", Throttle(logger)
+        self._complaint = ""
+        self._throttle = Throttle(logger)
 
     def granted(self) -> bool:
         """Return whether the claim is granted; request it if needed, and again after a temporary refusal.
@@ -111,7 +120,8 @@ class JointClaim:
             self._ask()
         if self._answer is None or not self._answer.done():
             return False
-        answer, self._answer = self._reply(self._answer), None
+        answer = self._reply(self._answer)
+        self._answer = None
         if not answer.success:
             if not answer.later:
                 raise ClaimRefused(f"plugin '{self._plugin}' does not get its joints: {answer.message}")
@@ -119,7 +129,10 @@ class JointClaim:
             self.is_taken = True
             return False
         now = self._middleware.now()
-        self._granted, self._since, self.reason, self.is_taken = True, now, "", False
+        self._granted = True
+        self._since = now
+        self.reason = ""
+        self.is_taken = False
         self.note(CLAIMED, self._told)
         self._settled = now + SETTLE if answer.again and self._claim.follows else now
         return now >= self._settled
@@ -142,12 +155,14 @@ class JointClaim:
         if self._refusals.waits:
             for message in self._refusals.drain():
                 if ALL_OWNERS in message.owners:
-                    self.reason, self.began_anew = message.reasons[message.owners.index(ALL_OWNERS)], True
+                    self.reason = message.reasons[message.owners.index(ALL_OWNERS)]
+                    self.began_anew = True
         return self.began_anew
 
     def complaint(self) -> str:
         """Return what was wrong with commands since the last call; empty: nothing."""
-        complaint, self._complaint = self._complaint, ""
+        complaint = self._complaint
+        self._complaint = ""
         return complaint
 
     @property
@@ -159,7 +174,8 @@ class JointClaim:
         """Give up the claim without a request, since nothing is sent for a while; it has to be requested again."""
         self.began_anew = False
         if self._commands:
-            self._granted, self._answer = False, None
+            self._granted = False
+            self._answer = None
 
     def damp(self) -> None:
         """Trip the robot's emergency stop, which fades out its springs. No effect if the plugin commands no joint."""
@@ -206,7 +222,8 @@ class JointClaim:
             return
         for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
             if owner == ALL_OWNERS:
-                self.reason, self.began_anew = reason, True
+                self.reason = reason
+                self.began_anew = True
             elif owner in self._topics:
                 self.reason = self.reason or reason
             if owner != self._claim.owner:

@@ -28,7 +28,8 @@ logger = logging.getLogger(__name__)
 REPORT_PERIOD = 1.0
 """Time between two health reports [s]."""
 
-WRITE, STOPPING = Stage.WRITE, PluginState.STOPPING
+WRITE = Stage.WRITE
+STOPPING = PluginState.STOPPING
 
 NOTICEABLE = 0.02
 """Shortest delay with a warning [s]; shorter ones, frequent on a shared machine, are only counted."""
@@ -150,10 +151,13 @@ class PluginLoop:
     """
 
     def __init__(self, plugins: PluginSet, middleware: Middleware, recorder: CycleRecorder | None = None):
-        self.plugins, self._middleware, self._recorder = plugins, middleware, recorder
+        self.plugins = plugins
+        self._middleware = middleware
+        self._recorder = recorder
         self.statistics = tuple(LoopStatistics() for _ in plugins.plugins)
         self._seen = [managed.plugin.life for managed in plugins.plugins]
-        self._next_report, self._late = 0.0, Throttle(logger)
+        self._next_report = 0.0
+        self._late = Throttle(logger)
         self._reports: deque[tuple[str, HealthReport]] = deque()
         self._skipped = 0
         plugins.changed = self._note
@@ -162,7 +166,8 @@ class PluginLoop:
 
     def run(self) -> None:
         """Run until the middleware ends, or all plugins have failed; then stop and close them. See `loop.run`."""
-        plugins, middleware = self.plugins, self._middleware
+        plugins = self.plugins
+        middleware = self._middleware
         failure: BaseException | None = None
         try:
             plugins.start()
@@ -172,7 +177,8 @@ class PluginLoop:
         except BaseException as error:  # a regular end goes through `middleware.running`: what is raised is a failure
             failure = error
             plugins.abort(located(error), error)
-        failure, before = failure or plugins.failure, set(plugins.failures)
+        failure = failure or plugins.failure
+        before = set(plugins.failures)
         plugins.close()
         late = [error for name, error in plugins.failures.items() if name not in before]
         if failure is not None or late:
@@ -203,7 +209,8 @@ class PluginLoop:
             self._middleware.report(name, report.level, report.summary, report.values)
 
     def _report(self, index: int, managed: ManagedPlugin) -> None:
-        plugin, self._seen[index] = managed.plugin, managed.plugin.life
+        plugin = managed.plugin
+        self._seen[index] = managed.plugin.life
         plugin.peers.look()
         plugin.tuning.log()
         values = {**self.statistics[index].summary(), **plugin.figures()}
@@ -212,7 +219,8 @@ class PluginLoop:
     def _collect(self) -> None:
         """Note the health of the process, and of the pipes of each plugin, to report it in the next cycles."""
         statistics = self.statistics[0]
-        news, self._skipped = statistics.skipped - self._skipped, statistics.skipped
+        news = statistics.skipped - self._skipped
+        self._skipped = statistics.skipped
         level, summary = (Health.WARNING, f"{news} periods skipped") if news else (Health.GOOD, "in time")
         process = f"{self._middleware.name.rpartition('/')[2]} process"
         self._reports.clear()

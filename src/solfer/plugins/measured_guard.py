@@ -19,9 +19,12 @@ class MeasuredGuard:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import tables_finite
 
-        self._owner, self._dofs, self._finite = owner, robot.dofs, tables_finite
+        self._owner = owner
+        self._dofs = robot.dofs
+        self._finite = tables_finite
         self._contacts = robot.contacts if robot.contact_records else None
-        self._values, self._wrenches = robot.state.defaults, np.zeros((0, 6))
+        self._values = robot.state.defaults
+        self._wrenches = np.zeros((0, 6))
         self._kept, self._wrenches_kept = _Kept(self._values), _Kept(self._wrenches)
 
     def keep(self) -> None:

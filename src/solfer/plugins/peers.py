@@ -38,10 +38,14 @@ class Peer:
     """
 
     def __init__(self, pipe: FeedbackPipe | CommandPipe, where: str, needed: bool):
-        self._pipe, self._where, self.needed = pipe, where, needed
+        self._pipe = pipe
+        self._where = where
+        self.needed = needed
         self._receives = isinstance(pipe, FeedbackPipe)
         self._end = pipe.reader if self._receives else pipe.writer
-        self.fault, self.warned, self.found = "", -math.inf, not self._end.carries
+        self.fault = ""
+        self.warned = -math.inf
+        self.found = not self._end.carries
 
     @property
     def open(self) -> bool:
@@ -54,7 +58,8 @@ class Peer:
         """Find out what is wrong, if anything is."""
         look = topics.missing_publisher if self._receives else topics.missing_subscriber
         missing = look(self._end.topic, self._end.carries)
-        self.fault, self.found = "", missing is None
+        self.fault = ""
+        self.found = missing is None
         if missing is not None:
             kind = "feedback" if self._receives else "controller"
             place = ", ".join(filter(None, (f"{kind} '{self._pipe.name}'", self._where)))
@@ -74,8 +79,13 @@ class Peers:
     """
 
     def __init__(self, plugin: str, peers: Sequence[Peer], middleware: Middleware):
-        self._plugin, self._peers, self._middleware = plugin, tuple(peers), middleware
-        self._begin, self._next, self._asked, self._trouble = middleware.now(), -math.inf, False, ""
+        self._plugin = plugin
+        self._peers = tuple(peers)
+        self._middleware = middleware
+        self._begin = middleware.now()
+        self._next = -math.inf
+        self._asked = False
+        self._trouble = ""
 
     def look(self) -> None:
         """Ask for the topics of other nodes, if that is due; to be called about once a second. Does not block."""

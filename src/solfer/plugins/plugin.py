@@ -32,12 +32,10 @@ logger = logging.getLogger(__name__)
 
 
 # module globals: the lookup in the control cycle is several times as fast as on the class
-STARTING, RUNNING, STOPPED, CLOSED = (
-    PluginState.STARTING,
-    PluginState.RUNNING,
-    PluginState.STOPPED,
-    PluginState.CLOSED,
-)
+STARTING = PluginState.STARTING
+RUNNING = PluginState.RUNNING
+STOPPED = PluginState.STOPPED
+CLOSED = PluginState.CLOSED
 CALLS, READ, ROBOT, COMPONENT, GATE, WRITE = Stage
 
 
@@ -102,8 +100,12 @@ class Plugin:
         requests: RequestNotes | None = None,
         tuning: Tuning | None = None,
     ):
-        self.component, self.robot, self.rate = component, robot, rate
-        self.outputs, self.inbox, self._publish = outputs, inbox, tuple(publish)
+        self.component = component
+        self.robot = robot
+        self.rate = rate
+        self.outputs = outputs
+        self.inbox = inbox
+        self._publish = tuple(publish)
         self._jumps = jumps
         self.documents, self.requests = documents, requests or RequestNotes()
         self.tuning = tuning or Tuning(component, ())
@@ -111,8 +113,11 @@ class Plugin:
         if claim is not None:
             claim.note = self.requests.note
         self.peers = peers or Peers(self.name, (), middleware)
-        self.life, self._guard = STARTING, guard
-        self._feedback_timeouts, self._now, self._claim = FeedbackTimeouts(watches), middleware.now, claim
+        self.life = STARTING
+        self._guard = guard
+        self._feedback_timeouts = FeedbackTimeouts(watches)
+        self._now = middleware.now
+        self._claim = claim
         self._conditions = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
         self.timing = CycleTiming()
         self.robot_time = RobotTime(self.feedbacks, 1.0 / rate)
@@ -145,9 +150,11 @@ class Plugin:
             OutOfLimits: The component would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
-        timing, now = self.timing, self._now()
+        timing = self.timing
+        now = self._now()
         # the clock is read here, not by a method of it: a cycle does so seven times
-        times, clock = timing.times, timing.nanoseconds
+        times = timing.times
+        clock = timing.nanoseconds
         times[:] = NO_TIMES
         begin = clock()
         gap = self._conditions.stall(now)
@@ -156,20 +163,24 @@ class Plugin:
             self._awake(now)
         self.inbox.apply()
         end = clock()
-        times[CALLS], begin = end - begin, end
+        times[CALLS] = end - begin
+        begin = end
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
         self._feedback_timeouts.read(now, self.outputs.way)
         verdict = self._judge(now, life is RUNNING)
         end = clock()
-        times[READ], begin = end - begin, end
+        times[READ] = end - begin
+        begin = end
         if verdict is not WORK:
             self._obey(verdict, now)
             return
         self._update_robot(life)
-        component, robot_time = self.component, self.robot_time
-        component.passed, component.time_lost = robot_time.advance(now), robot_time.lost
+        component = self.component
+        robot_time = self.robot_time
+        component.passed = robot_time.advance(now)
+        component.time_lost = robot_time.lost
         component.pace = self.overload.advance(component.passed)
         following = self.outputs.following
         if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
@@ -181,20 +192,23 @@ class Plugin:
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
         end = clock()
-        times[ROBOT], begin = end - begin, end
+        times[ROBOT] = end - begin
+        begin = end
         if self._guard is None:
             self.component.update()
             self.component.send()
         else:
             self._work_guarded(self._guard)
         end = clock()
-        times[COMPONENT], begin = end - begin, end
+        times[COMPONENT] = end - begin
+        begin = end
         if self.component.modify:
             # its pipes publish joints that follow others; who reads the State next computes what it needs
             self.robot.follow()
         self.outputs.collect()
         end = clock()
-        times[GATE], begin = end - begin, end
+        times[GATE] = end - begin
+        begin = end
         self.outputs.send(self._now())
         for publish in self._publish:
             publish()
@@ -302,7 +316,8 @@ class Plugin:
 
     def _judge(self, now: float, running: bool) -> CycleVerdict:
         """Judge what to do in this cycle, whose messages were read `now` [s]; ask for the claim when all is there."""
-        verdict, claim = self._conditions.judge(now, running), self._claim
+        verdict = self._conditions.judge(now, running)
+        claim = self._claim
         if claim is not None and not running and claim.begins_anew():
             return self._conditions.judge_claim(claim, running)
         if verdict is not WORK or claim is None:
@@ -367,7 +382,8 @@ class Plugin:
 
     def _wait(self) -> None:
         """Wait for what the plugin lacks, and log it if it has changed."""
-        self.life, lacks = STARTING, self._conditions.lacks
+        self.life = STARTING
+        lacks = self._conditions.lacks
         if lacks == self._lacks:
             return
         self._lacks = lacks
@@ -380,7 +396,9 @@ class Plugin:
         self.component.init()
         if self._jumps is not None:
             self._jumps.restart()
-        self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
+        self.life = RUNNING
+        self.inbox.refusal = ""
+        self._lacks = ""
         self._conditions.started()
         self._began = self._now()
         self.robot_time.restart(self._began)

@@ -62,7 +62,8 @@ class PluginLog:
     """
 
     def __init__(self, plugin: Plugin):
-        self._plugin, robot = plugin, plugin.robot
+        self._plugin = plugin
+        robot = plugin.robot
         log = Logger(plugin.name)
         for title, state in (("measured", robot.state), ("wanted", robot.command)):
             _add_state(log.section(title), robot, state)
@@ -71,7 +72,8 @@ class PluginLog:
         # one piece of memory for all that is copied: each further one costs time in every cycle
         parts = np.cumsum([len(STAGES), len(plugin.feedbacks), len(counted)])
         times, ages, held, life = np.split(np.zeros(parts[-1] + 4), parts)
-        self._ages, self._aged = cast("memoryview[float]", memoryview(ages)), tuple(enumerate(plugin.feedbacks))
+        self._ages = cast("memoryview[float]", memoryview(ages))
+        self._aged = tuple(enumerate(plugin.feedbacks))
         self._copies: list[tuple[memoryview, memoryview]] = []
         for index, feedback in enumerate(plugin.feedbacks):
             self._add_feedback(log.section(f"feedback/{feedback.name}"), feedback, ages[index : index + 1])
@@ -81,7 +83,8 @@ class PluginLog:
         if counted:
             log.add("gate", held.view(np.int64), counted)
         log.add("life", life, ("state", "blend", "passed", "lost"), ("", "s", "s", "s"))
-        self._life, self._blend = cast("memoryview[float]", memoryview(life)), plugin.outputs.blend
+        self._life = cast("memoryview[float]", memoryview(life))
+        self._blend = plugin.outputs.blend
         log.add("load", plugin.overload.figures, ("left_out", "age", "pace"), ("", "s", ""))
         log.add("timing", times.view(np.int64), STAGES, "s", factor=NANOSECOND)
         self._words = memoryview(times).cast("B").cast("q")
@@ -91,7 +94,8 @@ class PluginLog:
     def take(self, now: float) -> None:
         """Bring the numbers up to date that nobody keeps in an array, at the time `now` [s] of the plugin's clock."""
         self._words[:] = self._plugin.timing.times
-        life, ages = self._life, self._ages
+        life = self._life
+        ages = self._ages
         life[0], life[1] = self._plugin.life, self._blend.shortest
         component = self._plugin.component
         life[2], life[3] = component.passed, component.time_lost
@@ -103,7 +107,8 @@ class PluginLog:
     def _add_feedback(self, log: Logger, feedback: FeedbackPipe, age: np.ndarray) -> None:
         """Declare what a pipe has received last: numbers as the Robot has them, before a filter."""
         pipe = feedback.source.pipe if isinstance(feedback, SharedFeedbackPipe) else feedback
-        robot, inputs = self._plugin.robot, self._plugin.component.inputs
+        robot = self._plugin.robot
+        inputs = self._plugin.component.inputs
         if isinstance(pipe, StateFeedbackPipe):
             for each in pipe.state_fields:
                 names = [robot.dofs[dof] for dof in each.dofs]
@@ -118,7 +123,9 @@ class PluginLog:
 
     def _add_command(self, log: Logger, pipe: CommandPipe) -> None:
         """Declare what a pipe sends."""
-        name, sent, robot = f"command/{pipe.name}", pipe.sent, self._plugin.robot
+        name = f"command/{pipe.name}"
+        sent = pipe.sent
+        robot = self._plugin.robot
         port = self._plugin.component.outputs.get(pipe.name)
         if isinstance(sent, JointMessage):
             for field, values in _joint_fields(sent):
@@ -141,7 +148,8 @@ class PluginLog:
         self, log: Logger, name: str, kind: str, parts: Sequence[np.ndarray], frame: str, child: str = ""
     ) -> None:
         """Declare numbers that are in several arrays, one after the other."""
-        whole, start = np.zeros(sum(part.size for part in parts)), 0
+        whole = np.zeros(sum(part.size for part in parts))
+        start = 0
         for part in parts:
             self._copies.append((memoryview(whole[start : start + part.size]), memoryview(part)))
             start += part.size
@@ -150,7 +158,8 @@ class PluginLog:
 
 def _count_in(gates: Iterable[CommandGate], counts: np.ndarray) -> None:
     """Let gates count in an array, one after the other."""
-    words, begin = memoryview(counts).cast("B").cast("q"), 0
+    words = memoryview(counts).cast("B").cast("q")
+    begin = 0
     for gate in gates:
         gate.count_in(words[begin : begin + len(gate.kinds)])
         begin += len(gate.kinds)
@@ -188,7 +197,8 @@ def _joint_fields(sent: JointMessage) -> Iterator[tuple[str, np.ndarray]]:
 def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     """Declare the numbers of a port."""
     kind = MESSAGES[port.quantity]
-    columns, unit = NAMED[kind], _UNITS.get(port.quantity, "")
+    columns = NAMED[kind]
+    unit = _UNITS.get(port.quantity, "")
     units = (unit,) * len(columns) if unit else with_units(columns, UNITS)
     if port.count is None:
         log.add(name, port.value, columns, units, frame, kind)

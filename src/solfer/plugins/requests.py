@@ -34,7 +34,8 @@ class RequestNotes:
         """Return a declaration that does the same, and notes what is asked."""
         name = declaration.name
         if isinstance(declaration, Service):
-            service, request = declaration, declaration.request
+            service = declaration
+            request = declaration.request
             self._calls[name] = lambda fields: service.prepared(made(request, fields))
             return self._service(service)
         if isinstance(declaration, TopicIn):

@@ -73,17 +73,24 @@ class StartConditions:
         period: float,
         stall: float | None = None,
     ):
-        self._plugin, self._feedback_timeouts, self._claim = plugin, watches, claim
+        self._plugin = plugin
+        self._feedback_timeouts = watches
+        self._claim = claim
         self._longest = period + min(stall or max(STALL, PERIODS * period), watches.patience)
         self._newest = math.inf
-        self._middleware, self._now, self._rewinds = middleware, middleware.now, middleware.rewinds
+        self._middleware = middleware
+        self._now = middleware.now
+        self._rewinds = middleware.rewinds
         self._latest: float | None = None
-        self._earliest, self._past = -math.inf, ""
-        self.lacks, self.level = self._missing(), logging.DEBUG
+        self._earliest = -math.inf
+        self._past = ""
+        self.lacks = self._missing()
+        self.level = logging.DEBUG
 
     def stall(self, now: float) -> float:
         """Measure how long the loop stood still before this cycle, which begins `now` [s]; 0: it did not [s]."""
-        gap, self._newest = now - self._newest, now
+        gap = now - self._newest
+        self._newest = now
         if gap <= self._longest:
             return 0.0
         self._past = f"after its own loop stood still for {gap:.3f} s"
@@ -100,7 +107,8 @@ class StartConditions:
         timeouts = self._feedback_timeouts
         # after the messages: a simulator publishes that the time went back before it publishes the new state
         if self._middleware.rewinds != self._rewinds:
-            self._rewinds, self._past = self._middleware.rewinds, "after the simulated time went back"
+            self._rewinds = self._middleware.rewinds
+            self._past = "after the simulated time went back"
             return FORGET
         if now < self._earliest:
             timeouts.restart()  # what is compared with an old measurement would be refused
@@ -120,7 +128,8 @@ class StartConditions:
     def forgotten(self, now: float) -> None:
         """Note that all was discarded that was received before `now` [s]: what comes soon may be old, too."""
         self._earliest = now + SETTLE
-        self.lacks, self.level = f"{self._missing()}, {self._past}", logging.WARNING
+        self.lacks = f"{self._missing()}, {self._past}"
+        self.level = logging.WARNING
 
     def started(self) -> None:
         """Mark the plugin as running: later waits are unlimited, and the duration of its start is not a stall."""
@@ -128,15 +137,18 @@ class StartConditions:
 
     def restart(self) -> None:
         """Reset to the state before the first cycle."""
-        self._latest, self._newest = None, math.inf
-        self.lacks, self.level = self._missing(), logging.DEBUG
+        self._latest = None
+        self._newest = math.inf
+        self.lacks = self._missing()
+        self.level = logging.DEBUG
 
     def health(self, running: bool) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence; empty if good."""
         if not running:
             refused = self._claim is not None and self._claim.reason
             return Health.ERROR if refused else Health.WARNING, f"holds and waits {self.lacks}"
-        complaint, kept = self._claim.complaint() if self._claim is not None else "", self._feedback_timeouts.kept()
+        complaint = self._claim.complaint() if self._claim is not None else ""
+        kept = self._feedback_timeouts.kept()
         if kept and not complaint:
             complaint = f"goes on with the last message of feedback {kept}"
         now = self._now()
@@ -158,7 +170,8 @@ class StartConditions:
     def _miss(self, now: float, running: bool) -> CycleVerdict:
         """Handle a missing feedback."""
         rivalries = self._feedback_timeouts.rivalries(now)
-        self.lacks, self.level = self._missing(running), logging.WARNING if running or rivalries else logging.INFO
+        self.lacks = self._missing(running)
+        self.level = logging.WARNING if running or rivalries else logging.INFO
         if running:
             if self._feedback_timeouts.action() == "stop":
                 raise MiddlewareError(

@@ -77,7 +77,9 @@ class CycleTrace:
 
     def __init__(self, plugins: Sequence[Plugin]):
         self.events: list[TraceEvent] = []
-        self.cycle, self._plugin, self._before = 0, "", b""
+        self.cycle = 0
+        self._plugin = ""
+        self._before = b""
         self._ends: list[End] = []
         self._robots: list[_TracedRobot] = []
         traced: list[FeedbackPipe] = []
@@ -115,7 +117,8 @@ class CycleTrace:
 
     def _observed_component(self, plugin: Plugin, robot: _TracedRobot) -> list[End]:
         """Observe whether a component changes the measured State."""
-        component, state = plugin.component, plugin.robot.state
+        component = plugin.component
+        state = plugin.robot.state
 
         def before() -> None:
             self._before = state.position.tobytes() + state.velocity.tobytes()
@@ -163,7 +166,8 @@ class TraceLog:
     """
 
     def __init__(self, plugins: Sequence[Plugin], cycles: int):
-        self._plugins, self._left = tuple(plugins), cycles
+        self._plugins = tuple(plugins)
+        self._left = cycles
         self._trace: CycleTrace | None = None
 
     def poll(self) -> None:

@@ -60,9 +60,12 @@ class _Motion:
     """
 
     def __init__(self, write: Callable[[np.ndarray], None], numbers: np.ndarray):
-        self.numbers, self.since = numbers, 0.0
+        self.numbers = numbers
+        self.since = 0.0
         self.goal: _Goal | None = None
-        self._write, self._begin, self._way = write, numbers, np.zeros_like(numbers)
+        self._write = write
+        self._begin = numbers
+        self._way = np.zeros_like(numbers)
         self._is_finite = bool(np.isfinite(numbers).all())
 
     def go_on(self, time: float) -> bool:
@@ -275,7 +278,8 @@ class Tuning:
         component.tags = change.after
         self._unsaid.append(change.lines)
         for motion, goal in change.goals:
-            motion.goal, motion.since = goal, self._time
+            motion.goal = goal
+            motion.since = self._time
             self._moving[motion] = None
         self.moves = bool(self._moving)
         for write in change.writes:
@@ -286,7 +290,8 @@ class Tuning:
         for name in request.names:
             if name not in self._knobs:
                 raise UnknownName("parameter", name, self._knobs)
-        tags, names = self._component.tags, request.names or self.names
+        tags = self._component.tags
+        names = request.names or self.names
         rows = [self._description(name, self._knobs[name], tags) for name in names]
         return ParametersReply(True, "", *zip(*rows, strict=True))
 

@@ -11,7 +11,8 @@ from typing import Any
 
 def _homes() -> dict[str, str]:
     """Return the names in the `__all__` of this room's files, each with the module that is imported for it."""
-    folder, homes = Path(__file__).parent, dict[str, str]()
+    folder = Path(__file__).parent
+    homes = dict[str, str]()
     for path in sorted([*folder.glob("[a-z]*.py"), *folder.glob("contact/[a-z]*.py")]):
         module = ".".join((__name__, *path.relative_to(folder).with_suffix("").parts))
         for names in re.findall(r"^__all__ = \[(.*?)\]", path.read_text(), re.MULTILINE | re.DOTALL):

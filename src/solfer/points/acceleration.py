@@ -51,7 +51,9 @@ class AngularAcceleration(RigidPoint, _CompiledAcceleration):
     orientation, b is dJ/dt v. Arguments: `AngularVelocity`.
     """
 
-    kind, kernels, motion = vector(3), (velocity, material_acceleration), ANGULAR
+    kind = vector(3)
+    kernels = (velocity, material_acceleration)
+    motion = ANGULAR
 
 
 class SpatialAcceleration(LinearPoint, _CompiledAcceleration):
@@ -61,7 +63,9 @@ class SpatialAcceleration(LinearPoint, _CompiledAcceleration):
     `SpatialVelocity`, b is dJ/dt v. Arguments: `LinearPoint`.
     """
 
-    kind, kernels, motion = vector(6), (velocity, material_acceleration), LINEAR + ANGULAR
+    kind = vector(6)
+    kernels = (velocity, material_acceleration)
+    motion = LINEAR + ANGULAR
 
 
 class SupportVertexAcceleration(SupportVertex, _CompiledAcceleration):

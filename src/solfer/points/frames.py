@@ -41,7 +41,8 @@ class RelativePoint(CompiledPoint):
                 f"{point} as seen from {frame}", expected="a position, an orientation or a pose, as seen from a pose"
             )
         super().__init__(point.space, _robot_of(point, frame))
-        self.point, self.frame = point, frame
+        self.point = point
+        self.frame = frame
 
     @property
     def parts(self) -> tuple[Point, ...]:
@@ -112,7 +113,8 @@ class GroundFrame(_LevelFrame):
         PointError: The pose has no Robot.
     """
 
-    falls, crosses = True, False
+    falls = True
+    crosses = False
 
     def __init__(self, pose: Point, height: float = 0.0, axis: ArrayLike = (1.0, 0.0, 0.0), normal: ArrayLike = UP):
         super().__init__(pose, axis, normal, height)
@@ -137,7 +139,8 @@ class WheelFrame(_LevelFrame):
         PointError: The pose has no Robot.
     """
 
-    falls, crosses = False, True
+    falls = False
+    crosses = True
 
     def __init__(self, pose: Point, axle: ArrayLike = UP, normal: ArrayLike = UP):
         super().__init__(pose, axle, normal, 0.0)
@@ -167,7 +170,8 @@ class LookAt(CompiledPoint):
         if frame.space != POSE or target.space != vector(3):
             raise SizeMismatch(f"a direction from {frame} to {target}", expected="a pose, and a position")
         super().__init__(3, _robot_of(frame, target))
-        self.frame, self.target = frame, target
+        self.frame = frame
+        self.target = target
 
     @property
     def parts(self) -> tuple[Point, ...]:

@@ -35,7 +35,9 @@ class Handler(Generic[PointT]):
     def __init__(self, points: Iterable[PointT] = ()):
         self._points: list[PointT] = []
         self._memory, self._sequence, self._program = _Memory(), list[Point](), Program()
-        self._contents, self._is_laid_out, self._is_running = Layout(), False, False
+        self._contents = Layout()
+        self._is_laid_out = False
+        self._is_running = False
         for point in points:
             self.add(point)
 
@@ -216,7 +218,8 @@ class _Memory:
 
     def place(self, point: Point) -> list[Point]:
         """Give a point the next place; return what has to be updated: it, and copies if it lies somewhere else."""
-        first, row = len(self.value), len(self.offset)
+        first = len(self.value)
+        row = len(self.offset)
         self._use(first + point.size, row + point.rows)
         values = self.value[first:], self.offset[row:]
         jacobians = self.jacobian[row:], np.zeros((point.rows, 0))
@@ -235,7 +238,9 @@ class _Memory:
 
     def _use(self, size: int, rows: int) -> None:
         values, jacobians, offsets = self._all
-        self.value, self.jacobian, self.offset = values[:size], jacobians[:rows], offsets[:rows]
+        self.value = values[:size]
+        self.jacobian = jacobians[:rows]
+        self.offset = offsets[:rows]
 
 
 def _parts(point: Point) -> tuple[Point, ...]:

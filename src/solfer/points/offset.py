@@ -34,7 +34,10 @@ class PositionOffset:
     size = 3
 
     def __init__(self, robot: RobotView, link: str, attachment: Attachment, numbers: np.ndarray):
-        self._kinematics, self._link, self._attachment, self._numbers = robot.kinematics, link, attachment, numbers
+        self._kinematics = robot.kinematics
+        self._link = link
+        self._attachment = attachment
+        self._numbers = numbers
         self.set_fixed((0.0, 0.0, 0.0))
 
     def share(self, numbers: np.ndarray) -> None:
@@ -60,7 +63,8 @@ class PositionOffset:
         Raises:
             SizeMismatch, NotFinite: These are not three finite numbers.
         """
-        origin, rotation = self._kinematics.position(self._link), self._kinematics.rotation(self._link)
+        origin = self._kinematics.position(self._link)
+        rotation = self._kinematics.rotation(self._link)
         self.set_fixed(rotation.T @ (self._checked(position) - origin))
 
     def set_reference(self, position: ArrayLike, link: str) -> None:
@@ -70,7 +74,8 @@ class PositionOffset:
             UnknownName: There is no such link.
             SizeMismatch, NotFinite: These are not three finite numbers.
         """
-        origin, rotation = self._kinematics.position(link), self._kinematics.rotation(link)
+        origin = self._kinematics.position(link)
+        rotation = self._kinematics.rotation(link)
         self.set_world(origin + rotation @ self._checked(position))
 
     def _checked(self, position: ArrayLike) -> np.ndarray:
@@ -90,7 +95,10 @@ class OrientationOffset:
     size = 4
 
     def __init__(self, robot: RobotView, link: str, attachment: Attachment, numbers: np.ndarray):
-        self._kinematics, self._link, self._attachment, self._numbers = robot.kinematics, link, attachment, numbers
+        self._kinematics = robot.kinematics
+        self._link = link
+        self._attachment = attachment
+        self._numbers = numbers
         self._turn(np.eye(3))
 
     def share(self, numbers: np.ndarray) -> None:
@@ -190,7 +198,8 @@ def chosen(
     if wanted is None:
         return np.arange(count, dtype=np.int64)
     item: Any
-    indices, expected = [], "" if names else f"a number of a {kind}"
+    indices = []
+    expected = "" if names else f"a number of a {kind}"
     for item in [wanted] if np.isscalar(wanted) else wanted:
         if isinstance(item, str) and item not in names:
             raise UnknownName(kind, item, names, where=where, expected=expected)

@@ -51,7 +51,8 @@ class Layout:
 
     def change(self) -> None:
         """Let all readers expire: an array was moved, or columns were added."""
-        readers, self._readers = self._readers, None
+        readers = self._readers
+        self._readers = None
         for reader in readers or ():
             reader.expire()
 
@@ -78,7 +79,8 @@ class Point(abc.ABC):
         self.space = space if isinstance(space, Space) else vector(int(space))
         self.robot = robot
         cols = 0 if robot is None else robot.kinematics.size
-        self._value, self._jacobian = self.space.neutral(), np.zeros((self.space.rows, cols))
+        self._value = self.space.neutral()
+        self._jacobian = np.zeros((self.space.rows, cols))
         self._flags = np.zeros(2, dtype=np.int64)
         self._is_overwritten = False
         self._layout = Layout()
@@ -262,7 +264,9 @@ class Point(abc.ABC):
             jacobian[:] = self._jacobian
         if layout is not self._layout:
             self._layout.change()
-        self._value, self._jacobian, self._layout = value, jacobian, layout
+        self._value = value
+        self._jacobian = jacobian
+        self._layout = layout
 
 
 def common_robot(*group: Point) -> RobotView | None:

@@ -82,7 +82,9 @@ def folded(point: Point, carried: np.ndarray, *instructions: Instruction) -> tup
     followers = point.robot.kinematics.tree.followers
     if not len(followers.dofs):
         return instructions
-    there, table, ratios = set(carried.tolist()), [], []
+    there = set(carried.tolist())
+    table = []
+    ratios = []
     for dof, leader, ratio in zip(followers.dofs, followers.leaders, followers.ratios, strict=True):
         if int(dof) in there:
             table.append((dof, leader, int(leader) in there))
@@ -105,13 +107,15 @@ class Program:
 
     def __init__(self) -> None:
         self.steps: list[Callable[[bool], object]] = []
-        self.is_current, self._is_expired = False, False
+        self.is_current = False
+        self._is_expired = False
         self._blocks: list[_Block] = []
         self._count, self._watched = 0, set[int]()
 
     def expire(self) -> None:
         """Take it that an array has moved: all is made anew by the next `complete`."""
-        self.is_current, self._is_expired = False, True
+        self.is_current = False
+        self._is_expired = True
 
     def reopen(self) -> None:
         """Take it that there are more points: `complete` appends them."""
@@ -142,8 +146,11 @@ class Program:
 
     def _restart(self) -> None:
         if self._is_expired:
-            self._is_expired, self._count = False, 0
-            self.steps, self._blocks, self._watched = [], [], set()
+            self._is_expired = False
+            self._count = 0
+            self.steps = []
+            self._blocks = []
+            self._watched = set()
 
     def _compile(self, point: "CompiledPoint", robot: RobotView | None, dofs: int) -> None:
         instructions = point.instructions()
@@ -179,7 +186,8 @@ class _Block:
     """
 
     def __init__(self, robot: RobotView | None, dofs: int):
-        self._header, self._instructions = np.zeros(1, dtype=PROGRAM), np.zeros(4, dtype=INSTRUCTION)
+        self._header = np.zeros(1, dtype=PROGRAM)
+        self._instructions = np.zeros(4, dtype=INSTRUCTION)
         self._header["dofs"], self._header["instructions"], self._count = dofs, address(self._instructions), 0
         self._arrays: list[Any] = []
         if robot is not None:

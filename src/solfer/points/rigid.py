@@ -39,7 +39,9 @@ class LinkPoint(CompiledPoint):
     def __init__(self, space: Space, link: str, robot: RobotView, count: int):
         self._attachment = robot.kinematics.attachment(link)
         super().__init__(space, robot)
-        self.link, self._joint, self._moving = link, self._attachment.joint, self._attachment.moved
+        self.link = link
+        self._joint = self._attachment.joint
+        self._moving = self._attachment.moved
         self._carried = self._attachment.columns
         self._numbers = np.zeros(count)
 
@@ -126,7 +128,8 @@ class LinearPoint(RigidPoint):
     def __init__(self, link: str, robot: RobotView, offset: ArrayLike = (0.0, 0.0, 0.0)):
         super().__init__(link, robot)
         self.position = self._position
-        self.set_fixed, self.set_world = self.position.set_fixed, self.position.set_world
+        self.set_fixed = self.position.set_fixed
+        self.set_world = self.position.set_world
         self.set_reference = self.position.set_reference
         self.set_fixed(offset)
 
@@ -149,12 +152,15 @@ class FrameOrientation(RigidPoint):
         SizeMismatch, NotFinite: The offset is not a quaternion.
     """
 
-    kind, kernels, motion = ORIENTATION, (place,), ANGULAR
+    kind = ORIENTATION
+    kernels = (place,)
+    motion = ANGULAR
 
     def __init__(self, link: str, robot: RobotView, offset: ArrayLike = (0.0, 0.0, 0.0, 1.0)):
         super().__init__(link, robot)
         self.orientation = self._orientation
-        self.set_fixed, self.set_world = self.orientation.set_fixed, self.orientation.set_world
+        self.set_fixed = self.orientation.set_fixed
+        self.set_world = self.orientation.set_world
         self.set_reference = self.orientation.set_reference
         self.set_fixed(offset)
 
@@ -187,7 +193,9 @@ class SpatialPoint(RigidPoint):
         SizeMismatch, NotFinite: An offset does not fit.
     """
 
-    kind, kernels, motion = POSE, (place,), LINEAR + ANGULAR
+    kind = POSE
+    kernels = (place,)
+    motion = LINEAR + ANGULAR
 
     def __init__(
         self,
@@ -197,7 +205,8 @@ class SpatialPoint(RigidPoint):
         orientation: ArrayLike = (0.0, 0.0, 0.0, 1.0),
     ):
         super().__init__(link, robot)
-        self.position, self.orientation = self._position, self._orientation
+        self.position = self._position
+        self.orientation = self._orientation
         self.set_fixed(offset, orientation)
 
     def set_fixed(self, position: ArrayLike, orientation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> None:
@@ -236,7 +245,9 @@ class AngularVelocity(RigidPoint):
         UnknownName: The robot has no such link.
     """
 
-    kind, kernels, motion = vector(3), (velocity,), ANGULAR
+    kind = vector(3)
+    kernels = (velocity,)
+    motion = ANGULAR
 
 
 class SpatialVelocity(LinearPoint):
@@ -245,4 +256,6 @@ class SpatialVelocity(LinearPoint):
     Arguments: `LinearPoint`.
     """
 
-    kind, kernels, motion = vector(6), (velocity,), LINEAR + ANGULAR
+    kind = vector(6)
+    kernels = (velocity,)
+    motion = LINEAR + ANGULAR

@@ -7,11 +7,13 @@ from pathlib import Path
 from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.latched import latched
 
-FILE, KIND = "estop", "estop"
+FILE = "estop"
+KIND = "estop"
 LAYOUT = b"""{"words": ["tripped", "time [ns]", "pid", "answer [ns]", "answering pid", "holds"],
 "texts": ["reason", "answer"]}"""
 TRIPPED, TIME, PID, ANSWER, ANSWERING, HOLDS = range(6)
-WORDS, TEXT = 6, 160  # [words], [B]
+WORDS = 6
+TEXT = 160  # [words], [B]
 
 
 class EmergencyStopLatch:
@@ -86,7 +88,8 @@ class EmergencyStopLatch:
     def answer(self, text: str, holds: bool = True) -> None:
         """Confirm as the executor that all plugins hold, or say which cannot."""
         _write(self._answer, text)
-        self._words[ANSWERING], self._words[HOLDS] = os.getpid(), holds
+        self._words[ANSWERING] = os.getpid()
+        self._words[HOLDS] = holds
         self._words[ANSWER] = time.monotonic_ns()
 
     def close(self) -> None:

@@ -90,7 +90,10 @@ class Executor:
         interruptions: Interruptions | None = None,
     ):
         self._rules = rules = rules or ExecutorRules()
-        self._beside, self._ns, self._middleware, self.estop = beside, nanoseconds, middleware, estop
+        self._beside = beside
+        self._ns = nanoseconds
+        self._middleware = middleware
+        self.estop = estop
         self.statistics = statistics or RuntimeStatistics(
             plugins[0].rate if plugins else 0.0, [plugin.name for plugin in plugins], STAGES
         )
@@ -110,16 +113,21 @@ class Executor:
             times=self._durations[len(LoopTime) :],
             requires=requires,
         )
-        self.plugins, self.switchboard, self.rate = self._set.plugins, self._set.switchboard, self._set.rate
-        self._seldom, self._period = max(1, round(SELDOM * self.rate)), round(1e9 / self.rate)
-        self._late, self._black_box = LeakyCounter(rules.overruns), black_box
+        self.plugins = self._set.plugins
+        self.switchboard = self._set.switchboard
+        self.rate = self._set.rate
+        self._seldom = max(1, round(SELDOM * self.rate))
+        self._period = round(1e9 / self.rate)
+        self._late = LeakyCounter(rules.overruns)
+        self._black_box = black_box
         self._set.changed = self._note
         self._set.initialize()
         self._serve()
 
     def cycle(self, late: int = 0) -> None:
         """Run one cycle, which began `late` after its deadline [ns]. Errors of plugins are not raised."""
-        statistics, begin = self.statistics, self._ns()
+        statistics = self.statistics
+        begin = self._ns()
         if self._interruptions is not None:
             self._interruptions.start()
         if self.estop:
@@ -130,11 +138,13 @@ class Executor:
         if self._black_box is not None:
             self._black_box.record(end, late, end - begin)
             end = self._ns()
-        durations, counts = self._durations, statistics.counts
+        durations = self._durations
+        counts = statistics.counts
         durations[CYCLE], durations[OVERHEAD], durations[LATENESS] = end - begin, end - begin - components, late
         count_durations(statistics.histograms.rows, durations, len(LoopTime))
         self._check_overrun(late, end - begin)
-        counts[CYCLES], counts[TIME] = self._set.cycles, end
+        counts[CYCLES] = self._set.cycles
+        counts[TIME] = end
         statistics.beat(monotonic_ns())
 
     def run(self, running: Callable[[], bool] | None = None) -> None:
@@ -195,7 +205,8 @@ class Executor:
 
     def _turn(self, late: float, skipped: int) -> None:
         """Run a cycle, which begins `late` [s] after its deadline, or after the first one of the `skipped` periods."""
-        lateness, overhang = max(0, int(1e9 * late)), self._overhang()
+        lateness = max(0, int(1e9 * late))
+        overhang = self._overhang()
         if skipped:
             self._skip(skipped, lateness - overhang)
         # what the cycle before took too long was counted with that
@@ -208,16 +219,20 @@ class Executor:
 
     def _overhang(self) -> int:
         """Compute how much longer the newest cycle lasted than to the next deadline [ns]."""
-        durations, period = self._durations, self._period
+        durations = self._durations
+        period = self._period
         return max(0, int(durations[LATENESS]) % period + int(durations[CYCLE]) - period)
 
     def _skip(self, periods: int, late: int) -> None:
         """Count skipped periods for their cause, the longest of the last stages and a wake-up that was `late` [ns]."""
-        statistics, longest, row = self.statistics, late, int(LATENESS)
+        statistics = self.statistics
+        longest = late
+        row = int(LATENESS)
         for index, times in enumerate(self._set.times):
             for stage, time in enumerate(times):
                 if time > longest:
-                    longest, row = time, statistics.row(index, stage)
+                    longest = time
+                    row = statistics.row(index, stage)
         statistics.counts[SKIPPED] += periods
         statistics.skips[row] += periods
 
@@ -230,7 +245,8 @@ class Executor:
 
         Neither one that was kept from running counts, nor how late the next one is for that: that is an overload.
         """
-        counts, late = self.statistics.counts, self._late
+        counts = self.statistics.counts
+        late = self._late
         taken = lasted if self._was_interrupted else delay + lasted
         self._was_interrupted = taken > self._period >= taken - self._interrupted()
         if self._was_interrupted or self._set.cycles <= self._rules.grace:
@@ -251,7 +267,8 @@ class Executor:
 
     def _note(self, index: int, managed: ManagedPlugin) -> None:
         """Publish a plugin's new state, and log why it is aborted."""
-        state, budget = managed.state, self._set.budgets[index]
+        state = managed.state
+        budget = self._set.budgets[index]
         if state in FAILED:
             logger.error(
                 "%s is aborted: %s",

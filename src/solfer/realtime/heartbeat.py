@@ -28,7 +28,8 @@ class Heartbeat:
         self._path = folder / STATISTICS
         self._segment: Segment | None = None
         self.pid = self.generation = 0
-        self.period, self._next_look = 0.0, -float("inf")
+        self.period = 0.0
+        self._next_look = -float("inf")
 
     def beats(self) -> int | None:
         """Return a number that changes with each beat; None without a process, or before its begin or after its end.
@@ -63,6 +64,7 @@ class Heartbeat:
             segment = None
         self._segment = None if segment is None or segment.retired else segment
         if self._segment is not None:
-            self.pid, self.generation = segment.pid, segment.generation
+            self.pid = segment.pid
+            self.generation = segment.generation
             self.period = 1.0 / json.loads(segment.layout)["rate"]
         return self._segment

@@ -45,7 +45,9 @@ class Lookout:
     """
 
     def __init__(self, peers: Mapping[str, Looking], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
-        self._peers, self._middleware, self._pipes = dict(peers), middleware, pipes
+        self._peers = dict(peers)
+        self._middleware = middleware
+        self._pipes = pipes
         self._published = dict.fromkeys(peers, "")
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -12,7 +12,8 @@ PRIORITY = 60
 """Priority of the RT process among those of SCHED_FIFO."""
 
 LATENCY = "/dev/cpu_dma_latency"
-MCL_CURRENT, MCL_FUTURE = 1, 2
+MCL_CURRENT = 1
+MCL_FUTURE = 2
 PR_SET_TIMERSLACK = 29
 
 

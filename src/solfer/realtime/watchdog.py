@@ -45,7 +45,10 @@ class Watchdog:
     def __init__(
         self, heartbeat: Heartbeat, stop: EmergencyStopLatch, limit: float = LIMIT, presence: Presence | None = None
     ):
-        self._heartbeat, self._stop, self._limit, self._presence = heartbeat, stop, limit, presence
+        self._heartbeat = heartbeat
+        self._stop = stop
+        self._limit = limit
+        self._presence = presence
         self._newest: int | None = None
         self._share: ProcessorShare | None = None
         self._age = self._idle = 0.0
@@ -69,7 +72,8 @@ class Watchdog:
         Raises:
             MiddlewareError: The namespace was removed. The latch in its memory was tripped.
         """
-        due, presence = time.monotonic(), self._presence
+        due = time.monotonic()
+        presence = self._presence
         while running():
             self.look()
             if presence is not None and presence.lost():

@@ -20,7 +20,8 @@ def save_arrays(recording: Recording, path: Path) -> None:
     Raises:
         RecordingError: The file cannot be written.
     """
-    draft, made = path.with_name(f"{path.name}.{os.getpid()}.new"), False
+    draft = path.with_name(f"{path.name}.{os.getpid()}.new")
+    made = False
     arrays: dict[str, Any] = {"lost": np.array(recording.lost)}
     for name, channel in recording.channels.items():
         arrays |= {name: channel.values, f"{name}.time": channel.times, f"{name}.columns": np.array(channel.columns)}

@@ -13,7 +13,9 @@ from solfer.recording.model import Channel
 
 _RECORD = "<BQHIQQ"  # of a message: opcode, length, channel, sequence, time of the log, time of publication
 _HEADER = struct.calcsize(_RECORD)
-_SEQUENCE, _LOGGED, _PUBLISHED = 11, 15, 23
+_SEQUENCE = 11
+_LOGGED = 15
+_PUBLISHED = 23
 _SECOND = 1_000_000_000
 
 
@@ -27,7 +29,9 @@ class RecordedTopic:
     """
 
     def __init__(self, name: str, places: Sequence[int], channels: Sequence[Channel]):
-        self.name, self.places, self.channels = name, tuple(places), tuple(channels)
+        self.name = name
+        self.places = tuple(places)
+        self.channels = tuple(channels)
         self.kind, self.template = channels[0].kind, template(channels)
 
     def described(self) -> dict[str, str]:
@@ -59,7 +63,8 @@ def topics_of(channels: Sequence[Channel]) -> list[RecordedTopic]:
     for index, channel in enumerate(channels):
         same = (topic_of(channel), channel.columns, channel.frame) if channel.kind == JOINTS else (channel.name,)
         groups.setdefault(same, []).append(index)
-    topics, used = [], set()
+    topics = []
+    used = set()
     for places in groups.values():
         ordered = sorted(places, key=lambda place: _rank(channels[place]))
         name = topic_of(channels[ordered[0]])
@@ -89,10 +94,12 @@ class Block:
     """
 
     def __init__(self, channels: Sequence[Channel], first: int):
-        self.topics, self.first = topics_of(channels), first
+        self.topics = topics_of(channels)
+        self.first = first
         starts = np.cumsum([0, *(len(channel.columns) for channel in channels)])
         self.width = int(starts[-1])
-        data, self._offsets = bytearray(), []
+        data = bytearray()
+        self._offsets = []
         self._moves: list[tuple[int, int, int]] = []  # where numbers go, where they come from, and how many bytes
         for index, topic in enumerate(self.topics):
             self._offsets.append(len(data))
@@ -101,7 +108,8 @@ class Block:
             columns = np.concatenate([np.arange(starts[place], starts[place + 1]) for place in topic.places])
             self._moves += _moves(content.runs, columns, len(data))
             data += content.data
-        self._row, self.size = np.frombuffer(bytes(data), dtype=np.uint8), len(data)
+        self._row = np.frombuffer(bytes(data), dtype=np.uint8)
+        self.size = len(data)
         self._times = self._bytes(8, _LOGGED, _PUBLISHED)
         self._numbers, self._stamps = self._bytes(4, _SEQUENCE), self._bytes(8, _HEADER + STAMP)
 
@@ -139,7 +147,8 @@ class Block:
 
 def _moves(runs: Sequence[tuple[int, int]], columns: np.ndarray, begin: int) -> list[tuple[int, int, int]]:
     """List what is copied into a message at `begin`: the numbers of some columns, a run after the other."""
-    moves, used = [], 0
+    moves = []
+    used = 0
     for place, count in runs:
         if count:
             moves.append((begin + place, 8 * int(columns[used]), 8 * count))

@@ -13,7 +13,8 @@ from solfer.recording.model import COLUMNS, JOINTS, Channel
 JOINT_PARTS = ("position", "velocity", "effort")
 """Fields of a message of joints, each a channel of its own."""
 
-_XYZ, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
+_XYZ = ("x", "y", "z")
+_QUATERNION = ("qx", "qy", "qz", "qw")
 _TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 NAMED = {
@@ -136,7 +137,8 @@ class Template:
 
 def template(channels: Sequence[Channel]) -> Template:
     """Lay out the message of channels that travel in one: those of a topic, in the order of `parts_of`."""
-    first, cdr = channels[0], Cdr()
+    first = channels[0]
+    cdr = Cdr()
     cdr.header(first.frame)
     if first.kind == JOINTS:
         runs = _joints(cdr, channels)

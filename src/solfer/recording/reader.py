@@ -81,7 +81,8 @@ class _Reader:
     """
 
     def __init__(self, file: BinaryIO):
-        self._file, self.place = file, ""
+        self._file = file
+        self.place = ""
         self._schemas: dict[int, str] = {}
         self._topics: dict[int, ChannelRecord] = {}
         self._rows: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
@@ -150,7 +151,8 @@ class _Reader:
         """Take the messages of a chunk; one that is damaged is left out."""
         first, last, size, checksum = _CHUNK.unpack_from(content)
         stream = ReadDataStream(io.BytesIO(content[_CHUNK.size :]))
-        packing, length = stream.read_prefixed_string(), stream.read8()
+        packing = stream.read_prefixed_string()
+        length = stream.read8()
         packed = stream.read(length)
         try:
             if size > _LARGEST or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
@@ -212,7 +214,8 @@ class _Reader:
 def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Find the messages of each topic in a chunk: where they begin, and how long they are."""
     found: dict[int, list[tuple[int, int]]] = {}
-    place, unpack = 0, struct.Struct("<BQH").unpack_from
+    place = 0
+    unpack = struct.Struct("<BQH").unpack_from
     while place + _CONTENT <= len(messages):
         opcode, length, number = unpack(messages, place)
         if opcode == Opcode.MESSAGE:
@@ -245,7 +248,8 @@ def _filled(layout: RecordedTopic, times: np.ndarray, contents: np.ndarray) -> d
     runs = [contents[:, begin : begin + 8 * count] for begin, count in layout.template.runs]
     packed = np.ascontiguousarray(np.concatenate(runs, axis=1))
     values = packed.view("<f8").reshape(len(times), packed.shape[1] // 8)
-    channels, start = {}, 0
+    channels = {}
+    start = 0
     for each in layout.channels:
         end = start + len(each.columns)
         channels[each.name] = Channel(

@@ -84,7 +84,10 @@ class RecordingWriter:
     def __init__(
         self, path: Path, attachments: Mapping[str, bytes] | None = None, metadata: Mapping[str, str] | None = None
     ):
-        self.path, self.size, self.rows, self.dropped = Path(path), 0, 0, 0
+        self.path = Path(path)
+        self.size = 0
+        self.rows = 0
+        self.dropped = 0
         self._compress = zstandard.ZstdCompressor(level=_LEVEL).compress
         self._schemas: dict[str, Schema] = {}
         self._channels: list[ChannelRecord] = []
@@ -132,9 +135,11 @@ class RecordingWriter:
         """
         if not len(times):
             return
-        messages, offsets = block.messages(numbers, times, values), block.offsets(len(times))
+        messages = block.messages(numbers, times, values)
+        offsets = block.offsets(len(times))
         index = np.empty((*offsets.shape, 2), dtype="<u8")
-        index[..., 0], index[..., 1] = times, offsets
+        index[..., 0] = times
+        index[..., 1] = offsets
         try:
             self._chunk(messages.tobytes(), block.first, index)
         except RecordingError:
@@ -184,23 +189,28 @@ class RecordingWriter:
         return channel.id
 
     def _text(self, name: str, texts: dict[str, str]) -> None:
-        data, begin = _bytes(Metadata(name, texts)), self.size
+        data = _bytes(Metadata(name, texts))
+        begin = self.size
         self._append(data)
         self._texts.append(MetadataIndex(begin, len(data), name))
 
     def _attach(self, name: str, content: bytes) -> None:
         media = _MEDIA.get(Path(name).suffix, "application/octet-stream")
-        data, begin = _bytes(Attachment(0, 0, name, media, content)), self.size
+        data = _bytes(Attachment(0, 0, name, media, content))
+        begin = self.size
         self._append(data)
         self._attached.append(AttachmentIndex(begin, len(data), 0, 0, len(content), name, media))
 
     def _chunk(self, messages: bytes, first: int, index: np.ndarray) -> None:
         """Append a chunk with messages of topics from `first` on; `index`: their times and places, (topics, T, 2)."""
         packed = self._compress(messages)
-        begin, end = int(index[..., 0].min()), int(index[..., 0].max())
+        begin = int(index[..., 0].min())
+        end = int(index[..., 0].max())
         head = struct.pack(_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
         chunk = struct.pack("<BQ", Opcode.CHUNK, len(head) + len(packed)) + head + packed
-        tail, places, start = bytearray(), {}, self.size
+        tail = bytearray()
+        places = {}
+        start = self.size
         for number, rows in enumerate(index, start=first):
             places[number], size = start + len(chunk) + len(tail), 16 * len(rows)
             tail += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + size, number, size) + rows.tobytes()
@@ -237,7 +247,8 @@ class RecordingWriter:
             metadata_count=len(self._texts),
             schema_count=len(self._schemas),
         )
-        begin, known = self.size + len(end), (*self._schemas.values(), *self._channels, statistics)
+        begin = self.size + len(end)
+        known = (*self._schemas.values(), *self._channels, statistics)
         places = (*self._attached, *self._texts)
         summary = b"".join((*map(_bytes, known), *self._chunks, *map(_bytes, places)))
         head = struct.pack("<BQQQ", Opcode.FOOTER, 20, begin, 0)

@@ -71,8 +71,14 @@ class TimedReference(ReferenceGenerator):
         self._via.at(max(time, 0.0), number, change)
         velocity[:turn] = change[:turn]
         # angular velocity 2 q' q*, of which the change of the length is no part
-        x, y, z, w = number[turn], number[turn + 1], number[turn + 2], number[turn + 3]
-        dx, dy, dz, dw = change[turn], change[turn + 1], change[turn + 2], change[turn + 3]
+        x = number[turn]
+        y = number[turn + 1]
+        z = number[turn + 2]
+        w = number[turn + 3]
+        dx = change[turn]
+        dy = change[turn + 1]
+        dz = change[turn + 2]
+        dw = change[turn + 3]
         square = x * x + y * y + z * z + w * w
         velocity[turn] = 2.0 * (dx * w - dw * x - dy * z + dz * y) / square
         velocity[turn + 1] = 2.0 * (dy * w - dw * y - dz * x + dx * z) / square

@@ -70,17 +70,20 @@ def recorded_commands(replay: Replay) -> dict[str, Channel]:
 
 def differences(replay: Replay) -> ReplayDifferences:
     """Compare the commands of a replay that has run with the recorded ones, in the cycles in which both plugins ran."""
-    rows, recorded = replay.rows, recorded_commands(replay)
+    rows = replay.rows
+    recorded = recorded_commands(replay)
     both = replay.running & rows.running
     found: list[ColumnDifference] = []
-    numbers, largest = 0, 0.0
+    numbers = 0
+    largest = 0.0
     for name, channel in replay.commands.items():
         shared = [column for column in channel.columns if name in recorded and column in recorded[name].columns]
         if not shared:
             continue
         ours = channel.values[:, [channel.columns.index(column) for column in shared]][both]
         gaps = _gaps(ours, rows.values(recorded[name], shared)[both])
-        numbers, largest = numbers + len(shared), max(largest, float(gaps.max(initial=0.0)))
+        numbers = numbers + len(shared)
+        largest = max(largest, float(gaps.max(initial=0.0)))
         for place in np.flatnonzero((gaps > TOLERANCE).any(axis=0)):
             first = int(np.flatnonzero(both)[(gaps[:, place] > TOLERANCE).argmax()])
             unit = channel.units[channel.columns.index(shared[place])]

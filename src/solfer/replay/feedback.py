@@ -39,7 +39,9 @@ class RecordedFeedbackPipe(FeedbackPipe):
 
     def __init__(self, pipe: FeedbackPipe, rows: RecordedRows, robot: Robot, port: Port | None):
         super().__init__(pipe.name, pipe.reader, pipe.required)
-        self.pipe, self.row, self._port = pipe, 0, port
+        self.pipe = pipe
+        self.row = 0
+        self._port = port
         self.unrepeated = ""
         if isinstance(pipe, StateFeedbackPipe) and pipe.history is not None:
             self.unrepeated = f"each message of feedback '{pipe.name}', of which the newest one of a cycle was recorded"
@@ -76,7 +78,9 @@ class RecordedFeedbackPipe(FeedbackPipe):
             for array, values in zip(self._arrays, self._values, strict=True):
                 array[...] = values[self.row].reshape(array.shape)
             self.pipe.repeat(self._arrivals[self.row])
-            self.accepted, self.arrival, self.received = self.accepted + 1, self.pipe.arrival, True
+            self.accepted = self.accepted + 1
+            self.arrival = self.pipe.arrival
+            self.received = True
         if self._port is not None:
             self._port.fresh = new
         if isinstance(self.pipe, StateFeedbackPipe):

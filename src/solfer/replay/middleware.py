@@ -25,7 +25,8 @@ class ReplayMiddleware(DryMiddleware):
 
     def __init__(self, configuration: Configuration, files: RobotFiles, rows: RecordedRows):
         super().__init__(configuration, files)
-        self.time, self._rows = float(rows.times[0]), rows
+        self.time = float(rows.times[0])
+        self._rows = rows
         self._recorded = dict(_descriptions(configuration, rows))
 
     def now(self) -> float:
@@ -74,10 +75,12 @@ class ReplayMiddleware(DryMiddleware):
 
 def _descriptions(configuration: Configuration, rows: RecordedRows) -> Mapping[str, str]:
     """Return the recorded descriptions of the Robot, by their parameters."""
-    sources, files = configuration.sources, rows.recording.attachments
+    sources = configuration.sources
+    files = rows.recording.attachments
     found = {}
     for key in ("urdf", "srdf"):
-        source, name = getattr(sources, key, None), f"{rows.plugin}/robot.{key}"
+        source = getattr(sources, key, None)
+        name = f"{rows.plugin}/robot.{key}"
         if source is not None and source.parameter is not None and name in files:
             found[source.parameter] = files[name].decode(errors="replace")
     return found

@@ -23,7 +23,8 @@ from solfer.replay.rows import LIFE, RecordedRows
 from solfer.robot.shipped import RobotFiles
 from solfer.transport.plugin_state import PluginState
 
-STOPPED, CLOSED = PluginState.STOPPED, PluginState.CLOSED
+STOPPED = PluginState.STOPPED
+CLOSED = PluginState.CLOSED
 
 
 @dataclass
@@ -63,7 +64,9 @@ class Replay:
         Raises:
             RecordingError: The component failed where the recorded one did not; names the cycle.
         """
-        log, rows, prefix = PluginLog(self.plugin), self.rows, f"{self.plugin.name}/"
+        log = PluginLog(self.plugin)
+        rows = self.rows
+        prefix = f"{self.plugin.name}/"
         sources = [each for each in log.sources if each.channel.name.startswith(f"{prefix}command/")]
         values = [np.zeros((len(rows.times), source.array.size)) for source in sources]
         turns = {
@@ -103,7 +106,8 @@ class Replay:
 
     def _cycle(self, row: int) -> None:
         """Bring the plugin to the recorded state of its life, and let it work if the recorded one worked."""
-        plugin, state = self.plugin, self.rows.states[row]
+        plugin = self.plugin
+        state = self.rows.states[row]
         for feedback in plugin.feedbacks:
             cast(RecordedFeedbackPipe, feedback).row = row
         if isinstance(plugin.robot_time, RecordedTime):

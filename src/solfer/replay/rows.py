@@ -33,7 +33,9 @@ class RecordedRows:
     """
 
     def __init__(self, recording: Recording, plugin: str, where: str = ""):
-        self.recording, self.plugin, self.where = recording, plugin, where
+        self.recording = recording
+        self.plugin = plugin
+        self.where = where
         known = [name.removesuffix(f"/{LIFE}") for name in recording.channels if name.endswith(f"/{LIFE}")]
         if plugin not in known:
             raise UnknownName("plugin", plugin, known, where=where, expected="" if known else "a whole recording")
@@ -79,7 +81,8 @@ class RecordedRows:
         for column in columns:
             if column not in channel.columns:
                 raise UnknownName("column", column, channel.columns, where=f"{self.where}: channel '{channel.name}'")
-        chosen, places = [channel.columns.index(column) for column in columns], self.places(channel)
+        chosen = [channel.columns.index(column) for column in columns]
+        places = self.places(channel)
         values = channel.values[np.maximum(places, 0)][:, chosen]
         values[places < 0] = np.nan
         return values

@@ -77,9 +77,12 @@ class _Builder:
     """Steps of `build`; mistakes that do not keep the next step from working are collected."""
 
     def __init__(self, configuration: Configuration, outside: Outside, goes_on: bool):
-        self._configuration, self._outside, self._goes_on = configuration, outside, goes_on
+        self._configuration = configuration
+        self._outside = outside
+        self._goes_on = goes_on
         self.faults: list[SolferError] = []
-        self._patience, self._asks = TIMEOUT, True
+        self._patience = TIMEOUT
+        self._asks = True
 
     def robot(self, beside: Robot | None) -> Robot:
         models = dict(self._models())

@@ -7,12 +7,17 @@ from solfer.model import Actuators, BidirectionalMap, Group, Kinematics, Maps, S
 
 def joint_limits(kinematics: Kinematics) -> tuple[State, State]:
     """Read lower and upper limits of the URDF: -inf and inf where it has none, as for every acceleration."""
-    lower, upper = State(kinematics.dofs), State(kinematics.dofs)
-    lower.position, upper.position = kinematics.lower_position, kinematics.upper_position
-    lower.velocity, upper.velocity = -kinematics.velocity_limit, kinematics.velocity_limit
-    lower.torque, upper.torque = -kinematics.effort_limit, kinematics.effort_limit
+    lower = State(kinematics.dofs)
+    upper = State(kinematics.dofs)
+    lower.position = kinematics.lower_position
+    upper.position = kinematics.upper_position
+    lower.velocity = -kinematics.velocity_limit
+    upper.velocity = kinematics.velocity_limit
+    lower.torque = -kinematics.effort_limit
+    upper.torque = kinematics.effort_limit
     unlimited = np.full(kinematics.size, np.inf)
-    lower.acceleration, upper.acceleration = -unlimited, unlimited
+    lower.acceleration = -unlimited
+    upper.acceleration = unlimited
     return lower, upper
 
 

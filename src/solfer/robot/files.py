@@ -32,12 +32,14 @@ def read_parts(
     contacts: str | Path | None,
 ) -> Parts:
     """Read all descriptions of a Robot; see `Robot.load`."""
-    description, elsewhere = _describe(urdf), [_describe(other) for other in others]
+    description = _describe(urdf)
+    elsewhere = [_describe(other) for other in others]
     warn_of_fixed_base(description, floating_base)
     kinematics = Kinematics(description, floating_base)
     warn_of_unfit(description, kinematics.base is not None)
     name = name or description.name
-    semantics, table = None, None
+    semantics = None
+    table = None
     if srdf is not None:
         read = Semantics.from_text if _is_text(srdf) else Semantics.from_file
         semantics = read(srdf, description, others=elsewhere)

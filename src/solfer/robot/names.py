@@ -59,9 +59,11 @@ class RobotNames:
             SolferError: A file cannot be read, or does not contain a robot.
         """
         first, *rest = [Description.from_file(path) for path in (urdf, *others)]
-        links, joints = dict(first.links), dict(first.joints)
+        links = dict(first.links)
+        joints = dict(first.joints)
         for model in rest:
-            links, joints = {**links, **model.links}, {**joints, **model.joints}
+            links = {**links, **model.links}
+            joints = {**joints, **model.joints}
         moved = _moved(first)
         if srdf is None:
             return cls(None, tuple(links), tuple(joints), None, moved)
@@ -90,7 +92,8 @@ def check_names(
         tags: The component's own tags.
         dofs: DoFs of the pipes; by default those of the configuration.
     """
-    records, maps = [*configuration.feedbacks, *configuration.controllers], tuple(_maps(configuration))
+    records = [*configuration.feedbacks, *configuration.controllers]
+    maps = tuple(_maps(configuration))
     for item in [record.dofs for record in records] if dofs is None else dofs:
         if item is not None:
             _check_dofs(item, names, maps, problems)

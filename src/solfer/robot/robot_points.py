@@ -27,7 +27,8 @@ class RobotPoints:
     """
 
     def __init__(self, robot: "GroupedRobot", contacts: Iterable[ContactRecord] = ()):
-        self._robot, self._records = robot, tuple(contacts)
+        self._robot = robot
+        self._records = tuple(contacts)
         links = robot.kinematics.description.links
         raise_all(
             [

@@ -80,7 +80,8 @@ def require_robot(configuration: Configuration, path: Path) -> None:
         ConfigError: The file cannot be read, or the robot has no name.
         UnknownName: The file does not know it; the place is that of the name, whatever the file is.
     """
-    known, name = [str(key) for key, _ in opened(path).node.items()], configuration.robot.name
+    known = [str(key) for key, _ in opened(path).node.items()]
+    name = configuration.robot.name
     if name in known:
         return
     head = _head_of_name(configuration)
@@ -106,7 +107,8 @@ def read_actuators(
     Raises:
         SolferError: The parameter or file is missing, or does not fit the robot.
     """
-    source, robot = configuration.sources.actuators, configuration.robot.name
+    source = configuration.sources.actuators
+    robot = configuration.robot.name
     elsewhere = {joint for other in others for joint in other.joints}
     location = source.location
     if location is not None:
@@ -121,7 +123,8 @@ def read_contacts(configuration: Configuration, outside: Outside) -> tuple[Conta
     Raises:
         SolferError: The parameter or file is missing, or does not contain contacts of the robot.
     """
-    source, robot = configuration.sources.contacts, configuration.robot.name
+    source = configuration.sources.contacts
+    robot = configuration.robot.name
     location = source.location
     if location is not None:
         require_robot(configuration, location)

@@ -38,17 +38,25 @@ class Player:
     """
 
     def __init__(self, scenario: Scenario, period: float | None = None):
-        self.scenario, self.period = scenario, scenario.period if period is None else period
+        self.scenario = scenario
+        self.period = scenario.period if period is None else period
         if not 0.0 < self.period < np.inf:
             raise SolferError(f"a period of {period}", expected="a positive number of seconds")
         self._script, self._steps = Script(scenario), played(scenario)
         self._constant = scenario.constant
         self._numbers = len(self._steps)
-        self.vertex_velocity, self.base_velocity = np.zeros((scenario.legs, 3)), np.zeros(4)
-        self._vertex_part, self._base_part = np.zeros((scenario.legs, 3)), np.zeros(4)
-        self.camber, self.grounded = self._script.camber, self._script.grounded
-        self.vertices, self.base = self._script.vertices, self._script.base
-        self._index, self._rest, self.elapsed, self._is_over = -1, 0.0, 0.0, False
+        self.vertex_velocity = np.zeros((scenario.legs, 3))
+        self.base_velocity = np.zeros(4)
+        self._vertex_part = np.zeros((scenario.legs, 3))
+        self._base_part = np.zeros(4)
+        self.camber = self._script.camber
+        self.grounded = self._script.grounded
+        self.vertices = self._script.vertices
+        self.base = self._script.base
+        self._index = -1
+        self._rest = 0.0
+        self.elapsed = 0.0
+        self._is_over = False
 
     @property
     def number(self) -> int:
@@ -78,7 +86,9 @@ class Player:
                 than it is goes on by a share of its own period, and multiplies the velocities by that share.
         """
         period = self.period if period is None else period
-        vertices, base, left = self.vertex_velocity, self.base_velocity, period
+        vertices = self.vertex_velocity
+        base = self.base_velocity
+        left = period
         vertices[:] = 0.0
         base[:] = 0.0
         while left > _ROUNDING * period:
@@ -92,14 +102,16 @@ class Player:
             np.multiply(self._base_part, span / period, out=self._base_part)
             np.add(vertices, self._vertex_part, out=vertices)
             np.add(base, self._base_part, out=base)
-            left, self._rest = left - span, self._rest - span
+            left = left - span
+            self._rest = self._rest - span
         self.elapsed += period - max(0.0, left)
         self._is_over = left >= period
         return not self._is_over
 
     def _go_on(self) -> bool:
         """Let the script make a step of its own; False at its end."""
-        script, steps = self._script, self._steps
+        script = self._script
+        steps = self._steps
         while self._index < 0 or (self._index < self._numbers and steps[self._index].done(script)):
             self._index += 1
             if self._index < self._numbers:
@@ -118,10 +130,12 @@ def count_periods(scenario: Scenario) -> tuple[int, ...]:
     Raises:
         ConfigError: A step never ends.
     """
-    script, counts = Script(scenario), []
+    script = Script(scenario)
+    counts = []
     for number, (record, step) in enumerate(zip(scenario.pattern, played(scenario), strict=True), 1):
         step.start(script)
-        most, count = step.longest(script), 0
+        most = step.longest(script)
+        count = 0
         while not step.done(script):
             if count > most or most > LONGEST:
                 raise ConfigError(

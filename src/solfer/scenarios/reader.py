@@ -80,12 +80,15 @@ def _pattern(node: YamlNode, problems: Problems) -> list[Step]:
     if not isinstance(pattern.value, dict):
         problems.add(pattern.mark, f"expected a map of numbered steps, got {pattern.kind}", "1: and a step, 2: ...")
         return []
-    steps, wanted, ended = [], 1, False
+    steps = []
+    wanted = 1
+    ended = False
     for key, child in pattern.items():
         if not (key.isascii() and key.isdecimal()) or key != str(int(key)):
             problems.add(child.head, f"'{key}' is no number of a step", "1, 2, 3 and so on")
             continue
-        step, number = _step(child, problems), int(key)
+        step = _step(child, problems)
+        number = int(key)
         if number == 0:
             problems.warn(child.head, "step 0 is never reached: steps begin at 1")
         elif number == wanted and not ended:
@@ -139,7 +142,8 @@ def _check_step(step: Step, record: ScenarioRecord, problems: Problems) -> None:
         _check_index(step, ("leg",), step.leg, record.x_cp, "'x cp'", problems)
     elif isinstance(step, SpeedRecord):
         for index, (row, column, value) in enumerate(step.motions):
-            path, of = ("motions", index, 1), "the base" if row == _BASE_ROW else "'x cp'"
+            path = ("motions", index, 1)
+            of = "the base" if row == _BASE_ROW else "'x cp'"
             _check_index(step, path, column, record.base_now if row == _BASE_ROW else record.x_cp, of, problems)
             if row != _BASE_ROW and not 0.0 < value <= 1.0:
                 mark = step.place("motions", index, 2)

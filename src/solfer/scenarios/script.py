@@ -41,13 +41,22 @@ class Script:
     """
 
     def __init__(self, scenario: Scenario):
-        self.period, legs = scenario.period, scenario.legs
-        self.vertices, self.base = scenario.vertices, scenario.base
-        self.vertex_velocity, self.base_velocity = np.zeros((legs, 3)), np.zeros(4)
-        self.vertex_speed, self.base_speed = np.full((legs, 3), scenario.record.vel), np.full(4, scenario.record.vel)
-        self.camber, self.grounded = np.zeros(legs), np.ones(legs, dtype=bool)
-        self._left, self._bare, self._slow = np.zeros((legs, 3)), np.zeros((legs, 3)), np.zeros((legs, 3), dtype=bool)
-        self._base_left, self._base_bare, self._base_near = np.zeros(4), np.zeros(4), np.zeros(4, dtype=bool)
+        self.period = scenario.period
+        legs = scenario.legs
+        self.vertices = scenario.vertices
+        self.base = scenario.base
+        self.vertex_velocity = np.zeros((legs, 3))
+        self.base_velocity = np.zeros(4)
+        self.vertex_speed = np.full((legs, 3), scenario.record.vel)
+        self.base_speed = np.full(4, scenario.record.vel)
+        self.camber = np.zeros(legs)
+        self.grounded = np.ones(legs, dtype=bool)
+        self._left = np.zeros((legs, 3))
+        self._bare = np.zeros((legs, 3))
+        self._slow = np.zeros((legs, 3), dtype=bool)
+        self._base_left = np.zeros(4)
+        self._base_bare = np.zeros(4)
+        self._base_near = np.zeros(4, dtype=bool)
 
     def rest(self) -> None:
         """Set all velocities to zero."""
@@ -76,7 +85,8 @@ class Script:
 
     def turn(self, heading: float) -> float:
         """Let the heading go to `heading` [rad] at its speed, x, y and z not at all; return its rate [rad/s]."""
-        left, self.base_velocity[:] = heading - self.base[HEADING], 0.0
+        left = heading - self.base[HEADING]
+        self.base_velocity[:] = 0.0
         rate = left / self.period if abs(left) < NEAREST else math.copysign(self.base_speed[HEADING], left)
         self.base_velocity[HEADING] = rate
         return rate

@@ -66,7 +66,8 @@ class _Speed(_Instant):
 
 class _Contact(_Instant):
     def __init__(self, leg: int, grounded: bool):
-        self._leg, self._grounded = leg, grounded
+        self._leg = leg
+        self._grounded = grounded
 
     def start(self, script: Script) -> None:
         script.grounded[self._leg] = self._grounded
@@ -74,7 +75,8 @@ class _Contact(_Instant):
 
 class _Wait(PlayedStep):
     def __init__(self, periods: int):
-        self._periods, self._left = periods, 0
+        self._periods = periods
+        self._left = 0
 
     def start(self, _: Script) -> None:
         self._left = self._periods
@@ -92,10 +94,14 @@ class _Wait(PlayedStep):
 
 class _Move(PlayedStep):
     def __init__(self, vertices: np.ndarray, base: np.ndarray, camber: np.ndarray | None):
-        self._vertices, self._base, self._camber = vertices, base, camber
+        self._vertices = vertices
+        self._base = base
+        self._camber = camber
         self._near, self._base_near = (REACHED * np.maximum(1.0, np.abs(each)) for each in (vertices, base))
-        self._left, self._base_left = np.zeros_like(vertices), np.zeros_like(base)
-        self._fits, self._base_fits = np.zeros(vertices.shape, dtype=bool), np.zeros(base.shape, dtype=bool)
+        self._left = np.zeros_like(vertices)
+        self._base_left = np.zeros_like(base)
+        self._fits = np.zeros(vertices.shape, dtype=bool)
+        self._base_fits = np.zeros(base.shape, dtype=bool)
 
     def start(self, script: Script) -> None:
         if self._camber is not None:
@@ -118,7 +124,8 @@ class _Move(PlayedStep):
 
     def longest(self, script: Script) -> float:
         far = np.abs(self._base - script.base)
-        ways, speeds = np.where(far <= self._base_near, 0.0, far).tolist(), script.base_speed.tolist()
+        ways = np.where(far <= self._base_near, 0.0, far).tolist()
+        speeds = script.base_speed.tolist()
         base = max(_straight(way, speed * script.period) for way, speed in zip(ways, speeds, strict=True))
         left = np.abs(self._vertices - script.vertices).ravel().tolist()
         shares = script.vertex_speed.ravel().tolist()
@@ -129,7 +136,8 @@ class _Heading(PlayedStep):
     """A step that ends at a heading, while the vertices approach their goals."""
 
     def __init__(self, vertices: np.ndarray, heading: float):
-        self._vertices, self._heading = vertices, heading
+        self._vertices = vertices
+        self._heading = heading
 
     def done(self, script: Script) -> bool:
         return abs(self._heading - float(script.base[HEADING])) <= TURNED
@@ -159,7 +167,8 @@ class _Circle(_Heading):
 
     def step(self, script: Script) -> None:
         script.approach(self._vertices)
-        rate, heading = script.turn(self._heading), float(script.base[HEADING])
+        rate = script.turn(self._heading)
+        heading = float(script.base[HEADING])
         script.base_velocity[0] = self._along[0] * rate * math.cos(heading)
         script.base_velocity[1] = self._along[1] * rate * math.sin(heading)
 
@@ -190,7 +199,8 @@ def _played(record: Step, scenario: Scenario) -> PlayedStep:
 
 @_played.register
 def _(record: MoveRecord, scenario: Scenario) -> PlayedStep:
-    tables, camber = scenario.record, None
+    tables = scenario.record
+    camber = None
     if record.cs is not None and tables.cs_ref is not None:
         camber = np.array(tables.cs_ref[record.cs])
     return _Move(scenario.goals(record), np.array(tables.base_ref[record.base]), camber)

@@ -27,7 +27,8 @@ class DiscoveredTopics:
     """
 
     def __init__(self, middleware: Middleware, messages: Mapping[str, str]):
-        self._middleware, self._messages = middleware, messages
+        self._middleware = middleware
+        self._messages = messages
         self._space = middleware.resolve("x")[:-1]
         self._readers: dict[str, dict[str, Reader]] = {name: {} for name in messages}
         self._asked: Future[Topics] | None = None
@@ -38,10 +39,12 @@ class DiscoveredTopics:
         """Ask for topics now and then, and subscribe what is new."""
         now = self._middleware.now()
         if self._asked is None and now >= self._next:
-            self._asked, self._next = self._middleware.topics(), now + EVERY
+            self._asked = self._middleware.topics()
+            self._next = now + EVERY
         if self._asked is None or not self._asked.done():
             return
-        asked, self._asked = self._asked, None
+        asked = self._asked
+        self._asked = None
         try:
             published = asked.result().published
         except MiddlewareError as error:  # it is asked again

@@ -46,7 +46,8 @@ class DraggedReferences:
         Returns:
             Whether it is this client that drags it.
         """
-        key, now = (shown.module, shown.task), self._middleware.now()
+        key = (shown.module, shown.task)
+        now = self._middleware.now()
         present = self._drags.get(key)
         if present is not None and present.client != client and now - present.since <= SILENCE:
             return False

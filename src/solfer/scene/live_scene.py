@@ -143,7 +143,8 @@ class LiveScene:
 
     def _polygon(self, forces: tuple[ContactForce, ...]) -> tuple[np.ndarray, np.ndarray]:
         nothing = np.zeros((0, 3))
-        contacts, records = self._robot.contacts, self._robot.contact_records
+        contacts = self._robot.contacts
+        records = self._robot.contact_records
         if not records:
             return nothing, nothing
         known = {force.contact: force.touches for force in forces}

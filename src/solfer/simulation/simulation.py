@@ -54,7 +54,10 @@ class Simulation:
     def __init__(self, bundle: Bundle, gui: bool = False, world: WorldRecord = FLAT):
         kinematics = self.kinematics = bundle.kinematics
         drives = bundle.lower_level.drives
-        self.lower_level, self.start, self._groups, self._count = bundle.lower_level, bundle.start, bundle.groups, 0
+        self.lower_level = bundle.lower_level
+        self.start = bundle.start
+        self._groups = bundle.groups
+        self._count = 0
         self._engine = Engine(gui)
         try:
             self.body = Body(
@@ -177,7 +180,8 @@ class Simulation:
             raise SimulationError(f"the seed is {seed}", expected=f"from 0 to {LARGEST_SEED}")
         self._put(posture, placement)
         self.pushes.clear()
-        self.torque[:], self._motor_torque[:] = 0.0, 0.0
+        self.torque[:] = 0.0
+        self._motor_torque[:] = 0.0
         self._read()
         self._remember()
         self.lower_level.start(self.q)

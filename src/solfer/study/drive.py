@@ -29,8 +29,11 @@ class StudyProgress:
     """
 
     def __init__(self, folder: StudyFolder, total: int, log: Callable[[str], None]):
-        self._folder, self._total, self._log = folder, total, log
-        self._begin, self._shown = time.monotonic(), 0.0
+        self._folder = folder
+        self._total = total
+        self._log = log
+        self._begin = time.monotonic()
+        self._shown = 0.0
         self._before = sum(folder.is_done(run) for run in folder.runs)
         self._seen = {run.id for run in folder.runs if folder.is_done(run)}
         self.failures = 0
@@ -54,7 +57,8 @@ class StudyProgress:
 
     def show(self, is_last: bool = False) -> None:
         """Show the progress, once a second at most."""
-        now, done = time.monotonic(), len(self._seen)
+        now = time.monotonic()
+        done = len(self._seen)
         if now - self._shown < 1.0 and not is_last:
             return
         if not sys.stderr.isatty() and not is_last and now - self._shown < 10.0:

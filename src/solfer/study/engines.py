@@ -176,7 +176,8 @@ class needs:  # noqa: N801 reads as a statement
     """
 
     def __init__(self, package: str, project: str):
-        self._package, self._project = package, project
+        self._package = package
+        self._project = project
 
     def __enter__(self) -> None:
         pass

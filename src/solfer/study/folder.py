@@ -30,8 +30,13 @@ from solfer.errors import StudyError
 from solfer.study.plan import Plan, PlannedRun, Study, study_of
 from solfer.study.result import Result
 
-STUDY, RUNS, RESULT, CONFIGURATION, STDERR = "study.json", "runs", "result.json", "config.yaml", "stderr"
-RECORDING, COLUMNS = "recording.mcap", "columns.npz"
+STUDY = "study.json"
+RUNS = "runs"
+RESULT = "result.json"
+CONFIGURATION = "config.yaml"
+STDERR = "stderr"
+RECORDING = "recording.mcap"
+COLUMNS = "columns.npz"
 CLAIM = "claim."
 
 HEARTBEAT, DEAD = 2.0, 30.0
@@ -117,7 +122,8 @@ class StudyFolder:
         file = self.path / STUDY
         try:
             self._data = data = json.loads(file.read_text())
-            self.code, self.is_recorded = data["code"], data["record"]
+            self.code = data["code"]
+            self.is_recorded = data["record"]
             self.runs = tuple(PlannedRun(**each) for each in data["runs"])
             self.study = study_of(data["study"], data["file"])
         except FileNotFoundError:

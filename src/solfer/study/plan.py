@@ -115,7 +115,8 @@ class Study:
         Raises:
             SolferError: A value does not fit. SolferErrors: Several mistakes.
         """
-        node, over = self._node, None
+        node = self._node
+        over = None
         for name, value in variations.items():
             path = self._path(name)
             written = self._value(name, value)
@@ -127,7 +128,8 @@ class Study:
 
     def points(self, runs: int | None = None) -> Iterator[tuple[int, dict[str, Any]]]:
         """Yield seed and variations of each run: of each point of the grid as many as the file, or `runs`, asks for."""
-        vary, seed = self.record.vary, self.record.seed
+        vary = self.record.vary
+        seed = self.record.seed
         grids = {name: each.grid for name, each in vary.items() if each.grid is not None}
         lists = {name: each.list for name, each in vary.items() if each.list is not None}
         rows = list(zip(*lists.values(), strict=True)) if lists else [()]
@@ -219,7 +221,8 @@ class Study:
             mark = next(iter(lists.values())).place("list") or self._node.mark
             problems.add(mark, f"lists of different lengths: {', '.join(lists)}", "lists that go together")
         for name, each in self._variations.items():
-            path, mark = self._path(name), each.place() or self._node.mark
+            path = self._path(name)
+            mark = each.place() or self._node.mark
             if path[0] not in VARYING:
                 problems.unknown(mark, "begin of a path", path[0], VARYING)
             elif path[0] == CONFIGURATION and len(path) < 3:
@@ -303,7 +306,8 @@ def _with(node: YamlNode, path: tuple[Key, ...], value: YamlNode) -> YamlNode:
     """
     if not path:
         return value
-    first, rest = path[0], path[1:]
+    first = path[0]
+    rest = path[1:]
     if isinstance(node.value, tuple):
         if not str(first).isdigit() or int(first) >= len(node.value):
             raise ConfigError(

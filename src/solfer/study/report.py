@@ -151,7 +151,8 @@ def write_map(folder: StudyFolder, first: str, second: str, measure: str, out: P
         RecordingError: The picture cannot be written.
         MissingDependency: matplotlib is not installed.
     """
-    names, measures = folder.study.names, ["failed", *folder.study.record.measure]
+    names = folder.study.names
+    measures = ["failed", *folder.study.record.measure]
     for name in (first, second):
         if name not in names:
             raise UnknownName("variable", name, names, where="--map")
@@ -228,7 +229,9 @@ def _plot(run: Path) -> str:
     """Draw the columns of a run over time; empty where it has none."""
     try:
         with np.load(run / COLUMNS) as kept:
-            times, names, values = kept["times"], kept["names"].tolist(), kept["values"]
+            times = kept["times"]
+            names = kept["names"].tolist()
+            values = kept["values"]
     except (OSError, ValueError, KeyError):
         return ""
     if not names or not len(times):

@@ -81,7 +81,8 @@ def files_of(record: SimulationRecord) -> list[Path]:
 
 
 # which look through all ROS packages
-_find_robot, _find_world = cache(find_robot), cache(find_world)
+_find_robot = cache(find_robot)
+_find_world = cache(find_world)
 
 
 @cache

@@ -80,16 +80,19 @@ class SimulatedRun:
         columns: Iterable[str] = (),
         gui: bool = False,
     ):
-        self.record, self._seed = record, seed
+        self.record = record
+        self._seed = seed
         self._configurations = configurations_of(record, changes)
-        self._kept, self._gui = tuple(columns), gui
+        self._kept = tuple(columns)
+        self._gui = gui
         self._stack = ExitStack()
         self.reset()
 
     def reset(self) -> None:
         """Begin again: everything is made as it was in the beginning, and settles until the motion begins."""
         self._stack.close()
-        self.failure, self.done = "", False
+        self.failure = ""
+        self.done = False
         self._sets: list[PluginSet] = []
         self._navigation: Navigation | None = None
         record = self.record
@@ -196,7 +199,9 @@ class SimulatedRun:
             members = generate_shared(
                 configuration.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry
             )
-            plugins, polls, requires = members.plugins, [members.sharing.turns.next], members.requires
+            plugins = members.plugins
+            polls = [members.sharing.turns.next]
+            requires = members.requires
             together = PluginSet(plugins, nanoseconds=self.nanoseconds, polls=polls, requires=requires)
         else:
             plugin, loaded = configuration
@@ -354,7 +359,8 @@ def configurations_of(record: StudyRecord, changes: YamlNode | None) -> list[Con
     Raises:
         SolferError: One is wrong. SolferErrors: Several mistakes.
     """
-    registry, file = Registry(), str(record.configuration.location)
+    registry = Registry()
+    file = str(record.configuration.location)
     known = module_names(file)
     loaded: list[Configuration] = []
     for index, entry in enumerate(record.plugins):
@@ -417,7 +423,8 @@ def rehearse(record: StudyRecord) -> None:
     Raises:
         SolferError: A plugin cannot be made. SolferErrors: Several mistakes.
     """
-    registry, bundle = Registry(), bundle_of(record.simulation, 0)
+    registry = Registry()
+    bundle = bundle_of(record.simulation, 0)
     srdf: Any = None if bundle.srdf is None else bundle.srdf.location
     files = RobotFiles(bundle.urdf.location, srdf)
     for plugin, configuration in listed(configurations_of(record, None)):

@@ -34,11 +34,16 @@ class CollisionLimit(Constraint):
     def __init__(self, distances: LinkDistances, robot: RobotView, nearest: float, weight: float | None = None):
         if not 0.0 <= nearest < np.inf:
             raise TaskError(f"a least distance of {nearest:g} m", expected="a number that is not negative")
-        count, kinematics = len(distances.distance), robot.kinematics
+        count = len(distances.distance)
+        kinematics = robot.kinematics
         super().__init__("collisions", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
-        self.distances, self._kinematics, self.nearest, self._rate = distances, kinematics, nearest, 0.0
+        self.distances = distances
+        self._kinematics = kinematics
+        self.nearest = nearest
+        self._rate = 0.0
         self._carried = kinematics.carried
-        self._wrenches, self._part = np.zeros((count, 6)), np.zeros((count, kinematics.size))
+        self._wrenches = np.zeros((count, 6))
+        self._part = np.zeros((count, kinematics.size))
 
     def set_horizon(self, horizon: float) -> None:
         """Set the time T within which a distance may fall to the least one, not below the period [s].
@@ -65,7 +70,9 @@ class CollisionLimit(Constraint):
 
     def _add(self, side: int, sign: float, count: int) -> None:
         """Add n' J of the nearest points of one side; the joints' Jacobian is given at the world's origin."""
-        near, wrenches, part = self.distances, self._wrenches[:count], self._part[:count]
+        near = self.distances
+        wrenches = self._wrenches[:count]
+        part = self._part[:count]
         wrenches[:, :3] = near.normal[:count]
         wrenches[:, 3:] = np.cross(near.points[side, :count], near.normal[:count])
         np.dot(wrenches, self._kinematics.tree.jacobian.T, out=part)

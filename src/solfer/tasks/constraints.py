@@ -42,7 +42,8 @@ class Constraint:
         upper: ArrayLike,
         weight: float | None = None,
     ):
-        self.name, self.weight = name, weight
+        self.name = name
+        self.weight = weight
         self.matrix = as_numbers(matrix, "matrix", self.where)
         self.lower, self.upper = (self._bounds(bounds) for bounds in (lower, upper))
         if not np.isfinite(self.matrix).all() or np.isnan([self.lower, self.upper]).any():
@@ -121,14 +122,19 @@ class TorqueLimits(Constraint):
         count = len(self._dofs)
         super().__init__("torques", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
         self.force = np.zeros(kinematics.size)
-        self._model, self._period, self._limit = model, period, limit[self._dofs]
-        self._load, self._scale, self._range = np.zeros(kinematics.size), np.zeros(count), np.zeros(count)
+        self._model = model
+        self._period = period
+        self._limit = limit[self._dofs]
+        self._load = np.zeros(kinematics.size)
+        self._scale = np.zeros(count)
+        self._range = np.zeros(count)
         self._center = np.zeros(count)
         model.subscribe({BIAS: 1, INERTIA: 1})
 
     def update(self) -> None:
         """Compute the rows at the state of the last update of the Robot."""
-        inertia, velocity = self._model.inertia, self._model.robot.state.velocity
+        inertia = self._model.inertia
+        velocity = self._model.robot.state.velocity
         inertia.take(self._dofs, 0, self.matrix, "clip")
         np.divide(self._period, inertia.diagonal()[self._dofs], out=self._scale)
         np.subtract(self.force, self._model.bias, out=self._load)
@@ -169,8 +175,11 @@ class WorkspaceLimit(Constraint):
                 f"a distance from {nearest:g} to {farthest:g} m", where=f"constraint '{name}'", expected="0 <= r <= R"
             )
         super().__init__(name, np.zeros((1, point.cols)), -np.inf, np.inf, weight)
-        self._points, self._point = Handler(updated_in_order(point)), point
-        self._least, self._largest, self._rate = nearest**2, farthest**2, 0.0
+        self._points = Handler(updated_in_order(point))
+        self._point = point
+        self._least = nearest**2
+        self._largest = farthest**2
+        self._rate = 0.0
 
     def set_horizon(self, horizon: float) -> None:
         """Set the time T within which the distance may reach the end of its range, not below the period [s].

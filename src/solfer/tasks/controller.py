@@ -52,7 +52,9 @@ class TaskController:
     def __init__(self, robot: RobotView, period: float, make: Callable[[Levels], Solver] = Hierarchy):
         if not 0.0 < period < np.inf:
             raise TaskError(f"a period of {period:g} s", expected="a positive number")
-        self._robot, self._period, self._make = robot, period, make
+        self._robot = robot
+        self._period = period
+        self._make = make
         self.levels: tuple[tuple[Task, ...], ...] = ()
         self.velocity, self._difference = np.zeros((2, robot.kinematics.size))
         self._stages = [_Stage(_Rest(robot), 0.0)]
@@ -140,7 +142,9 @@ class _Stage:
     """A solver with its share, which grows from 0 to 1."""
 
     def __init__(self, solver: Solver, step: float):
-        self.solver, self._step, self._progress = solver, step, 0.0
+        self.solver = solver
+        self._step = step
+        self._progress = 0.0
 
     @property
     def is_new(self) -> bool:

@@ -23,11 +23,15 @@ class Descent:
 
     def __init__(self, stack: Stack, checks: bool):
         (rows, cols), count = stack.jacobian.shape, len(stack.levels)
-        self._stack, self.reached, self.slopes = stack, np.zeros((count + 1, cols)), np.zeros(count if checks else 0)
-        self._projected, self.basis = np.zeros((max(rows, cols), cols)), np.zeros((rows, cols))
+        self._stack = stack
+        self.reached = np.zeros((count + 1, cols))
+        self.slopes = np.zeros(count if checks else 0)
+        self._projected = np.zeros((max(rows, cols), cols))
+        self.basis = np.zeros((rows, cols))
         largest = int(np.diff(stack.ends).max())
         # the factor L of a level, then its residual
-        self._square, self._work = np.zeros((largest + 1, largest)), np.zeros((3, cols))
+        self._square = np.zeros((largest + 1, largest))
+        self._work = np.zeros((3, cols))
 
     def update(self) -> None:
         """Compute all levels at the last update of the stack."""

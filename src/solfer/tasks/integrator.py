@@ -43,7 +43,9 @@ class ReferenceIntegrator:
                 raise SizeMismatch(f"{what} of shape {array.shape} for {size} DoFs", where=where)
         if not (lead > 0.0).all():
             raise TaskError(f"a lead of {lead.tolist()}", where=where, expected="positive numbers")
-        self._state, self._command, self._period = robot.state, robot.command, period
+        self._state = robot.state
+        self._command = robot.command
+        self._period = period
         self._lead, self._has_lead = np.full(size, lead), bool(np.isfinite(lead).any())
         self._work = np.zeros(size)
 
@@ -71,7 +73,8 @@ class ReferenceIntegrator:
         Returns:
             The desired velocities within all limits, shape (n,): those of the Robot's desired state, live.
         """
-        position, desired = self._command.position, self._command.velocity
+        position = self._command.position
+        desired = self._command.velocity
         self._bounds.update(position)
         np.maximum(velocity, self._bounds.lower, out=desired)
         np.minimum(desired, self._bounds.upper, out=desired)
@@ -84,7 +87,8 @@ class ReferenceIntegrator:
 
     def _stay_inside(self) -> None:
         """Bring references into their ranges, also by what rounding adds."""
-        position, bounds = self._command.position, self._bounds
+        position = self._command.position
+        bounds = self._bounds
         np.maximum(position, bounds.lower_position, out=position)
         np.minimum(position, bounds.upper_position, out=position)
 

@@ -22,7 +22,9 @@ def _weigh(jacobian, places, masks, numbers, out):
     """Write sqrt(w) J of the rows of all tasks, without the columns of other DoFs."""
     rows, cols = out.shape
     for i in range(rows):
-        root, row, task = math.sqrt(numbers[i, 2]), places[i, 0], places[i, 2]
+        root = math.sqrt(numbers[i, 2])
+        row = places[i, 0]
+        task = places[i, 2]
         for k in range(cols):
             out[i, k] = root * masks[task, k] * jacobian[row, k]
 
@@ -168,8 +170,11 @@ def _complete(basis, start, free, work):
     Each begins as the unit vector of which most is left, as in a Cholesky decomposition of the projector
     F F' = 1 - W' W with pivoting, whose diagonal tells that.
     """
-    cols, total = basis.shape[1], _dimensions(basis, start)
-    column, left, shares = work[0], work[1], work[2]
+    cols = basis.shape[1]
+    total = _dimensions(basis, start)
+    column = work[0]
+    left = work[1]
+    shares = work[2]
     for k in range(cols):
         left[k] = 1.0
     for j in range(start):
@@ -220,13 +225,15 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
     With A = J F, where F are the free columns, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F z.
     """
     cols = jacobian.shape[1]
-    row, right = step[:count], square[-1, :count]
+    row = step[:count]
+    right = square[-1, :count]
     square[:count, :count] = 0.0
     right[:] = 0.0
     for j in range(count):
         square[j, j] = 1.0
     for i in range(start, end):
-        left, weight = velocity[i], 1.0 / numbers[i, 3] ** 2
+        left = velocity[i]
+        weight = 1.0 / numbers[i, 3] ** 2
         row[:] = 0.0
         for k in range(cols):
             entry = jacobian[i, k]
@@ -263,7 +270,8 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
 @part
 def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out):
     """Compute the slope of a level's cost beside the levels before, as a share of its largest term, if that is > 1."""
-    cols, largest = jacobian.shape[1], 1.0
+    cols = jacobian.shape[1]
+    largest = 1.0
     step[:] = 0.0
     for i in range(start, end):
         left = velocity[i]
@@ -290,9 +298,13 @@ def _descend(jacobian, velocity, numbers, ends, projected, basis, square, work, 
 
     `slopes` is what each row leaves of the slope of its level's cost, as a share of its largest term.
     """
-    residual, step = square[-1], work[0]
+    residual = square[-1]
+    step = work[0]
     for level in range(len(ends) - 1):
-        start, end, before, out = ends[level], ends[level + 1], reached[level], reached[level + 1]
+        start = ends[level]
+        end = ends[level + 1]
+        before = reached[level]
+        out = reached[level + 1]
         out[:] = before
         is_last = level == len(ends) - 2
         if is_last and start and end - start > _dimensions(basis, start):
@@ -370,7 +382,8 @@ def _objective(jacobian, velocity, numbers, before, hessian, gradient):
                     hessian[m, k] += entry * jacobian[i, k]
 
 
-_MATRIX, _VECTOR = "float64[:, ::1]", "float64[::1]"
+_MATRIX = "float64[:, ::1]"
+_VECTOR = "float64[::1]"
 
 gather = cached(
     f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather, REORDERED

@@ -94,7 +94,8 @@ class QpHierarchy:
         weights = self._inequalities.weights
         forbidden = np.full_like(weights, np.inf)
         self._descent = Descent(self.stack, checks=True)
-        self._steps, basis = self._descent.reached[1:], self._descent.basis
+        self._steps = self._descent.reached[1:]
+        basis = self._descent.basis
         none = np.zeros(0)
         self._velocity_bounds = (none, none) if bounds is None else (bounds.lower, bounds.upper)
         self._levels = [
@@ -125,7 +126,8 @@ class QpHierarchy:
         if self._bounds is not None:
             self._bounds.update(self._position)
         self._inequalities.update()
-        self.velocity[:], self.relaxed = 0.0, None
+        self.velocity[:] = 0.0
+        self.relaxed = None
         self.solutions[:] = [None] * len(self._levels)
         free = self._free_levels()
         for index, level in enumerate(self._levels[free:], free):
@@ -149,7 +151,8 @@ class QpHierarchy:
 
         They are the least of the cost without limits: where they keep them, they solve the QP.
         """
-        descent, inequalities = self._descent, self._inequalities
+        descent = self._descent
+        inequalities = self._inequalities
         descent.update()
         count = count_kept(
             self._steps,
@@ -199,7 +202,8 @@ class QpHierarchy:
 
     def _residuals(self, index: int, x: np.ndarray) -> Iterator[tuple[str, float]]:
         """Yield the tasks of a level with the length of K e + v - J dq."""
-        stack, row = self.stack, int(self.stack.ends[index])
+        stack = self.stack
+        row = int(self.stack.ends[index])
         for task in stack.levels[index]:
             rows = slice(row, row + task.rows)
             left = (stack.velocity[rows] - stack.jacobian[rows] @ x) / np.sqrt(task.weight)

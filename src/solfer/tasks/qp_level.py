@@ -41,7 +41,9 @@ class Inequalities:
                 )
         self._constraints = tuple(constraints)
         rows = sum(constraint.rows for constraint in constraints)
-        self.matrix, self.lower, self.upper = np.zeros((rows, size)), np.zeros(rows), np.zeros(rows)
+        self.matrix = np.zeros((rows, size))
+        self.lower = np.zeros(rows)
+        self.upper = np.zeros(rows)
         self.weights = np.array(
             [np.inf if one.weight is None else one.weight for one in constraints for _ in range(one.rows)], dtype=float
         )
@@ -95,11 +97,18 @@ class QpLevel:
         weights: np.ndarray,
         basis: np.ndarray,
     ):
-        start, end = stack.ends[index], stack.ends[index + 1]
-        self._stack, self._basis, self._spanned = stack, basis, (int(stack.ends[max(index - 1, 0)]), int(start))
-        self._size, self._bounds, self._inequalities = stack.size, bounds, inequalities
-        self._jacobian, self._velocity = stack.jacobian[start:end], stack.velocity[start:end]
-        self._numbers, self._is_first = stack.numbers[start:end], index == 0
+        start = stack.ends[index]
+        end = stack.ends[index + 1]
+        self._stack = stack
+        self._basis = basis
+        self._spanned = (int(stack.ends[max(index - 1, 0)]), int(start))
+        self._size = stack.size
+        self._bounds = bounds
+        self._inequalities = inequalities
+        self._jacobian = stack.jacobian[start:end]
+        self._velocity = stack.velocity[start:end]
+        self._numbers = stack.numbers[start:end]
+        self._is_first = index == 0
         soft = np.flatnonzero(np.isfinite(weights))
         self.solver = QpSolver(self._size + len(soft), start, inequalities.rows)
         self._problem = problem = self.solver.problem
@@ -114,7 +123,8 @@ class QpLevel:
 
     def solve(self, before: np.ndarray) -> Solution:
         """Solve the level at the last update of the stack; `before` is dq of the levels before, shape (n,)."""
-        problem, size = self._problem, self._size
+        problem = self._problem
+        size = self._size
         objective(self._jacobian, self._velocity, self._numbers, before, problem.hessian, problem.gradient)
         if self._bounds is not None:
             problem.least[:size], problem.largest[:size] = self._bounds.lower, self._bounds.upper

@@ -47,9 +47,11 @@ class Stack:
         self._places = self._find_rows()
         self._masks = np.array([task.mask for task in self.tasks])
         # both Handlers are this stack's own: their arrays stay where they are
-        self._point_jacobian, self._error_value = self._points.jacobian, self._errors.value
+        self._point_jacobian = self._points.jacobian
+        self._error_value = self._errors.value
         rows = int(self.ends[-1])
-        self.jacobian, self.velocity = np.zeros((rows, self._masks.shape[1])), np.zeros(rows)
+        self.jacobian = np.zeros((rows, self._masks.shape[1]))
+        self.velocity = np.zeros(rows)
         self.numbers = np.zeros((rows, COLUMNS))
         starts = _starts([task.rows for task in self.tasks])
         self._copies = [
@@ -90,7 +92,8 @@ class Stack:
         It is small near kinematic singularities, and where the level's tasks contradict each other or those before it.
         Computed at each call, for the rows of the last `update`.
         """
-        values, free = [], np.eye(self.size)
+        values = []
+        free = np.eye(self.size)
         for start, end in pairwise(self.ends):
             singular = np.linalg.svd(self.jacobian[start:end] @ free.T, compute_uv=False)
             values.append(singular[-1] if len(singular) == end - start else 0.0)
@@ -142,7 +145,8 @@ def as_levels(levels: Levels) -> tuple[tuple[Task, ...], ...]:
 def _require_together(tasks: tuple[Task, ...]) -> None:
     if not tasks:
         raise TaskError("a stack without a task", expected="at least one task")
-    first, names = tasks[0], set()
+    first = tasks[0]
+    names = set()
     for task in tasks:
         if task.name in names:
             raise TaskError(

@@ -66,7 +66,8 @@ class Task:
         rows: Sequence[int] | None = None,
         dofs: Sequence[str | int] | None = None,
     ):
-        self.name, self.where = name, f"task '{name}'"
+        self.name = name
+        self.where = f"task '{name}'"
         if not isinstance(point, Point) or point.robot is None or not point.cols:
             raise TaskError(f"{point} moves with no robot", where=self.where, expected="a point of a Robot")
         self.point = point

@@ -24,9 +24,11 @@ class Backlog(Generic[Item]):
     """
 
     def __init__(self, size: int):
-        self._size, self.dropped = size, 0
+        self._size = size
+        self.dropped = 0
         self.waiting: dict[str, deque[tuple[int, Item]]] = {}
-        self._numbers, self._lock = itertools.count(), threading.Lock()
+        self._numbers = itertools.count()
+        self._lock = threading.Lock()
         self._first: Container[str] = ()
 
     def put(self, sender: str, item: Item) -> None:

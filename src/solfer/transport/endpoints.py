@@ -18,7 +18,9 @@ class MessageStatus(enum.IntEnum):
 
 
 # module globals: the lookup in the control cycle is five times as fast as on the class
-NONE, OLD, NEW = MessageStatus.NONE, MessageStatus.OLD, MessageStatus.NEW
+NONE = MessageStatus.NONE
+OLD = MessageStatus.OLD
+NEW = MessageStatus.NEW
 
 
 RIVALRY = 1.0
@@ -37,7 +39,8 @@ class Publisher:
     """
 
     def __init__(self, name: str):
-        self.name, self.arrival = name, -math.inf
+        self.name = name
+        self.arrival = -math.inf
 
 
 class Reader(abc.ABC):

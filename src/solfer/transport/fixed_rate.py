@@ -33,7 +33,9 @@ class FixedRateLoop:
     """
 
     def __init__(self, clock: Clock, rate: float, catch_up: float = 0.0):
-        self._now, self._sleep_until, self.period = clock.now, clock.sleep_until, 1.0 / rate
+        self._now = clock.now
+        self._sleep_until = clock.sleep_until
+        self.period = 1.0 / rate
         self._made_up = max(0.0, catch_up - self.period)
         self.skipped = self._turn = 0
         self._begin = self.deadline = clock.now()

@@ -30,8 +30,11 @@ class Inbox:
     """
 
     def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING) -> None:
-        self.refusal, self.refused, self.most = refusal, 0, 0
-        self._ration, self._waiting = ration, waiting
+        self.refusal = refusal
+        self.refused = 0
+        self.most = 0
+        self._ration = ration
+        self._waiting = waiting
         self._calls: deque[_Call] = deque()
         self._urgent: deque[_Call] = deque()
         self._single: deque[_Call] = deque()

@@ -29,7 +29,8 @@ RELEASED = 0.25
 TURN = 2.0
 """Turn of the base for each metre of the pad's speed [rad/m]."""
 
-CMD_VEL, TWIST = "cmd_vel", "geometry_msgs/Twist"
+CMD_VEL = "cmd_vel"
+TWIST = "geometry_msgs/Twist"
 
 WAYS = {
     "ahead": (1.0, 0.0, 0.0),
@@ -67,7 +68,9 @@ class PageControl:
     """
 
     def __init__(self, viser: ViserServer, requests: PageRequests, middleware: Middleware):
-        self._viser, self._requests, self._middleware = viser, requests, middleware
+        self._viser = viser
+        self._requests = requests
+        self._middleware = middleware
         self._dragged = DraggedReferences(middleware)
         self._holder: _Holder | None = None
         self._handles: dict[str, TransformControlsHandle] = {}
@@ -75,14 +78,16 @@ class PageControl:
         self._frames: Mapping[str, ScenePose] = {}
         self._moved: set[str] = set()
         self._writers: dict[str, Writer] = {}
-        self._way, self._pressed = (0.0, 0.0, 0.0), -math.inf
+        self._way = (0.0, 0.0, 0.0)
+        self._pressed = -math.inf
         self._drives = False
         self._topics: Future[Topics] | None = None
         self._next = -math.inf
         gui = viser.gui
         with gui.add_folder("control"):
             self._state = gui.add_markdown(FREE)
-            take, give = gui.add_button("take control"), gui.add_button("give it back")
+            take = gui.add_button("take control")
+            give = gui.add_button("give it back")
             self._module = gui.add_dropdown("base", ("",))
             self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
             pads = {name: gui.add_button(name) for name in WAYS}
@@ -127,10 +132,12 @@ class PageControl:
     def _find_modules(self, now: float) -> None:
         """Look once a second which components drive the base."""
         if self._topics is None and now >= self._next:
-            self._topics, self._next = self._middleware.topics(), now + 1.0
+            self._topics = self._middleware.topics()
+            self._next = now + 1.0
         if self._topics is None or not self._topics.done():
             return
-        topics, self._topics = self._topics, None
+        topics = self._topics
+        self._topics = None
         try:
             received = topics.result().received
         except MiddlewareError:  # it is asked again
@@ -206,7 +213,8 @@ class PageControl:
         if module not in self._writers:
             topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
             self._writers[module] = self._middleware.declared_writer(topic, TWIST)
-        linear, angular = {"x": x, "y": y, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": TURN * turn}
+        linear = {"x": x, "y": y, "z": 0.0}
+        angular = {"x": 0.0, "y": 0.0, "z": TURN * turn}
         self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
         self._drives = pressed
 
@@ -220,7 +228,8 @@ class PageControl:
             if name not in self._handles:
                 self._handles[name] = self._made(name, shown)
             if name not in self._moved:
-                self._handles[name].wxyz, self._handles[name].position = wxyz(shown.reference), shown.reference.position
+                self._handles[name].wxyz = wxyz(shown.reference)
+                self._handles[name].position = shown.reference.position
 
     def _made(self, name: str, shown: ShownReference) -> TransformControlsHandle:
         handle = self._viser.scene.add_transform_controls(
@@ -234,7 +243,8 @@ class PageControl:
         )
 
         async def moved(event: TransformControlsEvent) -> None:
-            place, turn = handle.position.copy(), handle.wxyz.copy()
+            place = handle.position.copy()
+            turn = handle.wxyz.copy()
             self._requests.ask(partial(self._drag, name, event.client_id, event.phase, place, turn))
 
         handle.on_update(moved)

@@ -22,9 +22,13 @@ TRANSLUCENT = 0.3
 Color = tuple[float, float, float]
 
 DESIRED = (0.3, 0.55, 1.0)
-CENTER, PROJECTION = (0.1, 0.4, 0.9), (0.9, 0.2, 0.2)
-EDGES, INNER = (0.1, 0.7, 0.2), (0.9, 0.7, 0.1)
-FORCES, PATH, ESTIMATED = (0.9, 0.3, 0.1), (0.6, 0.2, 0.8), (0.95, 0.6, 0.2)
+CENTER = (0.1, 0.4, 0.9)
+PROJECTION = (0.9, 0.2, 0.2)
+EDGES = (0.1, 0.7, 0.2)
+INNER = (0.9, 0.7, 0.1)
+FORCES = (0.9, 0.3, 0.1)
+PATH = (0.6, 0.2, 0.8)
+ESTIMATED = (0.95, 0.6, 0.2)
 GOES = (0.5, 0.5, 0.5)
 
 
@@ -55,7 +59,8 @@ class SceneDrawing:
         """Draw a scene."""
         self._measured.place(state.measured)
         self._desired.place(state.desired)
-        self._center.position, self._projection.position = state.center, state.projection
+        self._center.position = state.center
+        self._projection.position = state.projection
         self._polygon.draw(_closed(state.polygon))
         self._inner.draw(_closed(state.inner))
         ground = state.projection[2]

@@ -8,7 +8,8 @@ from solfer.transport.lower_level import LOWER_LEVEL, Answer
 from solfer.transport.middleware import TRIGGER, NoFields
 from solfer.view.requests import PageRequests
 
-TEXT, CONFIRM = "EMERGENCY STOP", "stop the robot now"
+TEXT = "EMERGENCY STOP"
+CONFIRM = "stop the robot now"
 
 
 class EmergencyStopButton:
@@ -21,7 +22,8 @@ class EmergencyStopButton:
     """
 
     def __init__(self, viser: ViserServer, requests: PageRequests, stop: Callable[[], None] | None = None):
-        self._requests, self._stop = requests, stop or self._call
+        self._requests = requests
+        self._stop = stop or self._call
         button = viser.gui.add_button(TEXT, color="red")
         button.on_click(self._confirm)
 

@@ -8,7 +8,8 @@ from solfer.view.server import PageServer
 OLDEST = 0.5
 """Age from which on the page says that what it shows is old [s]."""
 
-BEAT, BANNER = "solfer-beat", "solfer-banner"
+BEAT = "solfer-beat"
+BANNER = "solfer-banner"
 
 WATCH = f"""
 clearInterval(window.solferWatch);

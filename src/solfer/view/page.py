@@ -42,10 +42,13 @@ class Page:
         control: bool = False,
         playback: Playback | None = None,
     ):
-        self._viser, self._middleware, self._playback = server.viser, middleware, playback
+        self._viser = server.viser
+        self._middleware = middleware
+        self._playback = playback
         gui = self._viser.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
-        self._viser.initial_camera.position, self._viser.initial_camera.look_at = CAMERA, LOOK
+        self._viser.initial_camera.position = CAMERA
+        self._viser.initial_camera.look_at = LOOK
         self._freshness = Freshness(server)
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)

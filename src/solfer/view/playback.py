@@ -10,7 +10,9 @@ from solfer.robot.shipped import robot_of
 from solfer.transport import BodyMessage, JointMessage, Middleware, Writer
 from solfer.transport.messages import PointsMessage
 
-MEASURED, COMMAND, TRUTH = "measured/position", "command", "truth"
+MEASURED = "measured/position"
+COMMAND = "command"
+TRUTH = "truth"
 
 
 class Playback:
@@ -32,13 +34,17 @@ class Playback:
     """
 
     def __init__(self, recording: Recording, middleware: Middleware, robot: Robot):
-        self._recording, self._robot = recording, robot
+        self._recording = recording
+        self._robot = robot
         self._joints = [each for each in _widest_first(recording, MEASURED) if len(each.times)]
         if not self._joints:
             raise RecordingError("no plugin measures joints", expected="a recording with <plugin>/measured/position")
         times = self._joints[0].times
-        self.begin, self.end = float(times[0]), float(times[-1])
-        self.time, self.speed, self.plays = self.begin, 1.0, True
+        self.begin = float(times[0])
+        self.end = float(times[-1])
+        self.time = self.begin
+        self.speed = 1.0
+        self.plays = True
         self._states = middleware.writer("joint_states", "sensor_msgs/JointState")
         self._base = middleware.writer("floating_base", "nav_msgs/Odometry")
         self._odometry = middleware.writer("odometry/odom", "nav_msgs/Odometry")
@@ -101,7 +107,8 @@ class Playback:
             self._wrenches.write(PointsMessage("world", tuple(self._forces), values))
 
     def _publish_base(self, known: dict[str, float]) -> None:
-        chart, link = self._robot.kinematics.base, self._robot.kinematics.base_link
+        chart = self._robot.kinematics.base
+        link = self._robot.kinematics.base_link
         if chart is None or link is None:
             return
         for channel in self._truths[:1]:

@@ -30,14 +30,16 @@ class Plots:
     """
 
     def __init__(self, gui: GuiApi, requests: PageRequests, columns: PlottedColumns):
-        self._gui, self._columns = gui, columns
+        self._gui = gui
+        self._columns = columns
         self._times = deque[float]()
         self._samples: dict[str, deque[float]] = {}
         self._plot: GuiUplotHandle | None = None
         self._drawn = -np.inf
         with gui.add_folder("plot", expand_by_default=False) as self._folder:
             self._choice = gui.add_dropdown("column", (NOTHING,))
-            add, clear = gui.add_button("add"), gui.add_button("clear")
+            add = gui.add_button("add")
+            clear = gui.add_button("clear")
         add.on_click(lambda _: requests.ask(self._add))
         clear.on_click(lambda _: requests.ask(self._clear))
 

@@ -46,7 +46,9 @@ class PluginTabs:
     """
 
     def __init__(self, gui: GuiApi, requests: PageRequests, control: PageControl | None):
-        self._gui, self._requests, self._control = gui, requests, control
+        self._gui = gui
+        self._requests = requests
+        self._control = control
         self._group = gui.add_tab_group()
         self._tabs: dict[str, _PluginTab] = {}
 
@@ -64,7 +66,10 @@ class _PluginTab:
     def __init__(
         self, gui: GuiApi, group: GuiTabGroupHandle, name: str, requests: PageRequests, control: PageControl | None
     ):
-        self._gui, self._name, self._requests, self._control = gui, name, requests, control
+        self._gui = gui
+        self._name = name
+        self._requests = requests
+        self._control = control
         self._report: HealthReport | None = None
         self._tab = group.add_tab(name.rpartition("/")[2])
         with self._tab:

@@ -29,7 +29,8 @@ class PageRequests:
     """
 
     def __init__(self, middleware: Middleware, viser: ViserServer):
-        self.middleware, self._viser = middleware, viser
+        self.middleware = middleware
+        self._viser = viser
         self._asked = SimpleQueue[Callable[[], None]]()
         self._answers: list[tuple[Future[Any], str, Callable[[Any], None]]] = []
 
@@ -52,7 +53,8 @@ class PageRequests:
             except Empty:
                 break
             work()
-        waiting, self._answers = self._answers, []
+        waiting = self._answers
+        self._answers = []
         for answer, service, done in waiting:
             if answer.done():
                 self._finish(answer, service, done)

@@ -50,14 +50,18 @@ class CycleMeter:
         self._plugin = plugin
         self._meter = LineMeter(Ownership(sys.modules[type(plugin.component).__module__]))
         part = (cycles - UNUSUAL) // 4
-        self.warm, self.kept, self.traced = 2 * part, part, part
+        self.warm = 2 * part
+        self.kept = part
+        self.traced = part
         ended = self.warm + self.kept
         self._steps: dict[int, Callable[[], None]] = {
             part: self._meter.watch,
             self.warm: self._meter.begin,
             ended: partial(self._meter.end, __file__),
         }
-        self._traced_from, self._counted_from, self._ran = ended, ended + UNUSUAL, 0
+        self._traced_from = ended
+        self._counted_from = ended + UNUSUAL
+        self._ran = 0
 
     @property
     def lines(self) -> Sequence[LineCost]:
@@ -71,7 +75,8 @@ class CycleMeter:
 
     def cycle(self) -> None:
         """Run one cycle of the plugin, and measure it if it is time for that."""
-        work, running = self._plugin.cycle, self._plugin.running
+        work = self._plugin.cycle
+        running = self._plugin.running
         if running and self._ran >= self._traced_from and not self.done:
             self._meter.measure(work, counts=self._ran >= self._counted_from)
         else:
@@ -123,7 +128,8 @@ def on_simulation(configuration: Configuration, given: RobotFiles | None) -> Cyc
     Raises:
         SolferError: The plugin or the robot cannot be made, or the plugin does not start.
     """
-    where, configuration = f"{configuration.file}: {configuration.name}", idle(configuration)
+    where = f"{configuration.file}: {configuration.name}"
+    configuration = idle(configuration)
     with closing(StandingRobot(configuration, given, where)) as robot:
         with closing(generate(configuration, robot.middleware, generator_of(configuration))) as plugin:
             return measured(plugin, CYCLES, lambda meter: _simulated(robot, plugin, meter, where))

@@ -26,10 +26,13 @@ DEPTH = 12
 """Calls that are remembered of memory that stays."""
 
 # events of CPython's tracing
-CALL, LINE, RETURN = 0, 2, 3
+CALL = 0
+LINE = 2
+RETURN = 3
 _EVENT = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.py_object, ctypes.c_int, ctypes.c_void_p)
 _set_trace = ctypes.pythonapi.PyEval_SetTrace
-_set_trace.argtypes, _set_trace.restype = (_EVENT, ctypes.py_object), None
+_set_trace.argtypes = (_EVENT, ctypes.py_object)
+_set_trace.restype = None
 
 Key = tuple[CodeType, int]
 OUTSIDE, IGNORED = None, ()
@@ -77,14 +80,19 @@ class LineMeter:
         self._whose, self._before = whose, tracemalloc.Snapshot((), 0)
         self._stack: list[Any] = [OUTSIDE]
         self._ended: FrameType | None = None
-        self._base, self._own, self._counts = 0, 0, False
-        self._callback, self._probed = _EVENT(self._trace), 0
+        self._base = 0
+        self._own = 0
+        self._counts = False
+        self._callback = _EVENT(self._trace)
+        self._probed = 0
         self._own = LEAST - self._probe()
 
     def measure(self, work: Callable[[], object], counts: bool = True) -> None:
         """Do some work, and count what its lines take, if it `counts`."""
         tracemalloc.start()
-        self._counts, self._stack[:], self._base = counts, [OUTSIDE], 0
+        self._counts = counts
+        self._stack[:] = [OUTSIDE]
+        self._base = 0
         _set_trace(self._callback, None)
         try:
             work()
@@ -116,7 +124,8 @@ class LineMeter:
         """Charge the line that was at work until this event, and note which one is at work from now on."""
         peak = tracemalloc.get_traced_memory()[1]
         stack = self._stack
-        key, size = stack[-1], peak - self._base + self._own
+        key = stack[-1]
+        size = peak - self._base + self._own
         if event == CALL:
             size -= sys.getsizeof(frame)  # made for the trace alone
         if size >= LEAST and key and self._counts:
@@ -140,7 +149,8 @@ class LineMeter:
     def _charge(self, key: Key, size: int) -> None:
         code, line = key
         cost = self._cost(code.co_filename, line, code.co_name)
-        cost.times, cost.size = cost.times + 1, cost.size + size
+        cost.times = cost.times + 1
+        cost.size = cost.size + size
         if not cost.blamed:
             callers = (each for each in reversed(self._stack) if each and self._whose.of_component(each[0].co_filename))
             cost.caller = next((f"{each[0].co_filename}:{each[1]}" for each in callers), "")

@@ -142,7 +142,8 @@ def check(known: Mapping[str, str], given: Mapping[str, str], launch: str) -> li
         launch: Name of the launch file.
     """
     errors: list[SolferError] = []
-    values, bounds = choices(known), numbers()
+    values = choices(known)
+    bounds = numbers()
     for name, value in given.items():
         where = f"{launch}, {name}:={value}"
         if name not in known:
@@ -208,7 +209,8 @@ def _together(given: Mapping[str, str], launch: str) -> list[SolferError]:
     from solfer.config.records.middlewares import DEFAULT, MIDDLEWARES
 
     middleware = given.get("middleware", DEFAULT)
-    kind, is_hardware = MIDDLEWARES.get(middleware), given.get("system") == "HW"
+    kind = MIDDLEWARES.get(middleware)
+    is_hardware = given.get("system") == "HW"
     is_layer = kind is not None and kind.layer == "RT"
     usual = {"lockstep": "false", "factor": "1", "rates": ""}
     changed = {name for name, value in usual.items() if given.get(name, value) != value}

@@ -34,7 +34,8 @@ def connect(
 
 
 def _box(configuration: Configuration, component: str, declared: tuple[Declared, ...]) -> PluginBox:
-    module, urdf = configuration.module, configuration.sources.urdf
+    module = configuration.module
+    urdf = configuration.sources.urdf
     model = urdf.parameter or (urdf.file or "").rsplit("/", 1)[-1]
     robot = configuration.robot.configuration
     idle = module.mode == "idle"
@@ -60,13 +61,15 @@ def _declared(boxes: Sequence[PluginBox]) -> Iterator[Arrow]:
             topic = one.name.lstrip("/")
             for box in boxes:
                 if one.kind == "topic out" and topic in box.declares("topic in"):
-                    tail, head = End(Kind.PLUGIN, sender.name), End(Kind.PLUGIN, box.name)
+                    tail = End(Kind.PLUGIN, sender.name)
+                    head = End(Kind.PLUGIN, box.name)
                     yield Arrow(tail, head, topic, one.interface, topic=topic)
 
 
 def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
     """Yield the pipes of a plugin that no other plugin receives."""
-    tail, idle = End(Kind.PLUGIN, sender.module.name), sender.module.mode == "idle"
+    tail = End(Kind.PLUGIN, sender.module.name)
+    idle = sender.module.mode == "idle"
     known = {arrow.topic for arrow in arrows if arrow.tail == tail}
     for pipe in sender.controllers:
         topic = topic_of(pipe)

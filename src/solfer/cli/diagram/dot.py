@@ -9,8 +9,13 @@ from html import escape
 
 from solfer.cli.diagram.network import Arrow, End, Kind, Network, PluginBox
 
-BLUE, GREEN, PINK, YELLOW, PURPLE = "#cfe2f7", "#d3ecc8", "#f8d3d8", "#fff0b8", "#e4daf5"
-LINE, GREY = "#3b4a5a", "#68778a"
+BLUE = "#cfe2f7"
+GREEN = "#d3ecc8"
+PINK = "#f8d3d8"
+YELLOW = "#fff0b8"
+PURPLE = "#e4daf5"
+LINE = "#3b4a5a"
+GREY = "#68778a"
 FONT = "Helvetica,Arial,sans-serif"
 SYSTEMS = {"SM": "simulation", "HW": "hardware"}
 

@@ -24,7 +24,8 @@ class End:
         return f"{self.kind.value} {self.name}".rstrip()
 
 
-SENSORS, LOWER_LEVEL = End(Kind.SENSORS), End(Kind.LOWER_LEVEL)
+SENSORS = End(Kind.SENSORS)
+LOWER_LEVEL = End(Kind.LOWER_LEVEL)
 
 
 @dataclass(frozen=True)

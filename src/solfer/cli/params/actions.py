@@ -83,7 +83,8 @@ def save(options: argparse.Namespace, caller: Caller) -> None:
     Raises:
         ConfigError: The file cannot be written.
     """
-    plugin, file = _known(options.running, caller.plugins()), options.file
+    plugin = _known(options.running, caller.plugins())
+    file = options.file
     values = {each.name: (each.value, each.configured) for each in _parameters(caller, plugin)}
     module = plugin.rpartition("/")[2]
     try:
@@ -113,7 +114,8 @@ def names(before: Iterable[str], action: str) -> list[str]:
     namespace = ""
     if "--namespace" in words[:-1]:
         place = words.index("--namespace")
-        _, namespace = words.pop(place), words.pop(place)
+        _ = words.pop(place)
+        namespace = words.pop(place)
     try:
         with caller(namespace) as made:
             if action == "running":

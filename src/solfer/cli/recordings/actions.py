@@ -86,7 +86,8 @@ def _info(recording: Recording) -> Iterator[str]:
     yield f"duration: {last - first:.3f} s, {rows} rows, {recording.lost} lost"
     yield from aligned([("channel", "columns", "rows", "rate [Hz]", "kind"), *map(_row, recording.channels.values())])
     for group in grouped(recording.events):
-        event, owner = group.first, group.first.plugin or "process"
+        event = group.first
+        owner = group.first.plugin or "process"
         if group.count > 1:
             yield f"requests: {owner}: {group.counted(first)}"
         else:

@@ -6,7 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
 Item = TypeVar("Item")
-AFTER, EVERY, WIDTH = 1.0, 0.1, 40  # [s], [s], characters
+AFTER = 1.0
+EVERY = 0.1
+WIDTH = 40  # [s], [s], characters
 
 
 def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
@@ -18,11 +20,13 @@ def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
         unit: What they are.
     """
     following = time.monotonic() + AFTER
-    shown, count = False, 0
+    shown = False
+    count = 0
     for count, item in enumerate(items, 1):
         yield item
         if time.monotonic() >= following and sys.stderr.isatty():
-            following, shown = time.monotonic() + EVERY, True
+            following = time.monotonic() + EVERY
+            shown = True
             full = WIDTH * count // max(1, total)
             print(
                 f"\r[{'#' * full}{'.' * (WIDTH - full)}] {count} of {total} {unit}", end="", file=sys.stderr, flush=True

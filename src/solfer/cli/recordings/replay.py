@@ -125,11 +125,13 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
     from solfer.recording.pictures.canvas import save
     from solfer.recording.pictures.replay_page import ROWS, replay_page
 
-    recorded, rows = recorded_commands(replay), replay.rows
+    recorded = recorded_commands(replay)
+    rows = replay.rows
     chosen = [(each.channel, each.column) for each in found.different[:ROWS]] or [
         (name, column) for name, channel in replay.commands.items() if name in recorded for column in channel.columns
     ][:ROWS]
-    both, tracks = replay.running & rows.running, []
+    both = replay.running & rows.running
+    tracks = []
     for name, column in chosen:
         pair = rows.values(recorded[name], (column,))[:, 0], replay.commands[name].column(column)
         theirs, ours = (np.where(both, values, np.nan) for values in pair)

@@ -21,7 +21,8 @@ def trip(namespace: Namespace, reason: str) -> None:
         MiddlewareError: No RT layer lives there, it has not read the latch, or a plugin cannot hold. The latch is
             set in any case.
     """
-    stop, begin = EmergencyStopLatch(namespace.folder), time.monotonic_ns()
+    stop = EmergencyStopLatch(namespace.folder)
+    begin = time.monotonic_ns()
     stop.trip(reason)
     layer = layer_of(namespace.folder)
     while stop.answered < begin:

@@ -154,7 +154,9 @@ def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "Record
     from solfer.realtime.process import ProcessEnd
 
     begin = time.monotonic()
-    end, told, warned = begin + seconds if seconds is not None else float("inf"), False, False
+    end = begin + seconds if seconds is not None else float("inf")
+    told = False
+    warned = False
     with closing(ProcessEnd()) as ending:
         while True:
             gone = all(each.drain.over for each in fills)

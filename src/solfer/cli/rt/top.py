@@ -26,7 +26,8 @@ SILENT = 5.0
 def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
     """Print the tables of an RT layer until Ctrl-C, or once. A layer that has ended may start again."""
     RuntimeStatistics.attach(namespace.folder)
-    observer, others = StatisticsReader(namespace.folder), Reports(namespace)
+    observer = StatisticsReader(namespace.folder)
+    others = Reports(namespace)
     before: LayerSummary | None = None
     since = "all cycles"
 
@@ -41,7 +42,8 @@ def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
             yield from health({**reports, **others.read()})
             yield ""
             yield from overview(layer, since)
-        before, since = layer, f"the last {options.every:g} s"
+        before = layer
+        since = f"the last {options.every:g} s"
 
     _print(options, lines)
 

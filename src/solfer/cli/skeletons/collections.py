@@ -8,7 +8,9 @@ from pathlib import Path
 
 from solfer.errors import MissingDependency, ModelError, UnknownName
 
-EXAMPLES, PYBULLET, DESCRIPTIONS = "example-robot-data", "pybullet_data", "robot_descriptions"
+EXAMPLES = "example-robot-data"
+PYBULLET = "pybullet_data"
+DESCRIPTIONS = "robot_descriptions"
 COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS)
 
 

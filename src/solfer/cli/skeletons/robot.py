@@ -124,7 +124,9 @@ class RobotSkeleton(Skeleton):
             "@URDF@": self._seen_from_bundle(urdf, name),
             "@FLOATING@": "true" if kinematics.base is not None else "false",
         }
-        feet, base, tip = feet_of(kinematics), kinematics.base_link, tip_of(kinematics)
+        feet = feet_of(kinematics)
+        base = kinematics.base_link
+        tip = tip_of(kinematics)
         for word, part in BASE_PARTS.items():
             self._words[word] = part.format(base=base) if feet else ""
         if feet:

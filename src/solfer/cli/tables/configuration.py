@@ -31,7 +31,8 @@ def configs(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def _config(configuration: Configuration) -> Row:
-    module, chosen = configuration.module, configuration.module.controller
+    module = configuration.module
+    chosen = configuration.module.controller
     controller = chosen if isinstance(chosen, str) else f"[{', '.join(chosen)}]"
     mode = "idle" if module.mode == "idle" else ""
     pipes = f"robot {module.robot}", f"controller {controller}"

@@ -22,12 +22,15 @@ class ScenarioTrace:
     """
 
     def __init__(self, scenario: Scenario):
-        player, self.scenario = Player(scenario), scenario
-        base, vertices = [scenario.base], [scenario.vertices]
+        player = Player(scenario)
+        self.scenario = scenario
+        base = [scenario.base]
+        vertices = [scenario.vertices]
         while player.step():
             base.append(base[-1] + player.base_velocity * scenario.period)
             vertices.append(player.vertices.copy())
-        self.base, self.vertices = np.array(base), np.array(vertices)
+        self.base = np.array(base)
+        self.vertices = np.array(vertices)
 
     @property
     def times(self) -> np.ndarray:
@@ -43,7 +46,8 @@ class ScenarioTrace:
     def rows(self) -> Iterator[tuple[str, ...]]:
         """Yield the head, and a row for each step: what it is, where the base is at its end, and how far all moves."""
         yield HEAD
-        begin, way = 0, self.way
+        begin = 0
+        way = self.way
         for number, (step, count) in enumerate(zip(self.scenario.pattern, self.scenario.periods, strict=True), 1):
             end = begin + count
             moved = np.linalg.norm(self.vertices[end] - self.vertices[begin], axis=1).max()

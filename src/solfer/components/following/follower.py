@@ -139,7 +139,8 @@ class ReferenceFollower(Component, abc.ABC):
         if not 0 <= request.nr < len(self._numbered):
             numbers = [f"{number} ({target.name})" for number, target in enumerate(self._numbered)]
             raise UnknownName("task with a position, number", str(request.nr), numbers)
-        target, shift = self._numbered[request.nr], (request.x, request.y, request.z)
+        target = self._numbered[request.nr]
+        shift = (request.x, request.y, request.z)
         target.want(shift if target.quantity == "position" else (*shift, 0.0, 0.0, 0.0, 1.0), relative=True)
         return Accepted()
 
@@ -319,13 +320,15 @@ class ReferenceFollower(Component, abc.ABC):
 
     def _judge(self) -> None:
         """Say what cannot be reached, the farthest task first: as long as it moves, it may pull others away."""
-        farthest, distance = None, 0.0
+        farthest = None
+        distance = 0.0
         for target in self._list:
             target.watch()
             if not target.is_still:
                 return
             if not target.is_unreachable and target.distance > distance:
-                farthest, distance = target, target.distance
+                farthest = target
+                distance = target.distance
         if farthest is None or not farthest.stays:
             return
         said = farthest.judge()

@@ -169,5 +169,6 @@ def pose_of(quantity: str, numbers: tuple[float, ...]) -> Pose:
 
 def numbers_of(pose: Pose) -> tuple[float, ...]:
     """Return position [m] and quaternion (x, y, z, w) of a pose."""
-    place, turn = pose.position, pose.orientation
+    place = pose.position
+    turn = pose.orientation
     return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)

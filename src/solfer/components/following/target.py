@@ -56,7 +56,9 @@ class Target:
     def __init__(
         self, name: str, task: Task, reference: Constant, frame: str, generator: ReferenceGenerator | None = None
     ):
-        self.name, self.task, self.frame = name, task, frame
+        self.name = name
+        self.task = task
+        self.frame = frame
         self._reference = reference
         self.quantity = quantity_of(reference)
         self._first = 3 if self.quantity == "orientation" else 0
@@ -70,8 +72,12 @@ class Target:
         self.residual = np.zeros(2)
         self.stays = self.is_unreachable = self.is_held = self._was_told = False
         self.reason = ""
-        self._last, self._cycles, self._looks, self._takeovers = math.inf, 0, 0, TAKEOVERS
-        self._stamp, self._creep = -math.inf, CREEP
+        self._last = math.inf
+        self._cycles = 0
+        self._looks = 0
+        self._takeovers = TAKEOVERS
+        self._stamp = -math.inf
+        self._creep = CREEP
         self._filter: ReferenceFilter
         self._generator = generator
         self._is_generated = False
@@ -94,20 +100,24 @@ class Target:
             motion: How the reference moves, and how fast an error is corrected beside that.
             tolerances: Error of a task that has arrived [m, rad], shape (2,).
         """
-        self._filter, self._index = references, index
+        self._filter = references
+        self._index = index
         self._feeds = motion.feed_forward and self._moves
         self.limit(motion)
-        self._period, self._tolerances = references.period, tolerances
+        self._period = references.period
+        self._tolerances = tolerances
         self.take_gain()
         last = self._first + self._size
         self._value = references.value[index, self._first : last]
         self._desired = references.target[index, self._first : last]
         rates = references.rate[index, self._first : self._first + self.task.point.rows]
-        self._rate, self._rows = rates, self.task.selected
+        self._rate = rates
+        self._rows = self.task.selected
         self._error = self.task.error.value
         self._turn = self._error[-3:] if self.quantity != "position" else self._error[:0]
         self._place = self._error[:3] if self.quantity != "orientation" else self._error[:0]
-        self._checks, self._growth = round(CHECK / self._period), math.exp(CHECK / GROWTH)
+        self._checks = round(CHECK / self._period)
+        self._growth = math.exp(CHECK / GROWTH)
 
     def limit(self, motion: MotionRecord) -> None:
         """Let the reference move as a record says, and errors be corrected no faster, as far as that counts."""
@@ -319,7 +329,8 @@ class Target:
     def measure(self) -> float:
         """Compute how far the point is from its reference; return the way that a cycle's step wants to go, K |e| T."""
         if not self.is_held:
-            place, turn = self._place, self._turn
+            place = self._place
+            turn = self._turn
             self.residual[0] = math.sqrt(float(place.dot(place))) if len(place) else 0.0
             self.residual[1] = math.sqrt(float(turn.dot(turn))) if len(turn) else 0.0
         return self._step * math.hypot(self.residual[0], self.residual[1])
@@ -340,12 +351,16 @@ class Target:
         distance = self.distance
         is_creeping = abs(distance - self._last) < self._creep * self._gain * distance * CHECK
         self._creep = min(self._creep * self._growth, 1.0)
-        self._looks, self._last = self._looks + 1 if is_creeping else 0, distance
+        self._looks = self._looks + 1 if is_creeping else 0
+        self._last = distance
         self.stays = self._looks >= CHECKS
 
     def look_anew(self) -> None:
         """Look anew whether the task comes nearer to its reference; one that is held is held where it is now."""
-        self._last, self._cycles, self._looks, self._takeovers = math.inf, 0, 0, TAKEOVERS
+        self._last = math.inf
+        self._cycles = 0
+        self._looks = 0
+        self._takeovers = TAKEOVERS
         self.stays = False
 
     def judge(self) -> str:
@@ -364,7 +379,8 @@ class Target:
 
     def _forget_progress(self) -> None:
         self.look_anew()
-        self.is_unreachable, self._creep = False, CREEP
+        self.is_unreachable = False
+        self._creep = CREEP
 
     def _added(self, numbers: np.ndarray) -> np.ndarray:
         """Add numbers to the reference; quaternions turn it in the same axes."""

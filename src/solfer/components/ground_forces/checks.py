@@ -23,12 +23,16 @@ class ContactChecks:
     """
 
     def __init__(self, names: Sequence[str], normals: np.ndarray, friction: float | None):
-        self._names, self._normals, self.friction = tuple(names), normals, friction
-        self._sum, self._count = np.zeros((len(self._names), 3)), 0
+        self._names = tuple(names)
+        self._normals = normals
+        self.friction = friction
+        self._sum = np.zeros((len(self._names), 3))
+        self._count = 0
 
     def start(self) -> None:
         """Begin without forces."""
-        self._sum[:], self._count = 0.0, 0
+        self._sum[:] = 0.0
+        self._count = 0
 
     def add(self, forces: np.ndarray) -> None:
         """Add the forces of a cycle, world axes, shape (k, 3) [N]."""
@@ -41,7 +45,8 @@ class ContactChecks:
         self.start()
         along = np.sum(means * self._normals, axis=1)
         across = np.linalg.norm(means - along[:, None] * self._normals, axis=1)
-        wrong, entries = [], []
+        wrong = []
+        entries = []
         for name, normal, tangential in zip(self._names, along.tolist(), across.tolist(), strict=True):
             text, complaint = self._judge(normal, tangential)
             entries.append(Entry(name, text))

@@ -81,7 +81,9 @@ class GroundForces(Component):
         self._touching = np.ones(len(self._contacts))
         self.law = self._make_law()
         self._filter: LowPass | None = None
-        self._cycles, self._silence, self._between = 0, 1, 1
+        self._cycles = 0
+        self._silence = 1
+        self._between = 1
         self.checks = ContactChecks(self._names, self._normals, tags.friction)
         self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
         self.outputs["center_of_pressure"] = Port("position")
@@ -91,7 +93,8 @@ class GroundForces(Component):
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer the filter of torques, when contacts touch, and the friction beyond which forces are reported."""
-        size, rate = self.model.size, 1.0 / self.period
+        size = self.model.size
+        rate = 1.0 / self.period
         touch = () if self.touch is None else ("above", "below", "speed", "delay")
         return (
             *live_filter(("filter", "torque"), self._filter, lambda tags: tags.filter.torque.low_pass(size, rate)),
@@ -141,7 +144,8 @@ class GroundForces(Component):
         return self.checks.report(self.name) if self._cycles % self._between == 1 else None
 
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
-        robot, tags = self.model, self.tags
+        robot = self.model
+        tags = self.tags
         robot.dynamics.subscribe(BIAS)
         if tags.method == "projection":
             return ProjectedLaw(self._contacts, self._torque)
@@ -164,7 +168,8 @@ class GroundForces(Component):
 
     def _tracked(self) -> tuple[str, ...]:
         """Return the names of the contacts that count."""
-        contacts, tags = self.model.contacts, self.tags
+        contacts = self.model.contacts
+        tags = self.tags
         try:
             group = contacts.group(tags.track)
         except UnknownName as error:
@@ -186,7 +191,8 @@ class GroundForces(Component):
 
     def _listed(self, file: Path) -> tuple[str, ...]:
         """Return the names of the contacts in a file, on links that the Robot has; those that it lacks are added."""
-        contacts, links = self.model.contacts, self.model.links("all")
+        contacts = self.model.contacts
+        links = self.model.links("all")
         records = [each for each in read_contacts(file, self.model.name) if each.end_frame in links]
         for record in records:
             if record.name not in contacts.names:
@@ -202,7 +208,8 @@ class GroundForces(Component):
         super().set_rate(rate)
         tags = self.tags.filter.torque
         self._filter = None if tags is None else tags.low_pass(self.model.size, rate)
-        self._silence, self._between = max(1, round(rate / PUBLISHED)), max(2, round(rate / REPORTED))
+        self._silence = max(1, round(rate / PUBLISHED))
+        self._between = max(2, round(rate / REPORTED))
 
     def init(self) -> None:
         """Begin with the torques of now, unfiltered, and with the contacts that touch now."""
@@ -263,7 +270,9 @@ class GroundForces(Component):
 
 def wrench_on_link(contact: Contact, robot: Robot) -> StampedWrench:
     """Make the message of a contact's wrench: in the axes of its link, about the link's origin, as a sensor there."""
-    rotation, arm = robot.kinematics.rotation(contact.link), contact.value - robot.kinematics.position(contact.link)
-    force, torque = contact.wrench[:3], contact.wrench[3:] + np.cross(arm, contact.wrench[:3])
+    rotation = robot.kinematics.rotation(contact.link)
+    arm = contact.value - robot.kinematics.position(contact.link)
+    force = contact.wrench[:3]
+    torque = contact.wrench[3:] + np.cross(arm, contact.wrench[:3])
     wrench = ForceAndTorque(*(Vector(*(vector @ rotation).tolist()) for vector in (force, torque)))
     return StampedWrench(Header(frame_id=contact.link), wrench)

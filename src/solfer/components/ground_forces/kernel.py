@@ -76,7 +76,8 @@ def _learn(
     solved, offsets,
 ):  # fmt: skip
     """Add what a cycle tells of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
-    rows, size = len(jacobian), len(told)
+    rows = len(jacobian)
+    size = len(told)
     _normal_matrix(jacobian, weights, columns, least, factor)
     for i in range(rows):
         needed[i] = 0.0
@@ -108,7 +109,9 @@ def _learn(
     _backward(solved, offsets)
 
 
-_MATRIX, _VECTOR, _INDICES = "float64[:,::1]", "float64[::1]", "int64[::1]"
+_MATRIX = "float64[:,::1]"
+_VECTOR = "float64[::1]"
+_INDICES = "int64[::1]"
 
 fit = cached(
     f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR})",

@@ -70,13 +70,19 @@ class WeightedLaw:
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact], torque: np.ndarray, tags: GroundForcesTags):
-        self._robot, self._contacts, self._torque = robot, tuple(contacts), torque
-        self._floating, deviations = robot.kinematics.base is not None, np.full(robot.size, tags.torque_deviation)
+        self._robot = robot
+        self._contacts = tuple(contacts)
+        self._torque = torque
+        self._floating = robot.kinematics.base is not None
+        deviations = np.full(robot.size, tags.torque_deviation)
         if self._floating:
             deviations[:6] = tags.push_deviation
         self._world, self._forces = MomentumObserver(robot, tags.observer), WeightedForces(contacts, deviations)
-        self._corrected, self.push, self._moment = np.zeros(robot.size), np.zeros(6), np.zeros(3)
-        self.offsets, self._largest = None, 0.0
+        self._corrected = np.zeros(robot.size)
+        self.push = np.zeros(6)
+        self._moment = np.zeros(3)
+        self.offsets = None
+        self._largest = 0.0
         if tags.offsets is not None:
             self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, self._floating)
             self._largest = tags.offsets.largest_push
@@ -112,7 +118,8 @@ class WeightedLaw:
 
     def _write_push(self) -> None:
         """Turn the forces along the base's six numbers into a wrench: with rates = G w of its angles, t = G^T t'."""
-        chart, rest = self._robot.kinematics.base, self._forces.rest
+        chart = self._robot.kinematics.base
+        rest = self._forces.rest
         rx, ry = self._robot.state.position[3:5].tolist()
         tx, ty, tz = rest[3:6].tolist()
         for axis, turn in enumerate(_AXES):

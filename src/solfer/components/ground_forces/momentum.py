@@ -27,7 +27,8 @@ class MomentumObserver:
     """
 
     def __init__(self, robot: Robot, cut_off: float | None):
-        self._robot, self._cut_off = robot, cut_off
+        self._robot = robot
+        self._cut_off = cut_off
         robot.dynamics.subscribe([BIAS] if cut_off is None else [BIAS, INERTIA])
         self.value, self._input, self._before, self._change = np.zeros((4, robot.size))
 

@@ -30,8 +30,11 @@ class TorqueOffsets:
     """
 
     def __init__(self, contacts: Sequence[Contact], deviations: np.ndarray, tags: OffsetTags, base: bool):
-        rows, size = 3 * len(contacts), len(deviations)
-        self._tags, self._share, self._decay = tags, 0.0, 0.0
+        rows = 3 * len(contacts)
+        size = len(deviations)
+        self._tags = tags
+        self._share = 0.0
+        self._decay = 0.0
         self._calm = deviations**-2
         self._pushed = self._calm.copy()
         if base:
@@ -41,15 +44,18 @@ class TorqueOffsets:
         self._first = int(np.count_nonzero(self._columns < 6)) if base else 0
         self._joints = self._columns[self._first :]
         count = len(self._joints)
-        self._jacobian, self._needed = np.zeros((rows, size)), np.zeros(rows)
-        self._factor, self._spread = np.zeros((rows, rows)), np.zeros((count, rows))
+        self._jacobian = np.zeros((rows, size))
+        self._needed = np.zeros(rows)
+        self._factor = np.zeros((rows, rows))
+        self._spread = np.zeros((count, rows))
         self._information, self._solved = np.zeros((2, count, count))
         self._told, self._offsets = np.zeros((2, count))
         self.value = np.zeros(size)
 
     def start(self, period: float) -> None:
         """Begin with cycles of `period` [s]; what is known stays."""
-        self._share, self._decay = period / self._tags.interval, period / self._tags.memory
+        self._share = period / self._tags.interval
+        self._decay = period / self._tags.memory
 
     def update(self, jacobian: np.ndarray, world: np.ndarray, lifted: np.ndarray, pushed: bool) -> None:
         """Learn from a cycle.

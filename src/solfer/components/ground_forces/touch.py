@@ -32,7 +32,10 @@ class Touch:
 
     def set(self, above: float, below: float, delay: float, speed: float = 0.0) -> None:
         """Set when contacts touch, see above; those that touch do so until they end."""
-        self._begin, self._end, self._delay, self._rise = above, below, delay, speed
+        self._begin = above
+        self._end = below
+        self._delay = delay
+        self._rise = speed
 
     def start(self, forces: np.ndarray) -> None:
         """Begin with the forces of now, shape (k,) [N], without a delay."""

@@ -35,10 +35,12 @@ class WeightedForces:
     """
 
     def __init__(self, contacts: Sequence[Contact], deviations: np.ndarray):
-        rows, size = 3 * len(contacts), len(deviations)
+        rows = 3 * len(contacts)
+        size = len(deviations)
         self._weights = deviations**-2
         self._columns = weighed(contacts, self._weights)
-        self._factor, self._forces = np.zeros((rows, rows)), np.zeros(rows)
+        self._factor = np.zeros((rows, rows))
+        self._forces = np.zeros(rows)
         self.rest, self.value = np.zeros(size), self._forces.reshape(-1, 3)
 
     def update(self, jacobian: np.ndarray, world: np.ndarray) -> np.ndarray:

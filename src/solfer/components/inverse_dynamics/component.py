@@ -88,7 +88,8 @@ class InverseDynamics(ReferenceFollower):
         self._roots = np.zeros(len(self._stack.velocity))
         self._rows = _rows_of(self._stack)
         self._read_gains()
-        self._settle, self._return = tags.settle, tags.follow
+        self._settle = tags.settle
+        self._return = tags.follow
         self._follow(tags.stack, self._configured, tags.stack.limits.speed_scale * robot.upper_limits.velocity)
         self._fed_rows = self._moving_rows()
         self._before_rates = np.zeros(len(self._fed))
@@ -111,9 +112,12 @@ class InverseDynamics(ReferenceFollower):
         self._demanded, self._slip = np.zeros((2, self.ground.rows.rows))
         self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
         self._standing: list[tuple[np.ndarray, np.ndarray]] = []
-        self._left, self.is_holding = 0.0, False
+        self._left = 0.0
+        self.is_holding = False
         self._watch = DynamicsWatch(robot, self.ground, self.efforts)
-        self._reason, self._fault, self._is_smooth = "", "", False
+        self._reason = ""
+        self._fault = ""
+        self._is_smooth = False
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`.
@@ -122,7 +126,8 @@ class InverseDynamics(ReferenceFollower):
             ComponentError: A gain is too large for the rate, or the horizon too short.
         """
         super().set_rate(rate)
-        robot, stack = self.model, self.tags.stack
+        robot = self.model
+        stack = self.tags.stack
         limits = stack.limits
         for name, task in stack.tasks.items():
             self._require_slow(name, task)
@@ -143,7 +148,9 @@ class InverseDynamics(ReferenceFollower):
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer gains, limits, friction and times beside what `ReferenceFollower` offers."""
-        limits, tags, ground = ("stack", "limits"), self.tags, self.ground
+        limits = ("stack", "limits")
+        tags = self.tags
+        ground = self.ground
         speeds = (
             [LiveParameter((*limits, "speed_scale"), partial(np.copyto, self._bounds.speed), self._speed_limits)]
             if tags.stack.limits.speeds
@@ -174,15 +181,20 @@ class InverseDynamics(ReferenceFollower):
         command = self.model.command
         if not self._standing:
             self._standing = [(command[gain], command[gain].copy()) for gain in GAINS if gain in command]
-        self._position[:], self._velocity[:] = self.start_position, 0.0
+        self._position[:] = self.start_position
+        self._velocity[:] = 0.0
         self._stack.update()
         self._configured.start()
         self._start_references()
         self.ground.start()
         self._watch.start()
         self._fault = ""
-        self._left, self.is_holding, self._reason, self._cycles = 0.0, False, "", 0
-        self._fed[:], self._is_smooth = 0.0, False
+        self._left = 0.0
+        self.is_holding = False
+        self._reason = ""
+        self._cycles = 0
+        self._fed[:] = 0.0
+        self._is_smooth = False
 
     def update(self) -> None:
         """Compute one cycle."""
@@ -260,7 +272,9 @@ class InverseDynamics(ReferenceFollower):
 
     def start_log(self, logger: Any) -> None:
         """Declare accelerations, torques, forces of contacts, active constraints, and what tasks demand."""
-        dofs, ground, problem = self.model.dofs, self.ground, self.problem
+        dofs = self.model.dofs
+        ground = self.ground
+        problem = self.problem
         forces = [
             f"{name}.{row}" for index, name in enumerate(ground.names) for row in range(np.diff(ground.starts)[index])
         ]
@@ -294,7 +308,8 @@ class InverseDynamics(ReferenceFollower):
 
     def _gains_of(self, name: str, tags: InverseDynamicsTags) -> np.ndarray:
         """Return the gains of a record's tasks, and those of their velocity, which may follow them; shape (2, rows)."""
-        record, configured = tags.stack.tasks[name], self._configured
+        record = tags.stack.tasks[name]
+        configured = self._configured
         self._require_slow(name, record)
         return np.stack(
             (configured.numbers(name, record, "gain"), configured.rows(name, _as_tag(_velocity_gain(record))))
@@ -310,7 +325,8 @@ class InverseDynamics(ReferenceFollower):
 
     def _speed_limits(self, tags: InverseDynamicsTags) -> np.ndarray:
         """Return the largest speeds of all DoFs, shape (n,) [rad/s, m/s]."""
-        robot, limits = self.model, tags.stack.limits
+        robot = self.model
+        limits = tags.stack.limits
         speed = limits.speed_scale * robot.upper_limits.velocity if limits.speeds else np.full(robot.size, math.inf)
         speed[: 0 if robot.kinematics.base is None else 6] = math.inf
         return speed
@@ -321,7 +337,8 @@ class InverseDynamics(ReferenceFollower):
 
     def _require_slow(self, name: str, task: DynamicTaskRecord) -> None:
         """Check that no cycle corrects more than the whole error of a task; a ComponentError if one does."""
-        gain, rate = float(np.max(_velocity_gain(task))), 1.0 / self.period
+        gain = float(np.max(_velocity_gain(task)))
+        rate = 1.0 / self.period
         if gain * self.period >= 1.0:
             key = "velocity_gain" if task.velocity_gain is not None else "gain"
             raise ComponentError(
@@ -337,11 +354,13 @@ class InverseDynamics(ReferenceFollower):
         self._settle = float(settle)
 
     def _take_times(self, tags: InverseDynamicsTags) -> None:
-        self.ground.fade, self._return = tags.fade, tags.follow
+        self.ground.fade = tags.fade
+        self._return = tags.follow
 
     def _moving_rows(self) -> tuple[tuple[slice, np.ndarray, Target | None], ...]:
         """Return rows, velocity and target of each task whose reference the configuration generates."""
-        row, found = 0, list[tuple[slice, np.ndarray, Target | None]]()
+        row = 0
+        found = list[tuple[slice, np.ndarray, Target | None]]()
         for task in self._stack.tasks:
             if isinstance(record_of(self.tags.stack, task.name).reference, ReferenceRecord):
                 found.append((slice(row, row + task.rows), task.velocity, self.targets.get(task.name)))
@@ -351,7 +370,8 @@ class InverseDynamics(ReferenceFollower):
     def _feed(self, step: float) -> None:
         """Write the accelerations of references that are generated; those of others are too rough."""
         for rows, velocity, target in self._fed_rows:
-            fed, before = self._fed[rows], self._before_rates[rows]
+            fed = self._fed[rows]
+            before = self._before_rates[rows]
             if target is not None and not target.is_generated:
                 fed[:] = 0.0
             elif self._is_smooth:
@@ -379,7 +399,9 @@ class InverseDynamics(ReferenceFollower):
 
     def _demand(self, step: float) -> None:
         """Write the accelerations that tasks and contacts demand."""
-        state, stack, ground = self.model.state, self._stack, self.ground
+        state = self.model.state
+        stack = self._stack
+        ground = self.ground
         self._bounds.update(state.position, state.velocity)
         ground.update(step)
         stack.update()
@@ -398,7 +420,8 @@ class InverseDynamics(ReferenceFollower):
 
     def _integrate(self, step: float) -> None:
         """Advance positions and velocities beside the torques, which return to the measured ones."""
-        state, share = self.model.state, step / (self._return + step)
+        state = self.model.state
+        share = step / (self._return + step)
         np.multiply(self.problem.acceleration, step, out=self._step)
         self._velocity += self._step
         np.subtract(state.velocity, self._velocity, out=self._step)
@@ -422,7 +445,8 @@ class InverseDynamics(ReferenceFollower):
         self.is_holding = is_holding
         self._before[:] = self._torque if self._cycles > 1 else self.model.state.torque
         self._left = CHANGE
-        self._position[:], self._velocity[:] = self.model.state.position, 0.0
+        self._position[:] = self.model.state.position
+        self._velocity[:] = 0.0
         if self._fault:
             self._reason = self._fault
             log.error("%s: %s; it holds until it is started again", self.name, self._reason)
@@ -435,7 +459,8 @@ class InverseDynamics(ReferenceFollower):
     def _report_now_and_then(self) -> Statuses | None:
         if self._cycles % self._between != 1:
             return None
-        problem, ground = self.problem, self.ground
+        problem = self.problem
+        ground = self.ground
         entries = [
             Entry(name, f"{float(force):.1f} N")
             for name, force in zip(ground.names, ground.normals @ problem.force, strict=True)

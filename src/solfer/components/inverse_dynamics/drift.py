@@ -19,7 +19,8 @@ class TaskDrift:
     """
 
     def __init__(self, stack: Stack):
-        self._stack, self._robot = stack, stack.robot
+        self._stack = stack
+        self._robot = stack.robot
         self.value, self._back = np.zeros((2, len(stack.jacobian)))
         self._move = np.zeros(stack.size)
         stack.update()

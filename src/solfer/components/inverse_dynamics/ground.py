@@ -51,7 +51,8 @@ class Ground:
         accelerations = [held_acceleration(contact) for contact in self.contacts.values()]
         self.rows: Handler[Acceleration] = Handler(accelerations)
         self.starts = np.cumsum([0, *(each.rows for each in accelerations)])
-        count, size = len(accelerations), int(self.starts[-1])
+        count = len(accelerations)
+        size = int(self.starts[-1])
         blocks = [_cone(name, contact, tags) for name, contact in self.contacts.items()]
         self.owners = np.repeat(np.arange(count), [len(block) for block in blocks])
         self.cones = self.cones_of(tags)

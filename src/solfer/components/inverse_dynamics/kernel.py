@@ -15,7 +15,9 @@ DEPENDENT = 1e-9
 @part
 def _write_equalities(inertia, bias, jacobian, demanded, unit, dofs, holds, rows, sides):
     """Write the rows A x = b: no torque at some DoFs, and accelerations of contacts; no force where one is lifted."""
-    size, count, count_dofs = len(bias), len(demanded), len(dofs)
+    size = len(bias)
+    count = len(demanded)
+    count_dofs = len(dofs)
     for i in range(count_dofs):
         dof = dofs[i]
         sides[i] = -bias[dof]
@@ -45,10 +47,12 @@ def _subtract(rows, sides, i, other, share):
 @part
 def _largest(row):
     """Find the column of the largest entry, and its size."""
-    column, most = 0, 0.0
+    column = 0
+    most = 0.0
     for j in range(len(row)):
         if abs(row[j]) > most:
-            column, most = j, abs(row[j])
+            column = j
+            most = abs(row[j])
     return column, most
 
 
@@ -81,7 +85,8 @@ def _eliminate(rows, sides, first, fixed, scales):
             if i < first:
                 return False
             rows[i] = 0.0
-            column, sides[i] = size + i - first, 0.0
+            column = size + i - first
+            sides[i] = 0.0
             rows[i, column] = 1.0
             for before in range(step):
                 other = (first + before) % count
@@ -122,7 +127,8 @@ def _sort(rows, fixed, free, table):
 @part
 def _reduce(row, fixed, sides, free, table, out):
     """Write a row over the first unknowns x as one over z; return its constant part."""
-    size, constant = len(row), 0.0
+    size = len(row)
+    constant = 0.0
     for j in range(len(free)):
         out[j] = row[free[j]] if free[j] < size else 0.0
     for i in range(len(fixed)):
@@ -204,7 +210,8 @@ def _build(
         return False
     _sort(rows, fixed, free, table)
     _write_cost(tasks, desired, smallest, fixed, sides, free, table, work[1, : len(free)], hessian, gradient)
-    row, place = work[2], 0
+    row = work[2]
+    place = 0
     for i in range(len(driven)):
         dof = driven[i]
         for j in range(size):
@@ -219,7 +226,8 @@ def _build(
         for j in range(count_forces):
             row[size + j] = cones[i, j]
         constant = _reduce(row[: size + count_forces], fixed, sides, free, table, matrix[place])
-        lower[place], upper[place] = -np.inf, -constant
+        lower[place] = -np.inf
+        upper[place] = -constant
         place += 1
     for i in range(len(normals)):
         for j in range(count_forces):
@@ -246,9 +254,11 @@ def _finish(z, inertia, bias, jacobian, unit, passive, fixed, sides, free, table
     size = len(bias)
     for i in range(len(free) + len(fixed)):
         if i < len(free):
-            unknown, value = free[i], z[i]
+            unknown = free[i]
+            value = z[i]
         else:
-            unknown, value = fixed[i - len(free)], sides[i - len(free)]
+            unknown = fixed[i - len(free)]
+            value = sides[i - len(free)]
             for j in range(len(free)):
                 value += table[i - len(free), j] * z[j]
         if unknown < size:
@@ -273,7 +283,9 @@ def _touch(values, least, most, slack, active):
         active[i] = 1 if values[i] >= most[i] - near or values[i] <= least[i] + near else 0
 
 
-_MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
+_MATRIX = "float64[:, ::1]"
+_VECTOR = "float64[::1]"
+_INDICES = "int64[::1]"
 
 build = cached(
     f"boolean({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, float64, {_INDICES}, boolean[::1], {_MATRIX}, {_VECTOR}, "

@@ -56,24 +56,33 @@ class WholeBodyProblem:
     """
 
     def __init__(self, robot: Robot, ground: Ground, bounds: AccelerationBounds, rows: int, torque_limits: np.ndarray):
-        size, forces = robot.size, ground.rows.rows
-        self._robot, self._ground, self._bounds = robot, ground, bounds
+        size = robot.size
+        forces = ground.rows.rows
+        self._robot = robot
+        self._ground = ground
+        self._bounds = bounds
         followers = robot.kinematics.followers.dofs
         moved = np.setdiff1d(np.arange(size), followers)
         self._driven = np.intersect1d(robot.actuated, moved).astype(np.int64)
         self._passive = np.setdiff1d(moved, robot.actuated).astype(np.int64)
         self._limits = torque_limits[self._driven]
-        fixed, free = len(self._passive) + forces, size - len(self._passive)
+        fixed = len(self._passive) + forces
+        free = size - len(self._passive)
         self._smallest = np.concatenate((np.full(size, ACCELERATION), np.full(forces, FORCE)))
-        self._rows, self._sides = np.zeros((fixed, size + forces)), np.zeros(fixed)
-        self._fixed, self._free = np.zeros(fixed, dtype=np.int64), np.zeros(free, dtype=np.int64)
-        self._table, self._work = np.zeros((fixed, free)), np.zeros((3, size + forces))
+        self._rows = np.zeros((fixed, size + forces))
+        self._sides = np.zeros(fixed)
+        self._fixed = np.zeros(fixed, dtype=np.int64)
+        self._free = np.zeros(free, dtype=np.int64)
+        self._table = np.zeros((fixed, free))
+        self._work = np.zeros((3, size + forces))
         contacts = len(ground.normals)
         first = len(self._driven) + len(ground.cones) + contacts
         self._problem = Problem.empty(free, 0, first + fixed)
         self._method = ActiveSet(free, first + fixed, TOLERANCE)
         self._z = np.zeros(free)
-        self.acceleration, self.torque, self.force = np.zeros(size), np.zeros(size), np.zeros(forces)
+        self.acceleration = np.zeros(size)
+        self.torque = np.zeros(size)
+        self.force = np.zeros(forces)
         self.names = (
             *(f"torque of {robot.dofs[dof]}" for dof in self._driven),
             *(f"friction of {ground.names[owner]}" for owner in ground.owners),
@@ -85,7 +94,8 @@ class WholeBodyProblem:
         self._least[: len(self._driven)], self._most[: len(self._driven)] = -self._limits, self._limits
         self._least[len(self._driven) : first - contacts] = -np.inf
         self._first = first
-        self.steps, self._outcome = 0, SOLVED
+        self.steps = 0
+        self._outcome = SOLVED
 
     def limit_torques(self, limits: np.ndarray) -> None:
         """Set the largest torques of all DoFs, shape (n,) [Nm, N]."""
@@ -101,8 +111,12 @@ class WholeBodyProblem:
             desired: W r, shape (rows,).
             demanded: Jc a of contacts, shape (k,).
         """
-        dynamics, ground, problem = self._robot.dynamics, self._ground, self._problem
-        inertia, bias, held = dynamics.inertia, dynamics.bias, ground.rows.jacobian
+        dynamics = self._robot.dynamics
+        ground = self._ground
+        problem = self._problem
+        inertia = dynamics.inertia
+        bias = dynamics.bias
+        held = ground.rows.jacobian
         is_sound = build(
             inertia,
             bias,
@@ -168,8 +182,11 @@ class WholeBodyProblem:
 
     def _compare(self) -> None:
         """Write what is bounded, and which bounds it touches."""
-        values, drives, ground = self._values, len(self._driven), self._ground
-        cones, first = drives + len(ground.cones), self._first
+        values = self._values
+        drives = len(self._driven)
+        ground = self._ground
+        cones = drives + len(ground.cones)
+        first = self._first
         np.take(self.torque, self._driven, out=values[:drives], mode="clip")
         np.dot(ground.cones, self.force, out=values[drives:cones])
         np.dot(ground.normals, self.force, out=values[cones:first])

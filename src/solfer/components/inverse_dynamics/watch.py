@@ -48,7 +48,8 @@ class DynamicsWatch:
         self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._springs, self._part = np.zeros((2, robot.size))
         self._sent, self._difference = np.zeros((2, robot.size))
-        self._moved, self._missing = np.zeros((count, 3)), np.zeros(count)
+        self._moved = np.zeros((count, 3))
+        self._missing = np.zeros(count)
         self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()])
         self._time = 0.0
 
@@ -57,7 +58,8 @@ class DynamicsWatch:
         for numbers in (self._sent, self._difference, self._moved, self._missing):
             numbers[:] = 0.0
         self._time = 0.0
-        state, command = self._robot.state, self._robot.command
+        state = self._robot.state
+        command = self._robot.command
         self._gains = [
             (command[gain], desired, measured)
             for gain, desired, measured in (
@@ -75,7 +77,8 @@ class DynamicsWatch:
             force: Forces of contacts that belong to them, shape (k,) [N, Nm].
             slip: Velocities of the rows that contacts hold, shape (k,) [m/s, rad/s].
         """
-        robot, ground = self._robot, self._ground
+        robot = self._robot
+        ground = self._ground
         self._time += step
         self._add_springs()
         found = watch(
@@ -112,9 +115,11 @@ class DynamicsWatch:
 
     def _text(self, found: int, forces: np.ndarray) -> str:
         """Return what has been found, by its number."""
-        size, names = self._robot.size, self._ground.names
+        size = self._robot.size
+        names = self._ground.names
         if found < size:
-            sent, gone = self._sent[found], self._sent[found] + self._difference[found]
+            sent = self._sent[found]
+            gone = self._sent[found] + self._difference[found]
             return f"joint '{self._robot.dofs[found]}' has a torque of {gone:.1f} Nm instead of {sent:.1f} Nm"
         index = found - size
         if index < len(names):
@@ -127,11 +132,13 @@ class DynamicsWatch:
 @part
 def _lost(share, torque, springs, measured, efforts, limit, sent, difference, is_calm):
     """Compare torques; return a DoF that has lost its own, or -1."""
-    found, any_measured = -1, False
+    found = -1
+    any_measured = False
     for dof in efforts:
         any_measured = any_measured or measured[dof] != 0.0
         sent[dof] += share * (torque[dof] - sent[dof])
-        least, most = min(springs[dof], 0.0), max(springs[dof], 0.0)
+        least = min(springs[dof], 0.0)
+        most = max(springs[dof], 0.0)
         away = measured[dof] - torque[dof]
         away -= min(max(away, least), most)
         difference[dof] += share * (away - difference[dof])
@@ -163,7 +170,8 @@ def _watch(
     moved,
 ):
     """See `DynamicsWatch.update`; return the number of a DoF, of a contact that slips, or of one that is absent."""
-    size, count = len(torque), len(tracked)
+    size = len(torque)
+    count = len(tracked)
     found = _lost(min(step / SMOOTHING, 1.0), torque, springs, measured, efforts, limit, sent, difference, is_calm)
     if found >= 0:
         return found
@@ -180,7 +188,8 @@ def _watch(
             way += moved[i, k] ** 2
         if math.sqrt(way) > SLIP:
             return size + i
-        pressed, computed = 0.0, 0.0
+        pressed = 0.0
+        computed = 0.0
         for k in range(3):
             pressed += wrenches[tracked[i], k] ** 2
         for k in range(len(force)):
@@ -192,7 +201,10 @@ def _watch(
     return -1
 
 
-_ROWS, _ROW, _INDICES, _FLAGS = "float64[:, ::1]", "float64[::1]", "int64[::1]", "boolean[::1]"
+_ROWS = "float64[:, ::1]"
+_ROW = "float64[::1]"
+_INDICES = "int64[::1]"
+_FLAGS = "boolean[::1]"
 watch = cached(
     f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, "
     f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",

@@ -60,7 +60,8 @@ class InverseKinematics(ReferenceFollower):
             raise ComponentError(
                 f"'{self.name}' without kinematics is closed on measurements", expected="kinematics: true"
             )
-        inner, tags = self._inner, self.tags
+        inner = self._inner
+        tags = self.tags
         self._solver = self._stack.solver(self.period, inner.command.position)
         lead = np.inf if tags.lead is None else tags.lead
         self._bounds = self._stack.bounds(self.period)
@@ -74,7 +75,8 @@ class InverseKinematics(ReferenceFollower):
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer the numbers of tasks, the joints' speeds, distances of links, and the deflection, beside references."""
-        tags, found = self.tags, [*super().live_parameters()]
+        tags = self.tags
+        found = [*super().live_parameters()]
         if tags.stack is not None:
             found += self._task_parameters(self._stack, ("gain", "weight", "damping", "correction"))
             limits = ("stack", "limits")
@@ -93,8 +95,10 @@ class InverseKinematics(ReferenceFollower):
         Raises:
             ComponentError: The way to the first value of a generated reference is too fast.
         """
-        command, inner = self.model.command, self._inner
-        command.position[:], command.velocity[:] = self.start_position, 0.0
+        command = self.model.command
+        inner = self._inner
+        command.position[:] = self.start_position
+        command.velocity[:] = 0.0
         self._set_out()
         self._integrator.start(self.start_position)
         if not self._is_measured:
@@ -131,7 +135,8 @@ class InverseKinematics(ReferenceFollower):
         """Write positions and velocities of the joints that it moves."""
         if self._is_measured:
             return
-        command, inner = self.model.command, self._inner.command
+        command = self.model.command
+        inner = self._inner.command
         command.position[self._moved] = inner.position[self._moved]
         command.velocity[self._moved] = inner.velocity[self._moved]
 
@@ -150,7 +155,8 @@ class InverseKinematics(ReferenceFollower):
 
     def _movable(self) -> np.ndarray:
         """Return the DoFs that it moves: driven joints of the chain, and the base if it belongs to it."""
-        robot, chain = self.model, self.tags.chain
+        robot = self.model
+        chain = self.tags.chain
         base = np.arange(0 if robot.kinematics.base is None else 6)
         free = np.union1d(robot.actuated, base)
         if chain is None:
@@ -191,7 +197,8 @@ class InverseKinematics(ReferenceFollower):
     def _take_deflection(self, tags: InverseKinematicsTags) -> None:
         assert self._deflection is not None
         assert tags.deflection is not None
-        self._deflection.time, self._deflection.most = tags.deflection.time_constant, tags.deflection.most
+        self._deflection.time = tags.deflection.time_constant
+        self._deflection.most = tags.deflection.most
 
     def _obstacles(self, task: Task) -> str:
         """See `ReferenceFollower._obstacles`."""
@@ -211,8 +218,10 @@ class InverseKinematics(ReferenceFollower):
 
     def _follow_model(self) -> None:
         """Bring the model to the commanded positions, and what it does not move to the measured ones."""
-        inner, measured = self._inner, self.model.state.position
-        state, command = inner.state, inner.command
+        inner = self._inner
+        measured = self.model.state.position
+        state = inner.state
+        command = inner.command
         command.position[self._others] = measured[self._others]
         state.position[:] = command.position
         if self._deflection is not None:

@@ -26,7 +26,9 @@ class Deflection:
 
     def __init__(self, size: int, base: int, time: float, most: float):
         self.value, self._change = np.zeros((2, size))
-        self._base, self.time, self.most = base, time, most
+        self._base = base
+        self.time = time
+        self.most = most
 
     def start(self, measured: np.ndarray, commanded: np.ndarray) -> None:
         """Begin with what joints stay away now; see `update`."""
@@ -42,7 +44,9 @@ class Deflection:
             commanded: Commanded ones; those of the base are written.
             passed: Time since the cycle before T [s]; the share is T / (T_d + T).
         """
-        value, change, base = self.value, self._change, self._base
+        value = self.value
+        change = self._change
+        base = self._base
         np.subtract(measured, commanded, out=change)
         change -= value
         change *= passed / (self.time + passed)

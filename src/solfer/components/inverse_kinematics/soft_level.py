@@ -34,7 +34,8 @@ class SoftLevel:
     """
 
     def __init__(self, tasks: Sequence[Task], targets: Sequence[Target], length: float):
-        self._targets, self._length = tuple(targets), length
+        self._targets = tuple(targets)
+        self._length = length
         followed = {target.task: target for target in targets}
         self._dampings = [(task, task.damping.copy(), followed.get(task)) for task in tasks]
         self._is_soft = False

@@ -88,7 +88,8 @@ class Odometry(Component):
             made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
             self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
             self._heading_twist, self._half, self._axes = np.zeros((3, 6, 6))
-            self._turn, self._deviations = np.zeros((3, 3)), np.zeros(6)
+            self._turn = np.zeros((3, 3))
+            self._deviations = np.zeros(6)
             self._variances = np.einsum("ii->i", self._covariance)
 
     def set_rate(self, rate: float) -> None:
@@ -105,7 +106,8 @@ class Odometry(Component):
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer the filters, and how wheels and ground are judged."""
-        law, rate = self.law, 1.0 / self.period
+        law = self.law
+        rate = 1.0 / self.period
         write = law.take if isinstance(law, FilteredOdometry) else lambda _: None
         return (
             *live_filter(("filter",), law.filter, lambda tags: tags.filter.low_pass(3, rate)),
@@ -149,7 +151,8 @@ class Odometry(Component):
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive `<name>/set_pose`; publish `<name>/pose` with its covariance, diagnostics and, by a tag, tf."""
-        interface, known = "geometry_msgs/PoseWithCovarianceStamped", isinstance(self.law, FilteredOdometry)
+        interface = "geometry_msgs/PoseWithCovarianceStamped"
+        known = isinstance(self.law, FilteredOdometry)
         made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, self.set_pose)]
         if known:
             made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._state_now_and_then))
@@ -167,7 +170,8 @@ class Odometry(Component):
 
     def start_log(self, logger: Any) -> None:
         """Declare the base and, of the method `filter`, its deviations, and innovation and state of each wheel."""
-        axes, places = BASE_DOFS, [f"{wheel}.{axis}" for wheel in self._wheels.names for axis in "xyz"]
+        axes = BASE_DOFS
+        places = [f"{wheel}.{axis}" for wheel in self._wheels.names for axis in "xyz"]
         logger.add("base", self._pose, axes, ("m",) * 3 + ("rad",) * 3, FRAME)
         logger.add("base_rates", self._rates, axes, ("m/s",) * 3 + ("rad/s",) * 3, FRAME)
         if isinstance(self.law, FilteredOdometry):
@@ -194,7 +198,9 @@ class Odometry(Component):
 
     def wheel_states(self) -> Statuses:
         """Return what each wheel does, with the probability that it rolls."""
-        law, entries, slips = self.law, [], False
+        law = self.law
+        entries = []
+        slips = False
         assert isinstance(law, FilteredOdometry)
         for index, wheel in enumerate(self._wheels.names):
             rolls = law.consensus.inliers[index]
@@ -256,8 +262,11 @@ class Odometry(Component):
 
     def _write(self) -> None:
         """Write where the base is now into the measured State; its angles go on without jumps by whole turns."""
-        law, state, ahead = self.law, self.model.state, self.streams.ahead
-        linear, angular = about_vertical(law.velocity, law.heading), about_vertical(law.angular, law.heading)
+        law = self.law
+        state = self.model.state
+        ahead = self.streams.ahead
+        linear = about_vertical(law.velocity, law.heading)
+        angular = about_vertical(law.angular, law.heading)
         turn = law.heading - self._base.heading
         turned = self.streams.turned_since() if ahead else None
         if turned is None:

@@ -24,9 +24,13 @@ def fit_twist(speeds, arms, weights, rate, weight):
         y0 += weights[i] * arms[i, 1]
         u0 += weights[i] * speeds[i, 0]
         v0 += weights[i] * speeds[i, 1]
-    x0, y0, u0, v0 = x0 / total, y0 / total, u0 / total, v0 / total
+    x0 = x0 / total
+    y0 = y0 / total
+    u0 = u0 / total
+    v0 = v0 / total
     for i in range(len(speeds)):
-        x, y = arms[i, 0] - x0, arms[i, 1] - y0
+        x = arms[i, 0] - x0
+        y = arms[i, 1] - y0
         across += weights[i] * (x * (speeds[i, 1] - v0) - y * (speeds[i, 0] - u0))
         spread += weights[i] * (x * x + y * y)
     turn = (across + weight * rate) / max(spread + weight, 1e-12)
@@ -36,7 +40,9 @@ def fit_twist(speeds, arms, weights, rate, weight):
 @part
 def write_distances(speeds, arms, twist, distances):
     """Write the squared distance of each wheel from a twist [m^2/s^2]."""
-    x, y, turn = twist[0], twist[1], twist[2]
+    x = twist[0]
+    y = twist[1]
+    turn = twist[2]
     for i in range(len(speeds)):
         u = speeds[i, 0] - x + turn * arms[i, 1]
         v = speeds[i, 1] - y - turn * arms[i, 0]
@@ -149,7 +155,10 @@ def _turn(ways, arms, weights):
     return turn, spread
 
 
-_F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
+_F = "float64"
+_V = "float64[::1]"
+_M = "float64[:, ::1]"
+_B = "boolean[::1]"
 
 estimate = cached(f"float64({_M}, {_M}, {_B}, {_F}, {_F}, {_F}, {_F}, {_M}, {_V}, {_V}, {_V})", _estimate)
 reject = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_F}, {_M}, {_B}, {_V})", _reject)

@@ -11,10 +11,12 @@ SILENT = 1e-6
 def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
     """Write arms and Jacobians in axes that are turned about the vertical, without the six columns of a base."""
     for i in range(len(places)):
-        x, y = places[i, 0] - origin[0], places[i, 1] - origin[1]
+        x = places[i, 0] - origin[0]
+        y = places[i, 1] - origin[1]
         arms[i, 0], arms[i, 1], arms[i, 2] = cosine * x + sine * y, cosine * y - sine * x, places[i, 2] - origin[2]
         for k in range(turned.shape[1]):
-            x, y = jacobian[3 * i, 6 + k], jacobian[3 * i + 1, 6 + k]
+            x = jacobian[3 * i, 6 + k]
+            y = jacobian[3 * i + 1, 6 + k]
             turned[3 * i, k], turned[3 * i + 1, k] = cosine * x + sine * y, cosine * y - sine * x
             turned[3 * i + 2, k] = jacobian[3 * i + 2, 6 + k]
 
@@ -25,16 +27,20 @@ def _subtract_tilt(arms, jacobian, x, y):
         a, b, c = arms[i]
         arms[i, 0], arms[i, 1], arms[i, 2] = a - y * c, b + x * c, c + y * a - x * b
         for k in range(jacobian.shape[1]):
-            a, b, c = jacobian[3 * i, k], jacobian[3 * i + 1, k], jacobian[3 * i + 2, k]
+            a = jacobian[3 * i, k]
+            b = jacobian[3 * i + 1, k]
+            c = jacobian[3 * i + 2, k]
             jacobian[3 * i, k], jacobian[3 * i + 1, k], jacobian[3 * i + 2, k] = a - y * c, b + x * c, c + y * a - x * b
 
 
 @part
 def turn_about_vertical(rotation, angle, out):
     """Write a rotation that is turned about the vertical by an angle [rad]."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     for k in range(3):
-        x, y = rotation[0, k], rotation[1, k]
+        x = rotation[0, k]
+        y = rotation[1, k]
         out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
 
 
@@ -75,7 +81,8 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
 
 def _measure_ways(jacobian, before, arms, arms_before, step, turned, weights, ways, mean, arm, tilting):
     """Write the ways that wheels measure, with mean Jacobians and arms, and the way of the ground point by tilting."""
-    px, py = turned[0], turned[1]
+    px = turned[0]
+    py = turned[1]
     total = 0.0
     arm[:] = 0.0
     for i in range(len(arms)):
@@ -138,10 +145,14 @@ def fit_plane(weights, arms, without, slope):
             x0 += arms[i, 0]
             y0 += arms[i, 1]
             z0 += arms[i, 2]
-    x0, y0, z0 = x0 / total, y0 / total, z0 / total
+    x0 = x0 / total
+    y0 = y0 / total
+    z0 = z0 / total
     for i in range(len(arms)):
         if weights[i] > 0.0 and i != without:
-            x, y, z = arms[i, 0] - x0, arms[i, 1] - y0, arms[i, 2] - z0
+            x = arms[i, 0] - x0
+            y = arms[i, 1] - y0
+            z = arms[i, 2] - z0
             xx += x * x
             xy += x * y
             yy += y * y
@@ -186,8 +197,11 @@ def _find_lifted(ways, arms, turn, turned, weights, trusted, normal, clearance, 
     A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
     smaller one counts. How high a wheel is that was lifted is known by its place: no sum of ways would stay right.
     """
-    px, py = turned[0], turned[1]
-    x, y, z = normal[0], normal[1], normal[2]
+    px = turned[0]
+    py = turned[1]
+    x = normal[0]
+    y = normal[1]
+    z = normal[2]
     total = mean_tilting = mean_way = 0.0
     for i in range(len(rise)):
         total += trusted[i]
@@ -243,12 +257,16 @@ def _turned(rotation, known, heading, out):
         return False
     sine = math.sqrt(x * x + y * y + z * z)
     factor = math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-12 else 1.0
-    a, b = factor * math.cos(heading), factor * math.sin(heading)
+    a = factor * math.cos(heading)
+    b = factor * math.sin(heading)
     out[0], out[1], out[2] = a * x + b * y, a * y - b * x, factor * z
     return True
 
 
-_F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
+_F = "float64"
+_V = "float64[::1]"
+_M = "float64[:, ::1]"
+_B = "boolean[::1]"
 
 turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)

@@ -45,14 +45,19 @@ class GeometricOdometry:
             raise ComponentError(
                 f"one wheel of '{robot.name}' measures no turn", expected="two, or the method `filter`"
             )
-        self._robot, self._base, self._radii = robot, base, wheels.radii
-        self._links, self._state = wheels.links, robot.state
+        self._robot = robot
+        self._base = base
+        self._radii = wheels.radii
+        self._links = wheels.links
+        self._state = robot.state
         self._dofs = np.array([robot.kinematics.attachment(link).columns[-1] for link in wheels.links])
         self._pairs = list(itertools.combinations(range(len(wheels)), 2))
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.candidates, self._places, self._centers = np.zeros((3, len(wheels), 3))
         self.heading = self._turn = self._rate = 0.0
-        self._known, self._rates, self._before = np.eye(3), np.zeros(6), np.zeros(len(wheels))
+        self._known = np.eye(3)
+        self._rates = np.zeros(6)
+        self._before = np.zeros(len(wheels))
         self._measured = np.zeros(3)
         self.filter: LowPass | None = None
         self.smoothing: LowPass | None = None
@@ -60,7 +65,8 @@ class GeometricOdometry:
     def start(self) -> None:
         """Begin at the origin, with the heading of the IMU."""
         self._base.start()
-        self.position[:], self._rate = 0.0, 0.0
+        self.position[:] = 0.0
+        self._rate = 0.0
         self._turn = twist(self._base.rotation)
         self._known = self._base.rotation
         for low_pass in (self.filter, self.smoothing):
@@ -127,7 +133,8 @@ class GeometricOdometry:
                 self.filter.step(turned)
             self._measured = turned
         tilting = self._measured * (1.0, 1.0, 0.0)
-        axis, rows = self._tilted[:, 2], []
+        axis = self._tilted[:, 2]
+        rows = []
         for center, moving, radius in zip(self._centers, self._moving, self._radii, strict=True):
             rolled = cross(tilting + moving[3:], radius * NORMAL)
             rows.append((cross(axis, center), rolled - cross(tilting, center) - moving[:3]))

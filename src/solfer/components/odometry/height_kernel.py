@@ -53,12 +53,16 @@ def find_track(tracks, heads, wheel, x, y, followed):
 @part
 def height_on_track(tracks, heads, wheel, x, y, slope, followed):
     """Interpolate the height of the track that a wheel follows [m]; NaN where it has left it."""
-    track, sample, size = followed[wheel, 0], followed[wheel, 1], tracks.shape[1]
+    track = followed[wheel, 0]
+    sample = followed[wheel, 1]
+    size = tracks.shape[1]
     for _ in range(size):
         if track < 0 or sample < max(0, heads[track] - size) or sample + 1 >= heads[track]:
             break
-        one, other = tracks[track, sample % size], tracks[track, (sample + 1) % size]
-        along, across = other[0] - one[0], other[1] - one[1]
+        one = tracks[track, sample % size]
+        other = tracks[track, (sample + 1) % size]
+        along = other[0] - one[0]
+        across = other[1] - one[1]
         square = along * along + across * across
         if square > BESIDE * BESIDE or square == 0.0:
             break
@@ -66,7 +70,8 @@ def height_on_track(tracks, heads, wheel, x, y, slope, followed):
         if share < 0.0 or share > 1.0:
             sample += 1 if share > 1.0 else -1
             continue
-        off_x, off_y = x - one[0] - share * along, y - one[1] - share * across
+        off_x = x - one[0] - share * along
+        off_y = y - one[1] - share * across
         if off_x * off_x + off_y * off_y > BESIDE * BESIDE:
             break
         followed[wheel, 1] = sample
@@ -78,7 +83,8 @@ def height_on_track(tracks, heads, wheel, x, y, slope, followed):
 @part
 def leads(arm, x, y, velocity, turn, before):
     """Return whether a wheel leads the others, 1, or follows them, -1; `before` while it stands."""
-    u, v = velocity[0] - turn * arm[1], velocity[1] + turn * arm[0]
+    u = velocity[0] - turn * arm[1]
+    v = velocity[1] + turn * arm[0]
     length = math.sqrt((u * u + v * v) * (x * x + y * y))
     if u * u + v * v > STILL * STILL and length > 0.0:
         return (u * x + v * y) / length
@@ -90,21 +96,25 @@ def _missing_height(
     places,
 ):  # fmt: skip
     """Write the lowest points of the wheels as `places`; return how far the base is below the map [m], NaN: unknown."""
-    cosine, sine, count = math.cos(heading), math.sin(heading), len(arms)
+    cosine = math.cos(heading)
+    sine = math.sin(heading)
+    count = len(arms)
     x0 = y0 = total = 0.0
     for i in range(count):
         if weights[i] > 0.0:
             total += 1.0
             x0 += arms[i, 0]
             y0 += arms[i, 1]
-    x0, y0 = x0 / total, y0 / total
+    x0 = x0 / total
+    y0 = y0 / total
     slope = (
         (-cosine * normal[0] + sine * normal[1]) / normal[2],
         (-sine * normal[0] - cosine * normal[1]) / normal[2],
     )
     missing = weight = 0.0
     for i in range(count):
-        x, y = arms[i, 0] + radii[i] * normal[0], arms[i, 1] + radii[i] * normal[1]
+        x = arms[i, 0] + radii[i] * normal[0]
+        y = arms[i, 1] + radii[i] * normal[1]
         places[i, 0] = position[0] + cosine * x - sine * y
         places[i, 1] = position[1] + sine * x + cosine * y
         places[i, 2] = position[2] + arms[i, 2] + radii[i] * (normal[2] - 1.0)
@@ -131,13 +141,15 @@ def _missing_height(
 @part
 def end_floor(tracks, heads, risen, wheel):
     """Give the newest samples the heights that were measured: the floor has ended there already."""
-    size, later = tracks.shape[1], math.inf
+    size = tracks.shape[1]
+    later = math.inf
     for sample in range(heads[wheel] - 1, max(0, heads[wheel] - size) - 1, -1):
         off = risen[wheel, sample % size]
         if abs(off) < SMALL or abs(off) > later:
             break
         tracks[wheel, sample % size, 2] += off
-        risen[wheel, sample % size], later = 0.0, abs(off)
+        risen[wheel, sample % size] = 0.0
+        later = abs(off)
 
 
 def _note(places, raised, weights, floor, tracks, risen, heads):
@@ -145,14 +157,24 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
 
     Returns whether all wheels that touch are on the floor.
     """
-    count, size, on_floor, touching = len(places), tracks.shape[1], 0, 0
-    lowest, highest, mean, way = 1e9, -1e9, 0.0, 0.0
+    count = len(places)
+    size = tracks.shape[1]
+    on_floor = 0
+    touching = 0
+    lowest = 1e9
+    highest = -1e9
+    mean = 0.0
+    way = 0.0
     for i in range(count):
         if weights[i] <= 0.0:
             continue
-        x, y, z = places[i, 0], places[i, 1], places[i, 2] + raised
+        x = places[i, 0]
+        y = places[i, 1]
+        z = places[i, 2] + raised
         touching += 1
-        lowest, highest, mean = min(lowest, z), max(highest, z), mean + z
+        lowest = min(lowest, z)
+        highest = max(highest, z)
+        mean = mean + z
         level = not math.isnan(floor[0]) and abs(z - floor[0]) <= TOLERANCE
         on_floor += level
         square = SPACING * SPACING if heads[i] == 0 else squared_distance(tracks, i, heads[i] - 1, x, y)
@@ -168,7 +190,8 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
         heads[i] += 1
     if not math.isnan(floor[0]):
         if on_floor == 0:
-            floor[0], floor[1] = math.nan, 0.0
+            floor[0] = math.nan
+            floor[1] = 0.0
     elif touching < 3 or highest - lowest > UNEVEN:
         floor[1] = 0.0
     else:
@@ -178,8 +201,12 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
     return on_floor > 0 and on_floor == touching
 
 
-_V, _M, _F, _I = "float64[::1]", "float64[:, ::1]", "float64", "int64[:, ::1]"
-_T, _N = "float64[:, :, ::1]", "int64[::1]"
+_V = "float64[::1]"
+_M = "float64[:, ::1]"
+_F = "float64"
+_I = "int64[:, ::1]"
+_T = "float64[:, :, ::1]"
+_N = "int64[::1]"
 
 missing_height = cached(
     f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, {_I}, {_V}, {_M})",

@@ -192,7 +192,8 @@ class WheelInertialFilter:
         """
         if not self._tilt:
             return
-        cosine, sine = math.cos(turn), math.sin(turn)
+        cosine = math.cos(turn)
+        sine = math.sin(turn)
         a, b = self.tilt.tolist()
         self.tilt[0] = cosine * a + sine * b + x
         self.tilt[1] = cosine * b - sine * a + y

@@ -4,7 +4,10 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
-POSITION, HEADING, VELOCITY, GYRO_BIAS = 0, 3, 4, 7
+POSITION = 0
+HEADING = 3
+VELOCITY = 4
+GYRO_BIAS = 7
 GYRO_NOISE, SCRUB, TILT, SLOPE, RADIUS = 10, 11, 12, 14, 16
 """First index of each part of the state."""
 
@@ -27,7 +30,8 @@ def set_identity(transition):
 @part
 def set_rotation(transition, first, angle):
     """Write the block of two numbers whose axes turn about the vertical by an angle [rad]."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     transition[first, first] = cosine
     transition[first, first + 1] = sine
     transition[first + 1, first] = -sine
@@ -37,7 +41,8 @@ def set_rotation(transition, first, angle):
 @part
 def tilt_moves(arm, heading, axis, out):
     """Write how far the ground point goes in the world for a small turn about an axis (0 or 1) of H: R (e x arm)."""
-    cosine, sine = math.cos(heading), math.sin(heading)
+    cosine = math.cos(heading)
+    sine = math.sin(heading)
     x, y = (0.0, -arm[2]) if axis == 0 else (arm[2], 0.0)
     out[0] = cosine * x - sine * y
     out[1] = sine * x + cosine * y
@@ -73,8 +78,10 @@ def set_process(transition, axes, arm, heading, turn, tilt_turn, imu_time, scrub
 @part
 def set_pose_process(transition, axis, heading, velocity, period, imu_time):
     """Write the Jacobian of p += R(heading) v T and heading += (u - b - n) s; a tilt that errs leads uphill."""
-    cosine, sine = math.cos(heading), math.sin(heading)
-    x, y = velocity[0], velocity[1]
+    cosine = math.cos(heading)
+    sine = math.sin(heading)
+    x = velocity[0]
+    y = velocity[1]
     set_identity(transition)
     transition[POSITION, HEADING] = -(sine * x + cosine * y) * period
     transition[POSITION + 1, HEADING] = (cosine * x - sine * y) * period
@@ -255,7 +262,8 @@ def _predict(covariance, state, axes, arm, heading, angles, imu_time, keeps, var
                 for column in range(3):
                     noise[POSITION + row, POSITION + column] += variances[3] * moves[row] * moves[column]
     for first in (VELOCITY, SLOPE):
-        a, b = state[first], state[first + 1]
+        a = state[first]
+        b = state[first + 1]
         state[first] = transition[first, first] * a + transition[first, first + 1] * b
         state[first + 1] = transition[first + 1, first] * a + transition[first + 1, first + 1] * b
     state[SCRUB] *= scrub_keep
@@ -334,7 +342,8 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
     The angular velocity errs by the gyroscope's variance `white` and by its biases, and the base's origin moves by that
     and by the arm.
     """
-    cosine, sine = math.cos(heading), math.sin(heading)
+    cosine = math.cos(heading)
+    sine = math.sin(heading)
     pose[:] = 0.0
     twist[:] = 0.0
     for i in range(HEADING + 1):
@@ -342,10 +351,13 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
         for j in range(HEADING + 1):
             pose[a, j if j < 3 else 5] = errors[i, j]
         # the tilt's error is subtracted
-        x, y = -errors[i, TILT], -errors[i, TILT + 1]
+        x = -errors[i, TILT]
+        y = -errors[i, TILT + 1]
         pose[a, 3], pose[a, 4] = cosine * x - sine * y, sine * x + cosine * y
         pose[3, a], pose[4, a] = pose[a, 3], pose[a, 4]
-    xx, xy, yy = errors[TILT, TILT], errors[TILT, TILT + 1], errors[TILT + 1, TILT + 1]
+    xx = errors[TILT, TILT]
+    xy = errors[TILT, TILT + 1]
+    yy = errors[TILT + 1, TILT + 1]
     pose[3, 3] = cosine * cosine * xx - 2.0 * cosine * sine * xy + sine * sine * yy
     pose[4, 4] = sine * sine * xx + 2.0 * cosine * sine * xy + cosine * cosine * yy
     pose[3, 4] = cosine * sine * (xx - yy) + (cosine * cosine - sine * sine) * xy
@@ -354,7 +366,9 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
         twist[3 + axis, 3 + axis] = errors[GYRO_BIAS + axis, GYRO_BIAS + axis] + white
     twist[3, 4] = errors[GYRO_BIAS, GYRO_BIAS + 1]
     twist[4, 3] = twist[3, 4]
-    xx, xy, yy = twist[3, 3], twist[3, 4], twist[4, 4]
+    xx = twist[3, 3]
+    xy = twist[3, 4]
+    yy = twist[4, 4]
     for i in range(3):
         a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
         for j in range(3):
@@ -362,7 +376,11 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
             twist[i, j] = errors[VELOCITY + i, VELOCITY + j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
 
 
-_F, _V, _M, _T, _B = "float64", "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]", "boolean[::1]"
+_F = "float64"
+_V = "float64[::1]"
+_M = "float64[:, ::1]"
+_T = "float64[:, :, ::1]"
+_B = "boolean[::1]"
 _PAIR = "UniTuple(float64, 2)"
 
 predict = cached(

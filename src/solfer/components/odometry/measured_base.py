@@ -67,7 +67,8 @@ class MeasuredBase:
 
     def subtract_tilt(self, x: float, y: float) -> None:
         """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn lacks it."""
-        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        cosine = math.cos(self.heading)
+        sine = math.sin(self.heading)
         x, y = cosine * x - sine * y, sine * x + cosine * y
         half = 0.5 * math.hypot(x, y)
         share = 0.5 * math.sin(half) / half if half else 0.5
@@ -86,6 +87,7 @@ def rotation_vector(rotation: np.ndarray) -> np.ndarray:
 
 def about_vertical(vector: np.ndarray, angle: float) -> np.ndarray:
     """Turn a vector about the vertical by an angle [rad], shape (3,); a new array."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     x, y, z = vector.tolist()
     return np.array((cosine * x - sine * y, sine * x + cosine * y, z))

@@ -19,7 +19,9 @@ class SortedSamples:
     """
 
     def __init__(self, capacity: int, width: int):
-        self.count, self.stamps, self.rows = 0, np.zeros(capacity), np.zeros((capacity, width))
+        self.count = 0
+        self.stamps = np.zeros(capacity)
+        self.rows = np.zeros((capacity, width))
 
     @property
     def newest(self) -> float:
@@ -28,8 +30,10 @@ class SortedSamples:
 
     def insert(self, stamp: float) -> int:
         """Make room for a sample; return its row, or -1 where there is one with that stamp, or it is too old."""
-        stamps, rows = self.stamps, self.rows
-        row, is_full = self.count, self.count == len(stamps)
+        stamps = self.stamps
+        rows = self.rows
+        row = self.count
+        is_full = self.count == len(stamps)
         while row and stamps[row - 1] > stamp:
             row -= 1
         if row == 0 and is_full or row and stamps[row - 1] == stamp:

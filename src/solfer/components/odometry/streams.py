@@ -50,7 +50,9 @@ class Streams:
     """
 
     def __init__(self, robot: Robot, offset: float = 0.0):
-        self._robot, self._state, self._offset = robot, robot.state, offset
+        self._robot = robot
+        self._state = robot.state
+        self._offset = offset
         self._chart = robot.kinematics.base or BaseChart()
         self._joints: SensorHistory | None = None
         self._imu: SensorHistory | None = None
@@ -108,7 +110,9 @@ class Streams:
         """Write the next measurement into the State; return whether there was one."""
         if self._joints is None or self._imu is None:
             return self._next_of_cycle()
-        waiting, samples, state = self._waiting, self._samples, self._state
+        waiting = self._waiting
+        samples = self._samples
+        state = self._state
         while waiting.count and self._is_frozen(waiting.rows[0]):
             waiting.drop(1)
         if not waiting.count:
@@ -135,7 +139,8 @@ class Streams:
 
     def turned_since(self) -> np.ndarray | None:
         """Return how the base has turned since the last measurement, in its axes, shape (3, 3); None: not known."""
-        samples, base = self._samples, self._base
+        samples = self._samples
+        base = self._base
         if self._measured_at != self._time or not samples.newest > self._time:
             return None
         base[3:] = self._angles
@@ -172,7 +177,8 @@ class Streams:
 
     def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
-        waiting, samples = self._waiting, self._samples
+        waiting = self._waiting
+        samples = self._samples
         begin = -math.inf if math.isnan(self._begin) else self._begin
         after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
         self.joint_stamps.begin_cycle()
@@ -195,12 +201,14 @@ class Streams:
         Returns:
             Whether a sample of the IMU is at that time, or samples are on both sides of it.
         """
-        samples, state = self._samples, self._state
+        samples = self._samples
+        state = self._state
         after = int(np.searchsorted(samples.stamps[: samples.count], time))
         before = after if samples.stamps[after] == time else after - 1
         if before < 0:
             return False
-        first, second = samples.rows[before], samples.rows[after]
+        first = samples.rows[before]
+        second = samples.rows[after]
         span = float(samples.stamps[after] - samples.stamps[before])
         share = (time - float(samples.stamps[before])) / span if span else 0.0
         self._angles_before[:] = self._angles
@@ -225,7 +233,8 @@ class Streams:
     def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
         """Return the integral of the rates at a share of the time from one sample to the next, shape (3,) [rad]."""
         samples = self._samples
-        first, second = samples.rows[before], samples.rows[after]
+        first = samples.rows[before]
+        second = samples.rows[after]
         span = samples.stamps[after] - samples.stamps[before]
         if span > LAG:  # too long for rates: angles do not drift in it
             turn = second[ANGLES] - first[ANGLES]
@@ -243,7 +252,8 @@ class SensorHistory:
 
     def __init__(self, history: History, first: int):
         places = history.dofs - first
-        self.history, self._places = history, (places, len(places) + places)
+        self.history = history
+        self._places = (places, len(places) + places)
         self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
 
     @classmethod

@@ -72,9 +72,13 @@ class Wheels:
         self.jacobian = np.zeros((3 * count, self.joints))
         self.legs = np.ones(self.joints, dtype=bool)
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
-        self._link, self._origin = robot.kinematics.base_link or "", np.zeros(3)
-        self.normal, self.is_level, self._forces = np.array((0.0, 0.0, 1.0)), True, np.zeros(count)
-        self.position, self.velocity = robot.state.position[6:], robot.state.velocity[6:]
+        self._link = robot.kinematics.base_link or ""
+        self._origin = np.zeros(3)
+        self.normal = np.array((0.0, 0.0, 1.0))
+        self.is_level = True
+        self._forces = np.zeros(count)
+        self.position = robot.state.position[6:]
+        self.velocity = robot.state.velocity[6:]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -83,13 +87,15 @@ class Wheels:
         """Set the normal of the ground, any length."""
         length = math.sqrt(x * x + y * y + z * z)
         self.normal[:] = x / length, y / length, z / length
-        was_level, self.is_level = self.is_level, bool(self.normal[2] >= LEVEL)
+        was_level = self.is_level
+        self.is_level = bool(self.normal[2] >= LEVEL)
         if self.is_level and not was_level:
             self._tilt(self.normal)
 
     def update(self, heading: float) -> None:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
-        cosine, sine = math.cos(heading), math.sin(heading)
+        cosine = math.cos(heading)
+        sine = math.sin(heading)
         if not self.is_level:
             x, y, z = self.normal.tolist()
             self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))

@@ -98,27 +98,32 @@ class SupportShaping(WheeledMotion):
                 expected="one for each wheel",
             )
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
-        self._links, self._base_link = wheels, str(robot.kinematics.base_link)
+        self._links = wheels
+        self._base_link = str(robot.kinematics.base_link)
         self.polygon = FootprintGeometry(count)
         self._limits = (*margins.tolist(), *workspaces.tolist())
-        gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
+        gains = (tags.margin_gain, tags.workspace_gain)
+        holds = tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
         )
         self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
         self.program = self._make_program() if tags.is_original else None
         self._ends = tuple(zip(self._hips, wheels, strict=True))
-        self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
+        self._asked = np.zeros((count, 3))
+        self._asked_turn = 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
         self._left = 0
-        self._share, self._reaction = np.ones(1), np.zeros(2)
+        self._share = np.ones(1)
+        self._reaction = np.zeros(2)
         self._weight = robot.kinematics.mass * float(np.linalg.norm(robot.gravity))
         self._names: tuple[str, ...] = ()
         self._keys: dict[str, str] = {}
         self._has_paced = self._is_paced
 
     def _make_program(self) -> JointProgram:
-        robot, tags = self.model, self.tags
+        robot = self.model
+        tags = self.tags
         self.dynamics = True
         robot.dynamics.subscribe(BIAS)
         axles = self._offsets.axes
@@ -128,8 +133,10 @@ class SupportShaping(WheeledMotion):
         ]
         wheels = tuple(wheel.end_frame for wheel in self._wheels)
         program = JointProgram(robot, tags, wheels, axles, radii, self.moved)
-        self._world, self._before_camber = WorldVertices(len(wheels), robot.size), np.zeros((len(wheels), robot.size))
-        self._before_steering, self._aims = np.zeros((len(wheels), robot.size)), np.zeros(len(wheels))
+        self._world = WorldVertices(len(wheels), robot.size)
+        self._before_camber = np.zeros((len(wheels), robot.size))
+        self._before_steering = np.zeros((len(wheels), robot.size))
+        self._aims = np.zeros(len(wheels))
         self._loads = np.zeros(robot.size)
         return program
 
@@ -202,7 +209,8 @@ class SupportShaping(WheeledMotion):
     def _take_over(self, gap: float) -> None:
         """Write what others want to the references, as far as the limits allow."""
         super()._take_over(gap)
-        references, governor = self.references, self.governor
+        references = self.references
+        governor = self.governor
         self._asked[:], self._asked_base[:] = references.vertex_velocity, references.velocity
         self._asked_turn = float(references.turn[2])
         self._measure()
@@ -227,16 +235,20 @@ class SupportShaping(WheeledMotion):
 
     def _measure(self) -> None:
         """Compute the polygon of this cycle, seen from the heading of the base, at its place."""
-        kinematics, offsets = self.model.kinematics, self._offsets
-        vertices, heading = offsets.states, offsets.heading
+        kinematics = self.model.kinematics
+        offsets = self._offsets
+        vertices = offsets.states
+        heading = offsets.heading
         px, py, _ = kinematics.position(self._base_link).tolist()
-        cos, sin = math.cos(heading), math.sin(heading)
+        cos = math.cos(heading)
+        sin = math.sin(heading)
         x, y, _ = self._balance().tolist()
         self.polygon.update(vertices.tolist(), (cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)))
         legs = []
         for hip, wheel in self._ends:
             (hx, hy, hz), (wx, wy, wz) = kinematics.position(hip).tolist(), kinematics.position(wheel).tolist()
-            x, y = hx - wx, hy - wy
+            x = hx - wx
+            y = hy - wy
             legs.append((cos * x + sin * y, cos * y - sin * x, hz - wz))
         self.polygon.measure_legs(legs)
 
@@ -251,14 +263,18 @@ class SupportShaping(WheeledMotion):
 
     def _react(self) -> None:
         """Move the references with the velocity that brings the polygon under the robot."""
-        robot, offsets, references = self.model, self._offsets, self.references
+        robot = self.model
+        offsets = self._offsets
+        references = self.references
         center = robot.center_of_mass
         np.dot(center.jacobian, robot.state.velocity, out=self._rate_of_center)
         (x, y, z), (px, py, _) = center.value.tolist(), robot.kinematics.position(self._base_link).tolist()
         vx, vy, _ = self._rate_of_center.tolist()
         ground = float(offsets.states[:, 2].min())
-        cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
-        dx, dy = x - px, y - py
+        cos = math.cos(offsets.heading)
+        sin = math.sin(offsets.heading)
+        dx = x - px
+        dy = y - py
         seen = cos * dx + sin * dy, cos * dy - sin * dx, z - ground
         rate = cos * vx + sin * vy, cos * vy - sin * vx
         ux, uy = self.reaction.update(offsets.states.tolist(), seen, rate, self.time_step)
@@ -279,7 +295,8 @@ class SupportShaping(WheeledMotion):
             self._error[self._rows[STEERING]] *= QUICKER
 
     def _warn(self) -> None:
-        governor, tags = self.governor, self.tags
+        governor = self.governor
+        tags = self.tags
         for name, reserve, is_lost in zip(
             self._names, governor.reserves.tolist(), governor.infeasible.tolist(), strict=False
         ):
@@ -310,7 +327,8 @@ class SupportShaping(WheeledMotion):
 
     def margins(self) -> SupportMargins:
         """Return what is published of the newest cycle."""
-        governor, names = self.governor, np.array(self._names)
+        governor = self.governor
+        names = np.array(self._names)
         return SupportMargins(
             self._names,
             self._limits,
@@ -347,7 +365,10 @@ class SupportShaping(WheeledMotion):
 
     def _update_program(self, program: JointProgram) -> None:
         """Compute one cycle as the original does."""
-        references, stack, rows, robot = self.references, self.stack, self._rows, self.model
+        references = self.references
+        stack = self.stack
+        rows = self._rows
+        robot = self.model
         super()._take_over(self._set_step(self.time_step))
         references.step(self.time_step)
         stack.update()

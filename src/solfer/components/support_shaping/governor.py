@@ -63,26 +63,32 @@ class SupportGovernor:
     ):
         count = len(margins)
         self.limits = np.array((margins, workspaces))
-        self.speed, self._least = speed, 0.0 if holds else SLOWEST
+        self.speed = speed
+        self._least = 0.0 if holds else SLOWEST
         self.velocities = np.zeros((count, 2))
         self.reserves, self._demand, self._reached, self._missed = np.zeros((4, 2 * count))
         self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
         self._solver = QpSolver(4 * count, 0, 2 * count)
-        problem, size = self._solver.problem, 2 * count
+        problem = self._solver.problem
+        size = 2 * count
         problem.hessian[np.arange(size), np.arange(size)] = 1.0
         self.tune(gains, horizon, recovery)
         problem.inequality_matrix[:, size:] = np.eye(2 * count)
         problem.least[size:] = 0.0
         self._rows = problem.inequality_matrix[:, :size]
         own = np.arange(count)[:, None]
-        self._edges, self._wheels, self._own = own, count + own, 2 * own + (0, 1)
+        self._edges = own
+        self._wheels = count + own
+        self._own = 2 * own + (0, 1)
         self._order: list[tuple[int, int]] | None = None
-        self._desired, self._period = np.zeros(size), 0.0
+        self._desired = np.zeros(size)
+        self._period = 0.0
         self.start()
 
     def tune(self, gains: Sequence[float], horizon: float, recovery: float) -> None:
         """Set the weights, the horizon and the speed of the way back, see above."""
-        self._rate, self._recovery = 1.0 / horizon, recovery
+        self._rate = 1.0 / horizon
+        self._recovery = recovery
         slacks = np.arange(2 * self.limits.shape[1], 4 * self.limits.shape[1])
         self._solver.problem.hessian[slacks, slacks] = np.repeat(gains, self.limits.shape[1])
 
@@ -93,7 +99,9 @@ class SupportGovernor:
     def start(self) -> None:
         """Begin with the whole motion."""
         self.share = 1.0
-        self.active[:], self.infeasible[:], self._missed[:] = False, False, 0.0
+        self.active[:] = False
+        self.infeasible[:] = False
+        self._missed[:] = 0.0
 
     def update(self, polygon: FootprintGeometry, desired: np.ndarray) -> None:
         """Compute the velocities of this cycle.
@@ -108,7 +116,8 @@ class SupportGovernor:
         np.dot(self._rows, self._desired, out=self._reached)
         if (self._reached >= self._demand).all():
             self.velocities.ravel()[:] = self._desired
-            self.active[:], self._missed[:] = False, 0.0
+            self.active[:] = False
+            self._missed[:] = 0.0
         else:
             self._solve()
         step = self._period * (-SLOWER if self.infeasible.any() else FASTER)
@@ -117,7 +126,10 @@ class SupportGovernor:
     def _write(self, polygon: FootprintGeometry) -> None:
         """Write rows and what is demanded of them."""
         count, (margins, workspaces) = len(polygon.edges), self.limits
-        rows, reserves, edges, wheels = self._rows, self.reserves, self._edges, self._wheels
+        rows = self._rows
+        reserves = self.reserves
+        edges = self._edges
+        wheels = self._wheels
         if self._order is not polygon.edges:
             self._find_places(polygon.edges)
         rows[edges, self._starts], rows[edges, self._ends] = polygon.of_start, polygon.of_end
@@ -132,16 +144,19 @@ class SupportGovernor:
 
     def _find_places(self, edges: list[tuple[int, int]]) -> None:
         """Find where gradients of the two vertices of each edge belong."""
-        self._order, pairs = edges, np.array(edges)
+        self._order = edges
+        pairs = np.array(edges)
         self._rows[:] = 0.0
         self._starts, self._ends = (2 * pairs[:, side : side + 1] + (0, 1) for side in (0, 1))
 
     def _solve(self) -> None:
-        problem, size = self._solver.problem, len(self._desired)
+        problem = self._solver.problem
+        size = len(self._desired)
         np.negative(self._desired, out=problem.gradient[:size])
         problem.lower[:] = self._demand
         largest = max(self.speed, float(np.abs(self._desired).max()))
-        problem.least[:size], problem.largest[:size] = -largest, largest
+        problem.least[:size] = -largest
+        problem.largest[:size] = largest
         solution = self._solver.solve()
         x = solution.x
         if not solution.is_solved:
@@ -183,13 +198,15 @@ class Reaction:
     """Acceleration for what is missing [1/s2], its largest value, and that of coming to rest [m/s2]."""
 
     def __init__(self, count: int, margin: float, speed: float):
-        self.margin, self._speed = margin, speed
+        self.margin = margin
+        self._speed = speed
         self._polygon = FootprintGeometry(count)
         self.start()
 
     def start(self, edges: list[tuple[int, int]] | None = None) -> None:
         """Begin at rest."""
-        self.velocity, self.is_active = (0.0, 0.0), False
+        self.velocity = (0.0, 0.0)
+        self.is_active = False
         if edges is not None:
             self._polygon.edges = edges
 
@@ -217,17 +234,22 @@ class Reaction:
         for margin, (nx, ny) in zip(self._polygon.margins.tolist(), self._polygon.of_point.tolist(), strict=True):
             missing = max(self.margin - margin, 0.0)
             # the gradient of the margin by the point leads inwards
-            ax, ay = ax - missing * nx, ay - missing * ny
+            ax = ax - missing * nx
+            ay = ay - missing * ny
         size = self.GAIN * math.hypot(ax, ay)
         if size > 0.0:
             share = self.GAIN * min(1.0, self.ACCELERATION / size) * period
-            vx, vy = vx + share * ax, vy + share * ay
+            vx = vx + share * ax
+            vy = vy + share * ay
         else:
             speed = math.hypot(vx, vy)
             share = max(0.0, 1.0 - self.BRAKING * period / speed) if speed > 0.0 else 0.0
-            vx, vy = share * vx, share * vy
+            vx = share * vx
+            vy = share * vy
         speed = math.hypot(vx, vy)
         if speed > self._speed:
-            vx, vy = vx * self._speed / speed, vy * self._speed / speed
-        self.velocity, self.is_active = (vx, vy), speed > SMALL
+            vx = vx * self._speed / speed
+            vy = vy * self._speed / speed
+        self.velocity = (vx, vy)
+        self.is_active = speed > SMALL
         return self.velocity

@@ -58,14 +58,21 @@ class JointProgram:
         radii: list[tuple[float, float]],
         moved: np.ndarray,
     ):
-        count, size = len(wheels), len(moved)
-        self._robot, self._tags, self._wheels, self._axles, self._radii = robot, tags, wheels, axles, radii
+        count = len(wheels)
+        size = len(moved)
+        self._robot = robot
+        self._tags = tags
+        self._wheels = wheels
+        self._axles = axles
+        self._radii = radii
         self._moved, self._centers = moved, [SpatialPoint(link, robot) for link in wheels]
         self._hips = [SpatialPoint(link, robot) for link in robot.links(tags.hips)]
         self._pelvis = SpatialPoint(str(robot.kinematics.base_link), robot)
         self.limits = np.array((tags.each("margins", count), tags.each("workspaces", count)))
         self.polygon = FootprintGeometry(count)
-        self.velocity, self.vertices, self.places = np.zeros(robot.size), np.zeros((count, 2)), np.zeros((count, 3))
+        self.velocity = np.zeros(robot.size)
+        self.vertices = np.zeros((count, 2))
+        self.places = np.zeros((count, 3))
         self._rolling = np.zeros((2 * count, robot.size))
         self._turning = np.zeros((3 * count, robot.size))
         self._centers_places, self._hips_places = np.zeros((2, count, 3))
@@ -79,7 +86,8 @@ class JointProgram:
         self.weigh((tags.margin_gain, tags.workspace_gain))
         problem.inequality_matrix[self._soft, size:] = -np.eye(2 * count)
         problem.largest[size:] = 0.0
-        self._period, self.infeasible = 0.0, 0
+        self._period = 0.0
+        self.infeasible = 0
         robot.dynamics.subscribe(INERTIA)
 
     def weigh(self, gains: Sequence[float]) -> None:
@@ -93,7 +101,8 @@ class JointProgram:
 
     def measure(self) -> None:
         """Compute vertices, margins and workspaces at the last update of the Robot."""
-        robot, velocity = self._robot, self._robot.state.velocity
+        robot = self._robot
+        velocity = self._robot.state.velocity
         for index, (center, hip) in enumerate(zip(self._centers, self._hips, strict=True)):
             center.update()
             hip.update()
@@ -133,7 +142,9 @@ class JointProgram:
         self._write_cost()
         self._write_equalities(contacts, before, base)
         self._write_bounds()
-        problem, moved, size = self.solver.problem, self._moved, len(self._moved)
+        problem = self.solver.problem
+        moved = self._moved
+        size = len(self._moved)
         self._write_torques(force)
         problem.inequality_matrix[self._cambers, :size] = camber[:, moved]
         problem.lower[self._cambers], problem.upper[self._cambers] = rates - CAMBER_RATE, rates + CAMBER_RATE
@@ -148,8 +159,11 @@ class JointProgram:
         return solution
 
     def _write_cost(self) -> None:
-        moved, hessian, size = self._moved, self.solver.problem.hessian, len(self._moved)
-        rolling, center = self._rolling[:, moved], self._robot.center_of_mass.jacobian[:2, moved]
+        moved = self._moved
+        hessian = self.solver.problem.hessian
+        size = len(self._moved)
+        rolling = self._rolling[:, moved]
+        center = self._robot.center_of_mass.jacobian[:2, moved]
         counted = [self._turning[:, moved], center, *(hip.jacobian[:3, moved] for hip in self._hips)]
         if self._tags.centers:
             self._pelvis.update()
@@ -160,7 +174,10 @@ class JointProgram:
         hessian[np.arange(size), np.arange(size)] += JOINTS_DAMPING
 
     def _write_equalities(self, contacts: np.ndarray, before: np.ndarray, base: np.ndarray) -> None:
-        problem, moved, size, rows = self.solver.problem, self._moved, len(self._moved), len(contacts)
+        problem = self.solver.problem
+        moved = self._moved
+        size = len(self._moved)
+        rows = len(contacts)
         problem.equality_matrix[:rows, :size] = contacts[:, moved]
         problem.equality_matrix[rows:, :size] = base[:, moved]
         problem.equality_vector[:rows] = contacts @ before
@@ -168,12 +185,16 @@ class JointProgram:
 
     def _write_bounds(self) -> None:
         """Write the speeds with which joints reach the ends of their ranges, desired and measured, and no more."""
-        robot, problem, moved, size = self._robot, self.solver.problem, self._moved, len(self._moved)
+        robot = self._robot
+        problem = self.solver.problem
+        moved = self._moved
+        size = len(self._moved)
         for position in (robot.state.position, robot.command.position):
             lower = (robot.lower_limits.position - position)[moved] / self._period
             upper = (robot.upper_limits.position - position)[moved] / self._period
             if position is robot.state.position:
-                problem.least[:size], problem.largest[:size] = lower, upper
+                problem.least[:size] = lower
+                problem.largest[:size] = upper
             else:
                 np.maximum(problem.least[:size], lower, out=problem.least[:size])
                 np.minimum(problem.largest[:size], upper, out=problem.largest[:size])
@@ -182,7 +203,10 @@ class JointProgram:
         problem.largest[:size] = np.maximum(np.minimum(problem.largest[:size], speed), 0.0)
 
     def _write_torques(self, force: np.ndarray) -> None:
-        robot, problem, driven, moved = self._robot, self.solver.problem, self._driven, self._moved
+        robot = self._robot
+        problem = self.solver.problem
+        driven = self._driven
+        moved = self._moved
         inertia = robot.dynamics.inertia
         problem.inequality_matrix[self._torques, : len(moved)] = inertia[np.ix_(driven, moved)]
         now = (inertia @ robot.state.velocity)[driven]
@@ -190,8 +214,12 @@ class JointProgram:
         problem.upper[self._torques] = now + (force + robot.upper_limits.torque)[driven] * self._period
 
     def _write_soft(self) -> None:
-        problem, moved, size, polygon = self.solver.problem, self._moved, len(self._moved), self.polygon
-        count, rows = len(polygon.edges), problem.inequality_matrix[self._soft, : len(moved)]
+        problem = self.solver.problem
+        moved = self._moved
+        size = len(self._moved)
+        polygon = self.polygon
+        count = len(polygon.edges)
+        rows = problem.inequality_matrix[self._soft, : len(moved)]
         center = self._robot.center_of_mass.jacobian[:2]
         for index, (first, second) in enumerate(polygon.edges):
             row = polygon.of_start[index] @ self._rolling[2 * first : 2 * first + 2]

@@ -23,12 +23,15 @@ class WorldVertices:
 
     def __init__(self, count: int, size: int):
         self.references, self._places, self._directions = np.zeros((3, count, 2))
-        self.errors, self.jacobian = np.zeros(count), np.zeros((count, size))
-        self._jacobians, self._cycle = np.zeros((count, 2, size)), 0
+        self.errors = np.zeros(count)
+        self.jacobian = np.zeros((count, size))
+        self._jacobians = np.zeros((count, 2, size))
+        self._cycle = 0
 
     def start(self, places: np.ndarray) -> None:
         """Begin with references where the vertices are, shape (count, 3) [m]."""
-        self.references[:], self._cycle = places[:, :2], 0
+        self.references[:] = places[:, :2]
+        self._cycle = 0
 
     def move(self, velocities: np.ndarray, directions: np.ndarray, period: float) -> None:
         """Move references along the directions of rolling, shape (count, 2), by velocities of the vertices [m/s]."""
@@ -56,4 +59,6 @@ class WorldVertices:
         self._cycle += 1
 
     def _look(self, places: np.ndarray, directions: np.ndarray, jacobians: np.ndarray) -> None:
-        self._places[:], self._directions[:], self._jacobians[:] = places[:, :2], directions, jacobians
+        self._places[:] = places[:, :2]
+        self._directions[:] = directions
+        self._jacobians[:] = jacobians

@@ -39,14 +39,23 @@ class FootprintGeometry:
 
     def update(self, vertices: Sequence[Sequence[float]], point: Sequence[float]) -> None:
         """Compute the margins of a point, of which x and y count; all in one frame whose z is up [m]."""
-        bx, by = point[0], point[1]
+        bx = point[0]
+        by = point[1]
         for index, (first, second) in enumerate(self.edges):
-            px, py = vertices[first][0], vertices[first][1]
-            qx, qy = vertices[second][0], vertices[second][1]
-            dx, dy, ex, ey, fx, fy = px - qx, py - qy, px - bx, py - by, qx - bx, qy - by
+            px = vertices[first][0]
+            py = vertices[first][1]
+            qx = vertices[second][0]
+            qy = vertices[second][1]
+            dx = px - qx
+            dy = py - qy
+            ex = px - bx
+            ey = py - by
+            fx = qx - bx
+            fy = qy - by
             length = max(math.hypot(dx, dy), 1e-9)
             margin = (dy * ex - dx * ey) / length
-            along_x, along_y = dx * margin / length**2, dy * margin / length**2
+            along_x = dx * margin / length**2
+            along_y = dy * margin / length**2
             self.margins[index] = margin
             self.of_start[index] = -along_x - fy / length, -along_y + fx / length
             self.of_end[index] = along_x + ey / length, along_y - ex / length

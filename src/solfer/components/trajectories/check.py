@@ -147,7 +147,8 @@ class TrajectoryCheck:
             NotFinite: One is no number.
             ComponentError: One is below zero, but not -1, or for an acceleration.
         """
-        position, velocity = np.full(len(names), np.inf), np.full(len(names), np.inf)
+        position = np.full(len(names), np.inf)
+        velocity = np.full(len(names), np.inf)
         for each in given:
             if each.name not in names:
                 raise UnknownName("joint", each.name, names)
@@ -203,7 +204,8 @@ class TrajectoryCheck:
     def _require_limits(self, motion: ViaPoints, places: np.ndarray, start: np.ndarray) -> None:
         """Check positions and speeds of the whole motion; a joint that is beyond a limit already may come back."""
         lowest, highest, fastest = motion.extremes()
-        lower, upper = np.minimum(self._lower[places], start), np.maximum(self._upper[places], start)
+        lower = np.minimum(self._lower[places], start)
+        upper = np.maximum(self._upper[places], start)
         self._require(places, lowest, lambda value, index: value >= lower[index] - _SLACK, "position", "rad")
         self._require(places, highest, lambda value, index: value <= upper[index] + _SLACK, "position", "rad")
         limits = self._speed[places] * (1.0 + _SLACK)

@@ -50,9 +50,13 @@ class TrajectoryFollower:
         from solfer.numerics.kernels import shorten
 
         self._shorten = shorten
-        self._state, self._joints, self._position, self._velocity = robot.state, joints, position, velocity
+        self._state = robot.state
+        self._joints = joints
+        self._position = position
+        self._velocity = velocity
         names = [robot.dofs[dof] for dof in joints]
-        lower, upper = robot.lower_limits.position[joints], robot.upper_limits.position[joints]
+        lower = robot.lower_limits.position[joints]
+        upper = robot.upper_limits.position[joints]
         self._turns = robot.turns[joints]
         self._check = TrajectoryCheck(names, lower, upper, robot.upper_limits.velocity[joints], self._turns)
         self.moving = False
@@ -83,12 +87,18 @@ class TrajectoryFollower:
         names = trajectory.joint_names
         places = self._check.places(names)
         supervised = None if goal is None else self._limits(goal, names)
-        start, velocity = self._position[places], self._velocity[places]
+        start = self._position[places]
+        velocity = self._velocity[places]
         measured = self._state.position[self._joints[places]]
         motion, elapsed = self._check.motion(trajectory, places, start, velocity, measured, now)
         self.leave("another trajectory has taken over")
-        self._motion, self._time, self.moving = motion, elapsed, True
-        self.places, self._names, self._supervised, self._outcome = places, names, supervised, None
+        self._motion = motion
+        self._time = elapsed
+        self.moving = True
+        self.places = places
+        self._names = names
+        self._supervised = supervised
+        self._outcome = None
         self._size(places)
         return motion.last
 
@@ -106,13 +116,17 @@ class TrajectoryFollower:
 
     def leave(self, why: str) -> None:
         """Leave the joints where they are, with their speed; a goal that is under way ends with this reason."""
-        self.moving, self._motion = False, None
+        self.moving = False
+        self._motion = None
         if self._supervised is not None and self._outcome is None:
             self._outcome = Outcome(FollowResult(INVALID_GOAL, why), False, why)
 
     def forget(self) -> None:
         """Leave the trajectory, and the goal without an outcome."""
-        self.moving, self._motion, self._supervised, self._outcome = False, None, None, None
+        self.moving = False
+        self._motion = None
+        self._supervised = None
+        self._outcome = None
 
     def outcome(self) -> Outcome | None:
         """Return how the goal has ended; None: it is under way."""
@@ -142,7 +156,9 @@ class TrajectoryFollower:
         """Make the arrays for so many joints."""
         self._dofs = self._joints[places]
         self._desired, self._speed, self._actual, self._turning = (np.zeros(len(places)) for _ in range(4))
-        self._ways, self._slip, self._turn = np.zeros((1, len(places))), np.zeros(len(places)), self._turns[places]
+        self._ways = np.zeros((1, len(places)))
+        self._slip = np.zeros(len(places))
+        self._turn = self._turns[places]
         self._away = self._error = self._ways[0]
         self._beyond = np.zeros(len(places), dtype=bool)
 

@@ -125,9 +125,12 @@ class WheeledMotion(Component):
         self._gain = np.zeros(len(self.stack.velocity))
         self._gain[:] = np.concatenate([task.gain for task in self.stack.tasks])
         self._rates = TaskRates(*np.zeros((3, len(self._gain))))
-        self._error, self._desired = self._rates.error, np.zeros(len(links))
+        self._error = self._rates.error
+        self._desired = np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._is_paced, self._is_original, self._is_first = tags.is_paced, tags.is_original, True
+        self._is_paced = tags.is_paced
+        self._is_original = tags.is_original
+        self._is_first = True
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
         self.targets = Targets(
             len(links),
@@ -153,7 +156,8 @@ class WheeledMotion(Component):
             robot.is_whole,
         )
         self._throttle = Throttle(log)
-        self._behind, self._tempo = 0.0, 1.0
+        self._behind = 0.0
+        self._tempo = 1.0
         self._base_error, self._measured_velocity = np.zeros((2, 3))
         self._vertex_error = np.zeros_like(self.references.vertices)
 
@@ -162,7 +166,8 @@ class WheeledMotion(Component):
         super().set_rate(rate)
         if not self.kinematics:
             raise ComponentError(f"'{self.name}' without kinematics", expected="kinematics: true")
-        tags, stack = self.tags, self.stack
+        tags = self.tags
+        stack = self.stack
         self._steering = Steering(
             tags.steering_record(),
             self.period,
@@ -206,8 +211,13 @@ class WheeledMotion(Component):
 
     def _name_parts(self) -> None:
         """Keep what the cycle needs, so that it looks up nothing by name."""
-        points, references, stack, tags = self._points, self.references, self.stack, self.tags
-        offsets, steering, tracked = self._offsets, self._steering, points[POINTS[BASE]].value[3:]
+        points = self._points
+        references = self.references
+        stack = self.stack
+        tags = self.tags
+        offsets = self._offsets
+        steering = self._steering
+        tracked = points[POINTS[BASE]].value[3:]
         first = {name: rows.start for name, rows in self._rows.items()}
         limits = np.stack((self._bounds.lower_position, self._bounds.upper_position))
         self._damping = stack.numbers[:, DAMPING_COLUMN]
@@ -288,7 +298,8 @@ class WheeledMotion(Component):
     def _take_limits(self, numbers: np.ndarray) -> None:
         """Go on with other numbers of `LIMITS`."""
         values = numbers.tolist()
-        speeds, accelerations = values[:3], values[3:6]
+        speeds = values[:3]
+        accelerations = values[3:6]
         self.drive.limit(speeds[0], speeds[1], accelerations[0], accelerations[1])
         self.targets.limit(speeds, accelerations)
         self._pace.limit(speeds, accelerations[0])
@@ -314,9 +325,12 @@ class WheeledMotion(Component):
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
-        self._position[:], self._velocity[:] = self.start_position, 0.0
+        self._position[:] = self.start_position
+        self._velocity[:] = 0.0
         self.stack.update()
-        pose, offsets, references = self._pose.value, self._offsets, self.references
+        pose = self._pose.value
+        offsets = self._offsets
+        references = self.references
         offsets.start()
         place = np.array(self._points[POINTS[BASE]].value[3:])
         if self.tags.base == "link" and self._is_original:
@@ -338,12 +352,16 @@ class WheeledMotion(Component):
         self._publisher.start()
         self._guard.start()
         self._rates.away[:] = 0.0
-        self._is_first, self._is_held = True, False
-        self._behind, self._tempo = 0.0, 1.0
+        self._is_first = True
+        self._is_held = False
+        self._behind = 0.0
+        self._tempo = 1.0
 
     def update(self) -> None:
         """Compute one cycle."""
-        stack, is_paced, step = self.stack, self._is_paced, self.time_step
+        stack = self.stack
+        is_paced = self._is_paced
+        step = self.time_step
         gap = self._set_step(step)
         self._take_over(gap)
         self._lifting.update(step)
@@ -511,7 +529,8 @@ class WheeledMotion(Component):
 
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and log why where it comes to rest."""
-        descent, guard = self._descent, self._guard
+        descent = self._descent
+        guard = self._guard
         self._is_held = guard.update(self.references.pace, descent.last >= 0, self.time_step)
         if self._is_held and self._pace.held < HELD:
             why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
@@ -519,7 +538,8 @@ class WheeledMotion(Component):
 
     def _raise_far(self, row: int) -> None:
         """Name what is farther from its reference than it may be."""
-        base, vertices = self._rows.get(BASE), self._rows.get(VERTICES)
+        base = self._rows.get(BASE)
+        vertices = self._rows.get(VERTICES)
         is_base = base is not None and base.start <= row < base.stop
         what = (
             "the base"
@@ -541,7 +561,8 @@ class WheeledMotion(Component):
 
     def _integrate(self) -> None:
         """Write what is commanded."""
-        moved, turning = self.moved, self._turning
+        moved = self.moved
+        turning = self._turning
         move(moved, self._descent.velocity, self.time_step, self._velocity, self._position)
         if not self._is_original:
             return

@@ -72,7 +72,8 @@ class Drive:
 
     def limit(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float) -> None:
         """Set the largest speeds and accelerations, see above."""
-        self._speeds, self._limits = (speed, turn_speed), (acceleration, turn_acceleration)
+        self._speeds = (speed, turn_speed)
+        self._limits = (acceleration, turn_acceleration)
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""

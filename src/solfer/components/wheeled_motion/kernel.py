@@ -39,7 +39,8 @@ TUNED = ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
 LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *TUNED, "period")])
 """Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
-_MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("rest", "way", "desired", "turn")
+_MERGED = ("motion", "motion_speed", "error", "error_speed")
+_KEPT = ("rest", "way", "desired", "turn")
 
 WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
 """State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
@@ -75,7 +76,9 @@ WHEELS = np.dtype(
 )
 """What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
 
-_wheels_at, _law_at, _states_at = record_at(WHEELS), record_at(LAW), records_at(WHEEL)
+_wheels_at = record_at(WHEELS)
+_law_at = record_at(LAW)
+_states_at = records_at(WHEEL)
 
 
 @part
@@ -88,7 +91,8 @@ def _wrapped(angle, period):
 def _turn(wheel, wx, wy, period):
     """Find how fast the desired direction of a vertex turns; one that jumps to the opposite one does not."""
     if wx == 0.0 and wy == 0.0:
-        wheel.turn, wheel.desired = 0.0, math.nan
+        wheel.turn = 0.0
+        wheel.desired = math.nan
         return
     desired = math.atan2(wy, wx)
     # of a vertex that has just been at rest nothing is known
@@ -111,7 +115,8 @@ def _keep(wheel, law, wx, wy, ex, ey):
         wheel.aim = wheel.angle
         return
     gain = law.across * (1.0 - RESTING / distance) if distance > RESTING else 0.0
-    x, y = wx + gain * ex, wy + gain * ey
+    x = wx + gain * ex
+    y = wy + gain * ey
     wheel.aim = nearest(math.atan2(y, x), wheel.angle)
     wheel.angle -= math.expm1(-law.rate * math.hypot(x, y)) * (wheel.aim - wheel.angle)
 
@@ -123,29 +128,47 @@ def _compile_steer(sources):
         """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
         sources  # noqa: B018 it has to be used to be in the closure
         memory = _wheels_at(start)
-        count, dofs = memory.count, memory.dofs
-        law, wheels = _law_at(memory.law), _states_at(memory.wheels, count)
-        before, steered = vector_at(memory.before, 3), matrix_at(memory.steered, 4, count)
-        places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
-        velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
-        lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
-        motion, numbers = vector_at(memory.motion, 3), vector_at(memory.numbers, 4)
-        heading, period = vector_at(memory.base, 1)[0], law.period
+        count = memory.count
+        dofs = memory.dofs
+        law = _law_at(memory.law)
+        wheels = _states_at(memory.wheels, count)
+        before = vector_at(memory.before, 3)
+        steered = matrix_at(memory.steered, 4, count)
+        places = matrix_at(memory.places, count, 3)
+        errors = matrix_at(memory.errors, count, 3)
+        velocities = matrix_at(memory.velocities, count, 3)
+        directions = matrix_at(memory.directions, count, 2)
+        lifted = flags_at(memory.lifted, count)
+        pose = vector_at(memory.pose, 7)
+        center = vector_at(memory.center, 2)
+        motion = vector_at(memory.motion, 3)
+        numbers = vector_at(memory.numbers, 4)
+        heading = vector_at(memory.base, 1)[0]
+        period = law.period
         share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
         turn = share * vector_at(memory.turning, 3)[2]
-        cos, sin = math.cos(heading), math.sin(heading)
-        vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
-        dx, dy = pose[0] - before[0], pose[1] - before[1]
-        mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
+        cos = math.cos(heading)
+        sin = math.sin(heading)
+        vx = share * (cos * motion[0] + sin * motion[1])
+        vy = share * (cos * motion[1] - sin * motion[0])
+        dx = pose[0] - before[0]
+        dy = pose[1] - before[1]
+        mx = (cos * dx + sin * dy) / period
+        my = (cos * dy - sin * dx) / period
         rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
         before[0], before[1], before[2] = pose[0], pose[1], heading
-        cx, cy = center[0] - pose[0], center[1] - pose[1]
-        sx, sy = cos * cx + sin * cy, cos * cy - sin * cx
+        cx = center[0] - pose[0]
+        cy = center[1] - pose[1]
+        sx = cos * cx + sin * cy
+        sy = cos * cy - sin * cx
         for index in range(count):
             wheel = wheels[index]
-            px, py = places[index, 0] - sx, places[index, 1] - sy
-            ex, ey = errors[index, 0], errors[index, 1]
-            wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
+            px = places[index, 0] - sx
+            py = places[index, 1] - sy
+            ex = errors[index, 0]
+            ey = errors[index, 1]
+            wx = vx - py * turn + share * velocities[index, 0]
+            wy = vy + px * turn + share * velocities[index, 1]
             if law.across != 0.0:
                 _keep(wheel, law, wx, wy, ex, ey)
             else:
@@ -167,8 +190,14 @@ def _compile_steer(sources):
 @part
 def _find_base(place, pose, desired_place, desired_orientation, error):
     """Write the vector part of the quaternion that turns the base to its reference, and what is left of the way."""
-    x, y, z, w = pose[3], pose[4], pose[5], pose[6]
-    rx, ry, rz, rw = desired_orientation[0], desired_orientation[1], desired_orientation[2], desired_orientation[3]
+    x = pose[3]
+    y = pose[4]
+    z = pose[5]
+    w = pose[6]
+    rx = desired_orientation[0]
+    ry = desired_orientation[1]
+    rz = desired_orientation[2]
+    rw = desired_orientation[3]
     # q and -q are the same orientation
     sign = 1.0 if w * rw + x * rx + y * ry + z * rz >= 0.0 else -1.0
     error[0] = sign * (w * rx - rw * x - ry * z + rz * y)
@@ -196,15 +225,20 @@ def _choose_ways(wheels, angles, desired, rows, turning, measured, position, vel
     way unless another one is much better, also where both are equal.
     """
     for index in range(len(angles)):
-        dof, way = turning[index], wheels[index].way
-        row, place = rows[index, dof], measured[dof]
+        dof = turning[index]
+        way = wheels[index].way
+        row = rows[index, dof]
+        place = measured[dof]
         way += _wrapped(desired[index] - angles[index] - way, PERIOD)
-        further, end = position[dof] + velocity[dof] * ahead, place + way * row
-        is_inside, is_next_inside = lower[dof] < end < upper[dof], lower[dof] < further < upper[dof]
+        further = position[dof] + velocity[dof] * ahead
+        end = place + way * row
+        is_inside = lower[dof] < end < upper[dof]
+        is_next_inside = lower[dof] < further < upper[dof]
         # what leaves the range shows which of the two others is the way back
         toward = (further - position[dof]) * row if is_inside and not is_next_inside else way
         other = way - math.copysign(PERIOD, toward)
-        other_end, is_inside = place + other * row, is_inside and is_next_inside
+        other_end = place + other * row
+        is_inside = is_inside and is_next_inside
         is_long = abs(way) > PERIOD / 2.0 + LONGER
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             way = other
@@ -220,8 +254,11 @@ def _find_errors(start):
     joints that have ranges the ones within them, and references of camber and caster follow where they are too far.
     """
     memory = _wheels_at(start)
-    count, dofs, half = memory.count, memory.dofs, memory.half
-    error, most = vector_at(memory.error, memory.rows), vector_at(memory.most, 3)
+    count = memory.count
+    dofs = memory.dofs
+    half = memory.half
+    error = vector_at(memory.error, memory.rows)
+    most = vector_at(memory.most, 3)
     if memory.of_base >= 0:
         _find_base(
             vector_at(memory.place, 3),
@@ -235,21 +272,28 @@ def _find_errors(start):
         for index in range(3 * count):
             error[memory.of_vertices + index] = -offsets[index]
     if memory.of_steering >= 0:
-        steered, desired = matrix_at(memory.steered, 4, count), vector_at(memory.aims, count)
+        steered = matrix_at(memory.steered, 4, count)
+        desired = vector_at(memory.aims, count)
         desired[:] = steered[ANGLES]
         if memory.limits:
-            rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
-            turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
-            velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * _law_at(memory.law).period
-            wheels, angles = _states_at(memory.wheels, count), steered[MEASURED]
+            rows = matrix_at(memory.steering_rows, count, dofs)
+            limits = matrix_at(memory.limits, 2, dofs)
+            turning = indices_at(memory.turning_dofs, count)
+            position = vector_at(memory.position, dofs)
+            velocity = vector_at(memory.velocity, dofs)
+            ahead = AHEAD * _law_at(memory.law).period
+            wheels = _states_at(memory.wheels, count)
+            angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
             _choose_ways(*given, limits[0], limits[1], most[0], ahead)
         _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
-        angles, desired = vector_at(memory.camber, count), vector_at(memory.desired_camber, count)
+        angles = vector_at(memory.camber, count)
+        desired = vector_at(memory.desired_camber, count)
         _find_soft(angles, desired, half, most[1], error[memory.of_camber :])
     if memory.of_caster >= 0:
-        angles, desired = vector_at(memory.caster, count), vector_at(memory.desired_caster, count)
+        angles = vector_at(memory.caster, count)
+        desired = vector_at(memory.desired_caster, count)
         _find_soft(angles, desired, half, most[2], error[memory.of_caster :])
 
 
@@ -261,7 +305,8 @@ def _find_soft_alone(angles, desired, half, most, error):
 @part
 def _feed_forward(memory, forward):
     """Write the desired rates of base, steering and vertices."""
-    count, turning = memory.count, vector_at(memory.turning, 3)
+    count = memory.count
+    turning = vector_at(memory.turning, 3)
     if memory.of_base >= 0:
         motion = vector_at(memory.motion, 3)
         for k in range(3):
@@ -271,13 +316,21 @@ def _feed_forward(memory, forward):
             forward[memory.of_steering + index] = turning[2]
     if memory.of_vertices < 0:
         return
-    velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
-    lifted, of_vertices, heading = flags_at(memory.lifted, count), memory.of_vertices, vector_at(memory.base, 1)[0]
-    cos, sin = math.cos(heading), math.sin(heading)
+    velocities = matrix_at(memory.velocities, count, 3)
+    directions = matrix_at(memory.directions, count, 2)
+    lifted = flags_at(memory.lifted, count)
+    of_vertices = memory.of_vertices
+    heading = vector_at(memory.base, 1)[0]
+    cos = math.cos(heading)
+    sin = math.sin(heading)
     for index in range(count):
-        vx, vy = velocities[index, 0], velocities[index, 1]
-        fx, fy = directions[index, 0], directions[index, 1]
-        wx, wy, is_free = cos * vx - sin * vy, sin * vx + cos * vy, lifted[index]
+        vx = velocities[index, 0]
+        vy = velocities[index, 1]
+        fx = directions[index, 0]
+        fy = directions[index, 1]
+        wx = cos * vx - sin * vy
+        wy = sin * vx + cos * vy
+        is_free = lifted[index]
         forward[of_vertices + index] = fx * wx + fy * wy
         forward[of_vertices + count + index] = fx * wy - fy * wx if is_free else 0.0
         forward[of_vertices + 2 * count + index] = velocities[index, 2] if is_free else 0.0
@@ -313,8 +366,10 @@ def _turn_ahead(memory, rates, gain, pace):
     A wheel that is far from its direction goes there as fast as it may: its way may be the longer one. None is to turn
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
-    wheels, most = _states_at(memory.wheels, memory.count), vector_at(memory.most, 1)[0]
-    error, with_base = vector_at(memory.error, memory.rows), pace * vector_at(memory.turning, 3)[2]
+    wheels = _states_at(memory.wheels, memory.count)
+    most = vector_at(memory.most, 1)[0]
+    error = vector_at(memory.error, memory.rows)
+    with_base = pace * vector_at(memory.turning, 3)[2]
     for index in range(memory.count):
         row = memory.of_steering + index
         if abs(error[row]) < (1.0 - 1e-9) * most:
@@ -328,10 +383,13 @@ def _turn_ahead(memory, rates, gain, pace):
 @part
 def _room(memory, index):
     """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
-    dof, rate = indices_at(memory.turning_dofs, memory.count)[index], 1.0 / _law_at(memory.law).period
-    limits, place = matrix_at(memory.limits, 2, memory.dofs), vector_at(memory.position, memory.dofs)[dof]
+    dof = indices_at(memory.turning_dofs, memory.count)[index]
+    rate = 1.0 / _law_at(memory.law).period
+    limits = matrix_at(memory.limits, 2, memory.dofs)
+    place = vector_at(memory.position, memory.dofs)[dof]
     by = rate * matrix_at(memory.steering_rows, memory.count, memory.dofs)[index, dof]
-    first, second = by * min(limits[0, dof] - place, 0.0), by * max(limits[1, dof] - place, 0.0)
+    first = by * min(limits[0, dof] - place, 0.0)
+    second = by * max(limits[1, dof] - place, 0.0)
     return min(first, second), max(first, second)
 
 
@@ -359,7 +417,9 @@ def _find_rates(start, is_paced, feeds_forward):
     """
     memory = _wheels_at(start)
     size = memory.rows
-    rates, gain, error = vector_at(memory.rates, size), vector_at(memory.gain, size), vector_at(memory.error, size)
+    rates = vector_at(memory.rates, size)
+    gain = vector_at(memory.gain, size)
+    error = vector_at(memory.error, size)
     for k in range(size):
         rates[k] = gain[k] * error[k]
     if is_paced:
@@ -376,7 +436,8 @@ def _find_rates(start, is_paced, feeds_forward):
             vertex_rise = period * memory.vertex_acceleration
             _correct(rates, away, memory.of_vertices, 3 * memory.count, memory.vertex_correction, vertex_rise)
     if feeds_forward:
-        forward, pace = vector_at(memory.forward, size), vector_at(memory.numbers, 4)[PACE]
+        forward = vector_at(memory.forward, size)
+        pace = vector_at(memory.numbers, 4)[PACE]
         _feed_forward(memory, forward)
         for k in range(size):
             rates[k] += pace * forward[k]
@@ -401,7 +462,8 @@ def _write_command(columns, position, velocity, commanded_position, commanded_ve
         commanded_position[k], commanded_velocity[k] = position[k], velocity[k]
 
 
-_VECTOR, _INDICES = "float64[::1]", "int64[::1]"
+_VECTOR = "float64[::1]"
+_INDICES = "int64[::1]"
 
 steer = _compile_steer(digest((Path(original.__file__), Path(__file__))))
 find_errors = cached("void(int64)", _find_errors)

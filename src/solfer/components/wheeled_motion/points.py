@@ -83,7 +83,9 @@ class BasePose(CompiledPoint):
 
     def __init__(self, robot: RobotView, pose: SpatialPoint, center: CenterOfMass, is_tracked: bool = False):
         super().__init__(6, robot)
-        self.pose, self.center, self._operands = pose, center, (pose, center) if is_tracked else (pose,)
+        self.pose = pose
+        self.center = center
+        self._operands = (pose, center) if is_tracked else (pose,)
 
     @property
     def parts(self) -> tuple[Point, ...]:
@@ -137,7 +139,10 @@ class RollingOffsets(CompiledPoint):
     ):
         count = len(vertices)
         super().__init__(3 * count, robot)
-        self.vertices, self.axes, self._pose, self._is_late = tuple(vertices), axes, pose, is_late
+        self.vertices = tuple(vertices)
+        self.axes = axes
+        self._pose = pose
+        self._is_late = is_late
         self._attachments = [robot.kinematics.attachment(vertex.link) for vertex in vertices]
         self._numbers = np.zeros(14 * count + 3)
         blocks = self._numbers[: 9 * count].reshape(3, count, 3)
@@ -146,7 +151,8 @@ class RollingOffsets(CompiledPoint):
         axles = self._numbers[11 * count : 14 * count].reshape(count, 3)
         axles[:] = [each.rotation @ axis for each, axis in zip(self._attachments, axes, strict=True)]
         self.base = self._numbers[14 * count :]
-        self.lifted, self._base_rows = np.zeros(count, dtype=bool), np.zeros((2, self.cols))
+        self.lifted = np.zeros(count, dtype=bool)
+        self._base_rows = np.zeros((2, self.cols))
 
     @property
     def heading(self) -> float:
@@ -164,7 +170,8 @@ class RollingOffsets(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        late, found = address(self._base_rows) if self._is_late else 0, []
+        late = address(self._base_rows) if self._is_late else 0
+        found = []
         for index, (vertex, each) in enumerate(zip(self.vertices, self._attachments, strict=True)):
             one = Instruction(
                 rolling_offset,
@@ -181,7 +188,8 @@ class RollingOffsets(CompiledPoint):
 
     def start(self) -> None:
         """Begin with vertices where they are; all parts are up to date."""
-        self.base[1:], self._base_rows[:] = self._pose.value[:2], 0.0
+        self.base[1:] = self._pose.value[:2]
+        self._base_rows[:] = 0.0
         self.update(jacobian=False)
         self.reference[:] = self.states
         self.errors[:] = 0.0

@@ -31,11 +31,13 @@ class References:
     """
 
     def __init__(self, count: int):
-        self._motion, self._places = np.zeros((3, 3)), np.zeros((2, count, 3))
+        self._motion = np.zeros((3, 3))
+        self._places = np.zeros((2, count, 3))
         self.velocity, self.turn, self.position = self._motion
         self.vertex_velocity, self.vertices = self._places
         self.camber, self.caster = np.zeros((2, count))
-        self.numbers, self.lifted = np.zeros(4), np.zeros(count, dtype=bool)
+        self.numbers = np.zeros(4)
+        self.lifted = np.zeros(count, dtype=bool)
         self._orientations = np.zeros((2, 4))
         self.orientation, self.tilt = self._orientations
         self._orientations[:, 3] = self.numbers[PACE] = self.numbers[LIMITS] = 1.0
@@ -74,8 +76,11 @@ class References:
 
     def start(self, position: np.ndarray, heading: float, orientation: np.ndarray) -> None:
         """Begin with a base at rest, at a position [m], a heading [rad] and an orientation (quaternion)."""
-        self.velocity[:], self.turn[:], self.vertex_velocity[:] = 0.0, 0.0, 0.0
-        self.position[:], self.numbers[:3] = position, (1.0, 1.0, heading)
+        self.velocity[:] = 0.0
+        self.turn[:] = 0.0
+        self.vertex_velocity[:] = 0.0
+        self.position[:] = position
+        self.numbers[:3] = (1.0, 1.0, heading)
         self.tilt[:] = quaternion_product(about_z(-heading), orientation.tolist())
         self.orientation[:] = orientation
 
@@ -87,7 +92,8 @@ class References:
             heading: Its heading [rad].
             vertices: Where the vertices are, as `vertices`.
         """
-        self.position[:2], self.heading = place[:2], heading
+        self.position[:2] = place[:2]
+        self.heading = heading
         np.copyto(self.vertices[:, :2], vertices[:, :2], where=~self.lifted[:, None])
 
     def displace(self, move: PlanarMove) -> None:

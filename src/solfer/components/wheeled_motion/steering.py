@@ -45,7 +45,8 @@ class Steering:
         self._given = period
         self.law = np.array((across, 0.0, rests, *self.numbers(tuning), period), dtype=LAW)
         self.set_step(period)
-        self.wheels, self.before = np.zeros(count, WHEEL), np.zeros(3)
+        self.wheels = np.zeros(count, WHEEL)
+        self.before = np.zeros(3)
         self.steered = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.steered
 
@@ -61,7 +62,8 @@ class Steering:
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""
-        self.law["rate"], self.law["period"] = step / RELAXATION, step
+        self.law["rate"] = step / RELAXATION
+        self.law["period"] = step
 
     def displace(self, move: PlanarMove) -> None:
         """Remember the base where its estimate has jumped to."""
@@ -77,9 +79,12 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
-        self.before[:2], self.before[2], self.wheels["way"] = place, heading, 0.0
+        self.before[:2] = place
+        self.before[2] = heading
+        self.wheels["way"] = 0.0
         if angles is not None:
             self.wheels[:] = np.zeros((), WHEEL)
             for direction in ("angle", "aim", "motion", "error"):
                 np.subtract(angles, heading, out=self.wheels[direction])
-        self.wheels["desired"], self.wheels["turn"] = np.nan, 0.0
+        self.wheels["desired"] = np.nan
+        self.wheels["turn"] = 0.0

@@ -12,8 +12,12 @@ from solfer.config.tasks.stack import StackRecord, TaskRecord
 from solfer.errors import UnknownName
 from solfer.model.contacts import AxisRecord
 
-CONSTRAINTS, BASE, STEERING, VERTICES = "CONSTRAINTS", "BASE", "STEERING", "CONTACT_POINTS"
-CAMBER, CASTER = "CAMBER", "CASTER"
+CONSTRAINTS = "CONSTRAINTS"
+BASE = "BASE"
+STEERING = "STEERING"
+VERTICES = "CONTACT_POINTS"
+CAMBER = "CAMBER"
+CASTER = "CASTER"
 
 SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
@@ -27,7 +31,8 @@ POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"
 IMPROVED = ("rest", "across", "pace")
 """Tags of the improved law alone."""
 
-_OTHERS, _UNREAD = "only `support_shaping` and `NwheelsZMPII` read it", "nothing reads it, in the original neither"
+_OTHERS = "only `support_shaping` and `NwheelsZMPII` read it"
+_UNREAD = "nothing reads it, in the original neither"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
 Limit = Annotated[float, Field(gt=0.0, le=100.0)]

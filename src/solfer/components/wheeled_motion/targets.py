@@ -60,7 +60,8 @@ class Stream:
 
     def note(self, step: float) -> None:
         """Take over a place that is so far from the one before [m or rad]."""
-        self.is_moving, self.age = self.is_followed and self.age <= PATIENCE and step > 0.0, 0.0
+        self.is_moving = self.is_followed and self.age <= PATIENCE and step > 0.0
+        self.age = 0.0
         self.is_followed = True
 
 
@@ -101,7 +102,8 @@ class Targets:
 
     def limit(self, speeds: Sequence[float], accelerations: Sequence[float]) -> None:
         """Set the largest speeds and accelerations, see above."""
-        self._limits[:3, 0], self._limits[:3, 1] = speeds, accelerations
+        self._limits[:3, 0] = speeds
+        self._limits[:3, 1] = accelerations
         self._limits[3:] = self._limits[2]
 
     @property
@@ -122,7 +124,8 @@ class Targets:
     def start(self) -> None:
         """Begin without targets."""
         self._base, self._vertices = Stream(), Stream()
-        self._age, self.share = math.inf, 1.0
+        self._age = math.inf
+        self.share = 1.0
 
     def read(self) -> str:
         """Take over what the ports have received; return what is wrong with it, empty if nothing is."""
@@ -180,7 +183,8 @@ class Targets:
 
     def _approach(self, references: References, passed: float) -> None:
         """Go to places from where the references are; what is abandoned comes to rest."""
-        errors, places = self._errors, self._places
+        errors = self._errors
+        places = self._places
         np.subtract(places[0], references.position, out=errors[0])
         errors[1, 2] = math.remainder(places[1, 2] - references.heading, math.tau)
         np.subtract(places[2:], references.vertices, out=errors[2:])
@@ -191,17 +195,20 @@ class Targets:
             errors[:2] = 0.0
         if self._vertices.is_abandoned:
             errors[2:] = 0.0
-        first, last = 0 if self._base.is_followed else 2, 2 + self._vertices.is_followed * self._count
+        first = 0 if self._base.is_followed else 2
+        last = 2 + self._vertices.is_followed * self._count
         self.share = approach(errors, self._limits, *moving, first, last, LEAD, passed)
         for stream, rates in ((self._base, moving[:2]), (self._vertices, moving[2:])):
             stream.age += passed
             if stream.is_abandoned and not any(rate.any() for rate in rates):
-                stream.is_followed, self.share = False, 1.0
+                stream.is_followed = False
+                self.share = 1.0
 
     def _drive_vertices(self, references: References, share: float, passed: float) -> None:
         """Follow velocities; without new ones come to rest."""
         self._age += passed
-        velocity, most = references.vertex_velocity, self._limits[2, 1] * passed
+        velocity = references.vertex_velocity
+        most = self._limits[2, 1] * passed
         np.multiply(self._desired, share, out=self._change)
         np.subtract(self._change, velocity, out=self._change)
         if self._age > PATIENCE:
@@ -212,7 +219,8 @@ class Targets:
                 change *= most / size
         velocity += self._change
         if self._age > PATIENCE and not velocity.any():
-            self._age, self.share = math.inf, 1.0
+            self._age = math.inf
+            self.share = 1.0
 
     def _aim_base(self, pose: np.ndarray) -> str:
         """Take over a desired pose, of whose orientation the heading counts; return what is wrong with it."""
@@ -224,7 +232,8 @@ class Targets:
         if self._base.is_moving and self._base.age <= PATIENCE and (step > JUMPS[0] or turn > JUMPS[1]):
             return f"'{BASE_PORT}' jumps by {step:.2f} m and {turn:.2f} rad"
         self._base.note(step + turn)
-        self._places[0], self._places[1, 2] = pose[:3], heading
+        self._places[0] = pose[:3]
+        self._places[1, 2] = heading
         return ""
 
     def _aim_vertices(self, places: np.ndarray) -> str:

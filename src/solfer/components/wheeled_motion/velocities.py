@@ -23,8 +23,12 @@ class SentVelocities:
     """
 
     def __init__(self, name: str, drive: Drive, targets: Targets, references: References, offsets: RollingOffsets):
-        self._name, self._drive, self._targets = name, drive, targets
-        self._references, self._offsets, self._throttle = references, offsets, Throttle(log)
+        self._name = name
+        self._drive = drive
+        self._targets = targets
+        self._references = references
+        self._offsets = offsets
+        self._throttle = Throttle(log)
 
     @property
     def share(self) -> float:

@@ -42,7 +42,8 @@ def pruned(tree: YamlNode, module: str, robot: str, middleware: str) -> YamlNode
         robot: Name of its robot configuration.
         middleware: Name of its middleware.
     """
-    section, kept = MIDDLEWARES[middleware].section, YamlNode({}, tree.mark, tree.key)
+    section = MIDDLEWARES[middleware].section
+    kept = YamlNode({}, tree.mark, tree.key)
     paths: list[tuple[Key, ...]] = [("middleware",), ("system",)]
     paths += [("robot", key) for key in ("name", "rate", robot)]
     feedback = tree.get("robot", robot, "feedback")

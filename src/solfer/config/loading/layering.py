@@ -67,7 +67,8 @@ class Layers:
                 written = self.main.get(key) or self.main
                 self.main = _with(self.main, (key,), replace(written, value=value))
         self.names = tuple(name for name, _ in _modules(self.main).items())
-        self._file, self._folders = os.fspath(file), tuple(folders)
+        self._file = os.fspath(file)
+        self._folders = tuple(folders)
         self._read: dict[str, tuple[YamlNode | None, Problems]] = {}
         self._last = over
         if over is not None:
@@ -106,8 +107,11 @@ class Layers:
             UnknownName: There is no such module.
             ConfigError: The module is empty.
         """
-        node, own = self.module(module), ("modules", module)
-        main, chosen, mode = self.main, shared and shared.get("layer"), shared and shared.get("mode")
+        node = self.module(module)
+        own = ("modules", module)
+        main = self.main
+        chosen = shared and shared.get("layer")
+        mode = shared and shared.get("mode")
         within = shared and node.get("shared")
         if within is not None:
             main = _with(main, own, overlaid((node, within), problems) or node)
@@ -125,7 +129,8 @@ class Layers:
 
     def variants(self, problems: Problems) -> Iterator[YamlNode]:
         """Merge everything below the root key, without a secondary file, for each system with each layer."""
-        systems, layers = self.main.get("robot", "systems"), self.main.get("layers")
+        systems = self.main.get("robot", "systems")
+        layers = self.main.get("layers")
         for system in [node for _, node in systems.items()] if systems else [None]:
             for layer in [node for _, node in layers.items()] if layers else [None]:
                 yield self._merged(self.main, (system, layer), problems)

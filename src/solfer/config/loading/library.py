@@ -12,7 +12,8 @@ from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 
-FEEDBACK, CONTROLLER = "feedback", "controller"
+FEEDBACK = "feedback"
+CONTROLLER = "controller"
 
 _RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK: FeedbackRecord, CONTROLLER: ControllerRecord}
 
@@ -27,9 +28,12 @@ class Library:
     """
 
     def __init__(self, tree: YamlNode, middleware: str, direction: str, problems: Problems):
-        self._direction, self._sets, self._middleware = direction, f"{direction}s", MIDDLEWARES[middleware]
+        self._direction = direction
+        self._sets = f"{direction}s"
+        self._middleware = MIDDLEWARES[middleware]
         self._generic, self._special = tree.get(direction), tree.get(self._middleware.section, direction)
-        self._tree, self._problems = tree, problems
+        self._tree = tree
+        self._problems = problems
         parts = [part for part in (self._generic, self._special) if part is not None]
         self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
         self.used: set[tuple[str, str]] = set()

@@ -50,7 +50,8 @@ class Reading:
     """
 
     def __init__(self, tree: YamlNode, problems: Problems):
-        self._tree, self._problems = tree, problems
+        self._tree = tree
+        self._problems = problems
         self.used: Used = set()
         self._dofs: list[DofsRecord] = []
 

@@ -145,7 +145,8 @@ class RtLayer:
             SolferError: As `load`.
             SolferErrors: Several of these.
         """
-        problems, found = Problems(), list[SharedPlugin]()
+        problems = Problems()
+        found = list[SharedPlugin]()
         problems.absorb(self.problems)
         for entry in self.plugins:
             options = {"system": system, "search_paths": search_paths, "shared": entry.shared}
@@ -194,12 +195,11 @@ def read_layer(file: str | os.PathLike, default: Naming = str) -> RtLayer:
     record = read(own, RtPluginsRecord, ("XBotRTPlugins",))
     main = read(own, RtMainRecord, ("mwoibn",))
     executor = read(own, _FileRecord).executor
-    path, named = main.config_file.location, main.config_file.where("file") or main.where("config_file")
+    path = main.config_file.location
+    named = main.config_file.where("file") or main.where("config_file")
     check_file(path, named)
-    problems, known = (
-        Problems(),
-        given if given is not own and os.path.samefile(path, given) else own.other(path, named),
-    )
+    problems = Problems()
+    known = given if given is not own and os.path.samefile(path, given) else own.other(path, named)
     layers = Layers(known, problems)
     _refuse_ros_alone(layers.main, record, known.path)
     entries: Any = own.node.nearest(("XBotRTPlugins", "plugins")).value

@@ -231,11 +231,15 @@ def _expanded(
 
 def _made_unique(plugins: Sequence[ListedPlugin], problems: Problems) -> list[ListedPlugin]:
     """Give plugins whose configuration stands in the list again a name with a number."""
-    own, taken, found = {plugin.name for plugin in plugins}, set[str](), list[ListedPlugin]()
+    own = {plugin.name for plugin in plugins}
+    taken = set[str]()
+    found = list[ListedPlugin]()
     for plugin in plugins:
-        name, number = plugin.name, 2
+        name = plugin.name
+        number = 2
         while name in taken or (name in own and name != plugin.name):
-            name, number = f"{plugin.name}_{number}", number + 1
+            name = f"{plugin.name}_{number}"
+            number = number + 1
         taken.add(name)
         if name != plugin.name:
             what = (
@@ -267,7 +271,8 @@ def _check_required(plugin: SharedPlugin, names: Sequence[str], group: str, prob
 
 def _note_rates(first: SharedPlugin, other: SharedPlugin, group: str, problems: Problems) -> None:
     """Note that two plugins of a group have different rates, at the place of the later one's."""
-    one, another = first.configuration, other.configuration
+    one = first.configuration
+    another = other.configuration
     problems.add(
         another.tree.nearest(("robot", "rate")).mark,
         f"'{other.name}' has {another.rate:g} Hz, and '{first.name}' {one.rate:g} Hz, in {group}",
@@ -277,7 +282,8 @@ def _note_rates(first: SharedPlugin, other: SharedPlugin, group: str, problems: 
 
 def _plugin(layers: Layers, file: str, entry: ListedPlugin, problems: Problems) -> SharedPlugin | None:
     """Load the plugin of an entry; None after a mistake."""
-    found, name = Problems(), entry.configuration
+    found = Problems()
+    name = entry.configuration
     try:
         configuration = Reading(layers.tree(name, found, entry.shared), found).configuration(file, name)
     except SolferError as error:

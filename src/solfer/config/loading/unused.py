@@ -23,7 +23,8 @@ def check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
     named_records(tree.get("calibration"), CalibrationRecord, problems)
     chosen = tree.get("middleware")
     for middleware, kind in MIDDLEWARES.items():
-        section, is_chosen = tree.get(kind.section), chosen is not None and chosen.value == middleware
+        section = tree.get(kind.section)
+        is_chosen = chosen is not None and chosen.value == middleware
         if is_chosen:
             _check_lists(tree, middleware, problems)
         named_records(section and section.get("mapping"), MappingRecord, problems)
@@ -41,7 +42,8 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
         sets = tree.get(f"{direction}s")
         for _, node in sets.items() if sets else ():
             library.check_list(library.list_of(node))
-    robots, misspelt = tree.get("robot"), misspelt_key(tree)
+    robots = tree.get("robot")
+    misspelt = misspelt_key(tree)
     for name, node in robots.items() if robots else ():
         if misspelt is not None and misspelt.where == str(node.head):
             problems.put(node.head, misspelt)
@@ -57,7 +59,8 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
 
 def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | None, problems: Problems) -> None:
     """Check each pipe, or without `used`, for a middleware that is not chosen, each pipe that its section names."""
-    generic, special = tree.get(direction), tree.get(MIDDLEWARES[middleware].section, direction)
+    generic = tree.get(direction)
+    special = tree.get(MIDDLEWARES[middleware].section, direction)
     for part in (special,) if used is None else (generic, special):
         for name, node in part.items() if part else ():
             found = Problems(complete=False)

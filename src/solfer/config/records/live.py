@@ -69,7 +69,8 @@ def is_live(field: FieldInfo) -> bool:
 def live_fields(record: Record) -> Iterator[tuple[Path, FieldInfo]]:
     """Yield the paths of the live fields of a record and of those below it."""
     for name, field in type(record).model_fields.items():
-        key, value = field.alias or name, record.__dict__[name]
+        key = field.alias or name
+        value = record.__dict__[name]
         if value is None and is_live(field):
             if any(typing.get_origin(part) is dict for part in typing.get_args(field.annotation)):
                 continue  # a map that is left out has nothing below it
@@ -165,7 +166,8 @@ class _Requested(Mark):
 
 
 def _node_of(value: Any, path: Path) -> YamlNode:
-    mark, inner = _Requested("", 1, 1, path), value
+    mark = _Requested("", 1, 1, path)
+    inner = value
     if isinstance(value, dict):
         inner = {key: _node_of(each, (*path, key)) for key, each in value.items()}
     elif isinstance(value, list):
@@ -177,7 +179,8 @@ def _replaced(node: YamlNode | None, path: Path, new: YamlNode, above: Path = ()
     """Return a tree with another value at a path."""
     if not path:
         return new
-    key, rest = path[0], path[1:]
+    key = path[0]
+    rest = path[1:]
     below = (*above, key)
     if node is not None and isinstance(node.value, tuple):
         items = [_replaced(each, rest, new, below) if index == key else each for index, each in enumerate(node.value)]
@@ -204,7 +207,8 @@ def _empty(annotation: Any) -> Record | None:
 
 
 def _kinds(annotation: Any) -> Iterator[str]:
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
     if origin is typing.Annotated:
         yield from _kinds(inner[0])
     elif origin is typing.Literal:

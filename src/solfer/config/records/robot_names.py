@@ -26,7 +26,8 @@ def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:
     Defaults are left out: a component may name a group that not every robot has.
     """
     for field, info in type(record).model_fields.items():
-        value, kind = record.__dict__[field], _kind(info)  # not by attribute: obsolete ones would warn
+        value = record.__dict__[field]
+        kind = _kind(info)  # not by attribute: obsolete ones would warn
         if field not in record.model_fields_set:
             continue
         for item in value if isinstance(value, tuple) else (value,):

@@ -103,7 +103,8 @@ def _misspelt(key: str, beside: YamlNode, problems: Problems) -> bool:
 def _unknown_key(
     node: YamlNode, path: tuple[Key, ...], model: type[BaseModel], problems: Problems, also: Iterable[str]
 ) -> None:
-    key, place = str(path[-1]), node.nearest(path).head
+    key = str(path[-1])
+    place = node.nearest(path).head
     if key in (replaced := getattr(model, "replaced", {})):
         problems.add(place, f"the key '{key}' is no more: {replaced[key]}")
         return
@@ -115,7 +116,8 @@ def _complain_at(
     node: YamlNode, path: tuple[Key, ...], items: list[ErrorDetails], record: type[BaseModel], problems: Problems
 ) -> None:
     """Note the error at one place; several items are the alternatives of a union."""
-    item, place = items[0], node.nearest(path)
+    item = items[0]
+    place = node.nearest(path)
     if item["loc"][-1:] == ("[key]",):
         problems.unknown(place.head, "key", str(path[-1]), _allowed(item))
     elif item["type"] == "missing" and isinstance(path[-1], str):

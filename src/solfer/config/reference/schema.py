@@ -111,7 +111,8 @@ class _Records:
     def pipe(self, record: type[PipeRecord], *others: type[PipeRecord]) -> Schema:
         """Build the schema of a pipe that carries DoFs, or the content of one of the `others`."""
         made = self.schema_of(record)
-        own, rest = made["properties"], [self.schema_of(other)["properties"] for other in others]
+        own = made["properties"]
+        rest = [self.schema_of(other)["properties"] for other in others]
         merged = {key: value for properties in rest for key, value in properties.items()}
         interface = {"anyOf": [own["interface"], *(properties["interface"] for properties in rest)]}
         return {**made, "properties": {**merged, **own, "interface": interface}}

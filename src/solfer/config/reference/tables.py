@@ -141,7 +141,8 @@ def _bounds(metadata: Iterable[Any]) -> str:
 
 
 def _value(annotation: Any) -> str:
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
     if annotation in (FileRecord, TextRecord):
         return _FILE if annotation is FileRecord else _TEXT
     if origin is typing.Annotated:

@@ -127,7 +127,8 @@ def translated(
                 where=tags.where("tunnings", str(tags.tunning)),
                 expected=f"a number or a list of them as '{name}'",
             )
-        gain, damp = gains[name], gains.get(name + _TAIL, gains.get("damping"))
+        gain = gains[name]
+        damp = gains.get(name + _TAIL, gains.get("damping"))
         if not isinstance(damp, float) or damp <= 0.0:
             raise ConfigError(
                 f"the tuning '{tags.tunning}' has no damping of '{name}'",
@@ -145,7 +146,8 @@ def _levels(
     tags: OriginalTaskTags, known: Mapping[str, TaskRecord], sums: Mapping[str, Sequence[str]]
 ) -> tuple[tuple[tuple[str, ...], ...], Solver]:
     """Read `IK`: the names of the tasks of each level, and the solver."""
-    levels, solvers = [], []
+    levels = []
+    solvers = []
     for index, entry in enumerate(tags.ik or ()):
         kind, _, name = entry.rpartition("::")
         where = tags.where("IK", index)

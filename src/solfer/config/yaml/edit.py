@@ -79,7 +79,9 @@ def _with(text: str, file: str, path: tuple[Key, ...], value: Any) -> str:
             break
         node = below
     else:
-        begin, end, new = node.start_mark.index, _end(node), _flow(value)
+        begin = node.start_mark.index
+        end = _end(node)
+        new = _flow(value)
         if begin == end:  # nothing behind the colon
             new = f" {new}"
         elif text[end - 1] == "\n":  # behind a block of text
@@ -103,11 +105,13 @@ def _entry(text: str, node: yaml.Node, path: tuple[Key, ...], value: Any) -> _Ed
         place = last if text[last - 1] == "\n" else text.find("\n", last) + 1
         first = ""
         if place == 0:  # the last line of the file has no end
-            place, first = len(text), "\n"
+            place = len(text)
+            first = "\n"
         return place, place, first + "\n".join(rows) + f" {_flow(value)}\n"
     for key in reversed(path):
         value = {key: value}
-    begin, end = node.start_mark.index, _end(node)
+    begin = node.start_mark.index
+    end = _end(node)
     if isinstance(node, yaml.MappingNode):
         return end - 1, end - 1, f"{', ' if node.value else ''}{_flow(value)[1:-1]}"
     return begin, end, f"{' ' if begin == end else ''}{_flow(value)}"

@@ -53,7 +53,8 @@ def opened(path: str | os.PathLike, where: str = "", later: tuple[Key, ...] | No
     """
     if isinstance(path, YamlFile):
         return path
-    file, problems = os.fspath(path), Problems()
+    file = os.fspath(path)
+    problems = Problems()
     problems.reading(file)
     return YamlFile(file, compose(read_text(file, where), file, problems, later), problems)
 

@@ -61,7 +61,8 @@ class Folders:
         in_package = _IN_PACKAGE.fullmatch(text)
         if in_package is None:
             return _below(text, self._roots) if os.path.isabs(text) else None
-        package, top = self._workspace().get(in_package[1]), in_package[2]
+        package = self._workspace().get(in_package[1])
+        top = in_package[2]
         if package is None or top in (os.curdir, os.pardir):
             return None
         inside = text[in_package.start(2) :]

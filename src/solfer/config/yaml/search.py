@@ -33,7 +33,8 @@ def _files_changed(node: YamlNode, change: Callable[[YamlNode, YamlNode | None],
         return replace(node, value=tuple(_files_changed(child, change) for child in node.value))
     if not isinstance(node.value, dict):
         return node
-    file, folder = node.value.get("file"), node.value.get("path")
+    file = node.value.get("file")
+    folder = node.value.get("path")
     if file is not None and isinstance(file.value, str) and (folder is None or isinstance(folder.value, str)):
         path = change(file, folder)
         return node if path is None else replace(node, value=_with_file(node.value, replace(file, value=path)))

@@ -54,7 +54,8 @@ class Claims:
     """
 
     def __init__(self, joints: Mapping[str, Sequence[str]], lease: float):
-        self._joints, self._lease = dict(joints), lease
+        self._joints = dict(joints)
+        self._lease = lease
         self._owners = {name: np.full((len(MODES), len(items)), FREE) for name, items in joints.items()}
         self._ids: dict[str, int] = {}
         self._nodes: Counter[str] = Counter()  # how many owners each node has

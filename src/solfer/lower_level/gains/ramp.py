@@ -18,12 +18,16 @@ class GainRamp:
 
     def __init__(self, gains: np.ndarray):
         self._gains, self._goal, self._left = gains, gains.copy(), np.zeros_like(gains)
-        self._share, self._change = np.zeros_like(gains), np.zeros_like(gains)
-        self._done, self._active = np.zeros(len(gains), dtype=bool), False
+        self._share = np.zeros_like(gains)
+        self._change = np.zeros_like(gains)
+        self._done = np.zeros(len(gains), dtype=bool)
+        self._active = False
 
     def begin(self, goal: np.ndarray, duration: float, joints: Joints = ALL_JOINTS) -> None:
         """Start a ramp of `joints` to their `goal` that ends in `duration` [s]; at once if that is zero."""
-        self._goal[joints], self._left[joints], self._active = goal, duration, True
+        self._goal[joints] = goal
+        self._left[joints] = duration
+        self._active = True
         if not duration:
             self._gains[joints] = goal
 
@@ -43,7 +47,9 @@ class GainRamp:
         """Let `dt` [s] pass."""
         if not self._active:
             return
-        share, change, left = self._share, self._change, self._left
+        share = self._share
+        change = self._change
+        left = self._left
         share.fill(0.0)
         np.divide(dt, left, out=share, where=np.greater(left, 0.0, out=self._done))
         np.greater_equal(share, 1.0, out=self._done)

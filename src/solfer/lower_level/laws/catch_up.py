@@ -50,11 +50,15 @@ class CatchUp:
         size = len(speed_limit)
         self._fastest = SHARE * speed_limit
         self._whole = WHOLE * speed_limit
-        self.distance, self._rate = np.zeros(size), np.zeros(size)
-        self._last, self._speed, self._age = np.zeros(size), np.zeros(size), np.full(size, LONGEST)
+        self.distance = np.zeros(size)
+        self._rate = np.zeros(size)
+        self._last = np.zeros(size)
+        self._speed = np.zeros(size)
+        self._age = np.full(size, LONGEST)
         self._limit = np.array(speed_limit, dtype=float)
         self._moved, self._work, self._bound, self._time, self._change = (np.zeros(size) for _ in range(5))
-        self._news, self._jumped = np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
+        self._news = np.zeros(size, dtype=bool)
+        self._jumped = np.zeros(size, dtype=bool)
         self.active = self._any_news = False
 
     def start(self, position: np.ndarray, joints: np.ndarray | slice = ALL_JOINTS) -> None:
@@ -80,7 +84,11 @@ class CatchUp:
 
     def _judge(self, position: np.ndarray) -> None:
         """Compare the command with where its stream was heading."""
-        moved, extra, time, news, jumped = self._moved, self._work, self._time, self._news, self._jumped
+        moved = self._moved
+        extra = self._work
+        time = self._time
+        news = self._news
+        jumped = self._jumped
         np.minimum(self._age, LONGEST, out=time)
         np.subtract(position, self._last, out=moved)
         # at most the commanded part of the stream's own step: a sender that stood still goes on where it was
@@ -111,7 +119,9 @@ class CatchUp:
 
     def _fade(self, dt: float) -> None:
         """Fade for one step, implicit in the speed."""
-        distance, rate, work = self.distance, self._rate, self._work
+        distance = self.distance
+        rate = self._rate
+        work = self._work
         np.multiply(distance, -FREQUENCY * FREQUENCY * dt, out=work)
         rate += work
         rate /= 1.0 + 2.0 * FREQUENCY * dt

@@ -25,7 +25,9 @@ class CommandCheck:
     """
 
     def __init__(self, controller: str, limits: JointLimits, fields: Sequence[str]):
-        self._controller, self._limits, self.fields = controller, limits, tuple(fields)
+        self._controller = controller
+        self._limits = limits
+        self.fields = tuple(fields)
         self._place = {name: index for index, name in enumerate(limits.joints)}
         self._names: tuple[str, ...] = ()
         self._indices = np.zeros(0, dtype=np.intp)
@@ -81,7 +83,8 @@ class CommandCheck:
                 raise CommandRefused(
                     f"joint '{name}' is named {names.count(name)} times", expected="every joint once at most"
                 )
-        self._names, self._indices = names, np.array([self._place[name] for name in names], dtype=np.intp)
+        self._names = names
+        self._indices = np.array([self._place[name] for name in names], dtype=np.intp)
         return self._indices
 
     def _numbers(self, field: str, values: np.ndarray, names: Sequence[str], indices: np.ndarray) -> np.ndarray:
@@ -102,7 +105,8 @@ class CommandCheck:
                 expected=f"{len(names)} numbers, one for each joint",
             )
         lower, upper = self._bounds[field]
-        low, high = lower[indices], upper[indices]
+        low = lower[indices]
+        high = upper[indices]
         inside = (numbers >= low - TOLERANCE) & (numbers <= high + TOLERANCE) & np.isfinite(numbers)
         if not inside.all():
             wrong = inside.argmin()

@@ -48,7 +48,11 @@ class LowerLevelController(abc.ABC):
     FIELDS: ClassVar[tuple[str, ...]]
 
     def __init__(self, name: str, limits: JointLimits, timeout: float = TIMEOUT):
-        self.name, self.limits, self.joints, self.dofs, self.running = name, limits, limits.joints, limits.dofs, True
+        self.name = name
+        self.limits = limits
+        self.joints = limits.joints
+        self.dofs = limits.dofs
+        self.running = True
         self.velocity = np.zeros(len(self.joints))
         self._check = CommandCheck(name, limits, self.FIELDS)
         self._watchdog = CommandTimeout(len(self.joints), timeout)
@@ -166,7 +170,8 @@ class ImpedanceController(LowerLevelController):
         self.stiffness, self.damping = (gain.copy() for gain in self._default.values())
         self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
         self._turns = np.where(np.isinf(limits.upper), math.tau, 0.0)
-        self.feed_forward, self._share = True, 1.0
+        self.feed_forward = True
+        self._share = 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
         self._leftover = GainRamp(self.effort)
         self._catch_up = CatchUp(limits.velocity)
@@ -248,7 +253,9 @@ class ImpedanceController(LowerLevelController):
     def check_measured(self, indices: np.ndarray, measured: Mapping[str, float]) -> None:
         """See `LowerLevelController.check_measured`; a motor at its largest torque stretches a spring by tau / k."""
         for index in indices[self.stiffness[indices] > 0.0]:
-            joint, held, limits = self.joints[index], self.target[index], self.limits
+            joint = self.joints[index]
+            held = self.target[index]
+            limits = self.limits
             away = measured.get(joint, held) - held
             away -= float(whole_turns(away, self._turns[index]))
             stretch = (limits.effort[index] + abs(self.applied_effort[index])) / self.stiffness[index]

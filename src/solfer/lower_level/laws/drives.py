@@ -49,12 +49,14 @@ class Drives:
         impedances = [item for item in controllers if isinstance(item, ImpedanceController)]
         motors = [item for item in controllers if isinstance(item, VelocityController)]
         springs = springs_of(kinematics, actuators, posture, STEP)
-        moved, held = _dofs(impedances), _dofs(motors)
+        moved = _dofs(impedances)
+        held = _dofs(motors)
         swinging = held[springs.two_mass[held]] if springs else held[:0]
         self.torque_dofs, self.speed_dofs = np.concatenate((moved, swinging)), np.setdiff1d(held, swinging)
         self._law = _law(kinematics, self.torque_dofs, springs, posture)
         self._law.damping[swinging] = HOLDING
-        self.torque, self.speed = self._law.torque, np.zeros(len(self.speed_dofs))
+        self.torque = self._law.torque
+        self.speed = np.zeros(len(self.speed_dofs))
         self._copies = [
             (target, source, item.dofs)
             for item in impedances
@@ -80,7 +82,8 @@ class Drives:
 
     def rest(self) -> None:
         """Set torques and speeds to zero until the next `update`."""
-        self.torque[:], self.speed[:] = 0.0, 0.0
+        self.torque[:] = 0.0
+        self.speed[:] = 0.0
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float, share: float) -> None:
         """Compute `torque` and `speed` for one step.

@@ -58,14 +58,18 @@ class ImplicitImpedance:
         # imported here: its compiler takes a while to load
         from solfer.lower_level.laws import kernel
 
-        size, self._kernel = dynamics.size, kernel
+        size = dynamics.size
+        self._kernel = kernel
         table = self._table = np.zeros((kernel.ROWS, size))
-        table[kernel.UPPER], table[kernel.FASTEST] = effort_limit, velocity_limit
+        table[kernel.UPPER] = effort_limit
+        table[kernel.FASTEST] = velocity_limit
         self.position, self.velocity, self.effort = (
             table[row] for row in (kernel.POSITION, kernel.VELOCITY, kernel.EFFORT)
         )
-        self.stiffness, self.damping = table[kernel.STIFFNESS], table[kernel.DAMPING]
-        self.torque, self._dynamics = table[kernel.TORQUE], dynamics
+        self.stiffness = table[kernel.STIFFNESS]
+        self.damping = table[kernel.DAMPING]
+        self.torque = table[kernel.TORQUE]
+        self._dynamics = dynamics
         self._force, self._loss, self._right = (table[row] for row in (kernel.FORCE, kernel.LOSS, kernel.RIGHT))
         self._matrix = np.zeros((size, size), order="F")
         self._diagonal = self._matrix.reshape(-1, order="F")[:: size + 1]

@@ -12,7 +12,9 @@ TENSION, PULLED, TAKEN, LINKS, MOTORS, FREE, INERT, BEFORE, EXPECTED, SURPRISE =
 ROWS = 30
 """Numbers for each DoF: rows of the table of a law."""
 
-_TABLE, _NUMBERS, _FLAGS = "float64[:, ::1]", "float64[::1]", "boolean[::1]"
+_TABLE = "float64[:, ::1]"
+_NUMBERS = "float64[::1]"
+_FLAGS = "boolean[::1]"
 
 
 def _pull(table, position, velocity, dt):
@@ -33,7 +35,9 @@ def _damp(table, acceleration):
 def _limit(table, velocity):
     """Write the force, within the limits of the drives at a velocity, to the torque; NaN stays NaN."""
     for k in range(table.shape[1]):
-        torque, upper, fastest = table[FORCE, k], table[UPPER, k], table[FASTEST, k]
+        torque = table[FORCE, k]
+        upper = table[UPPER, k]
+        fastest = table[FASTEST, k]
         torque = upper if torque > upper else -upper if torque < -upper else torque
         if (velocity[k] >= fastest and torque > 0.0) or (velocity[k] <= -fastest and torque < 0.0):
             torque = 0.0
@@ -70,7 +74,8 @@ def _balance(table, elastic):
         free = table[PULLED, k] - table[FRICTION, k] * table[MOTOR_VELOCITY, k] - table[TENSION, k]
         inert = table[SLOW, k] + table[TAKEN, k]
         share = table[COUPLING, k] / (inert + table[COUPLING, k]) if elastic[k] else 1.0
-        table[FREE, k], table[INERT, k] = free, inert
+        table[FREE, k] = free
+        table[INERT, k] = inert
         table[FORCE, k] = share * free + table[TENSION, k]
         table[LOSS, k] = share * inert
 
@@ -94,7 +99,9 @@ def _clip(table, sprung):
         clipped = sprung[k] and table[TORQUE, k] != table[DRIVE, k]
         table[DRIVE, k] = table[TORQUE, k]
         if clipped:
-            table[PULLED, k], table[TAKEN, k], some = table[DRIVE, k], 0.0, True
+            table[PULLED, k] = table[DRIVE, k]
+            table[TAKEN, k] = 0.0
+            some = True
     return some
 
 
@@ -102,7 +109,9 @@ def _release(table, elastic, dt):
     """Write the springs' torques with what the drives have left, and move the motors on."""
     for k in range(table.shape[1]):
         free = table[DRIVE, k] - table[FRICTION, k] * table[MOTOR_VELOCITY, k] - table[TENSION, k]
-        motors, coupling, slow = table[MOTORS, k], table[COUPLING, k], table[SLOW, k]
+        motors = table[MOTORS, k]
+        coupling = table[COUPLING, k]
+        slow = table[SLOW, k]
         if elastic[k]:
             motors = (free + coupling * table[LINKS, k]) / (slow + coupling)
             table[MOTORS, k] = motors

@@ -67,15 +67,20 @@ class TwoMassImpedance(ImplicitImpedance):
         dt: float,
     ):
         super().__init__(dynamics, *limits)
-        self._dt, self.springs, table, row = dt, springs, self._table, self._kernel
-        self._elastic, self._sprung = springs.two_mass, springs.stiffness > 0.0
+        self._dt = dt
+        self.springs = springs
+        table = self._table
+        row = self._kernel
+        self._elastic = springs.two_mass
+        self._sprung = springs.stiffness > 0.0
         table[row.SPRING], table[row.DAMPER] = (
             np.where(self._elastic, values, 0.0) for values in (springs.stiffness, springs.damping)
         )
         table[row.FRICTION], table[row.COMPLIANCE] = springs.friction, springs.compliance
         table[row.COUPLING, self._elastic] = self._coupled(dynamics.inertia(posture))
         table[row.SLOW] = np.where(self._elastic, springs.rotor, 0.0) + dt * springs.friction
-        self.motor_position, self.motor_velocity = table[row.MOTOR_POSITION], table[row.MOTOR_VELOCITY]
+        self.motor_position = table[row.MOTOR_POSITION]
+        self.motor_velocity = table[row.MOTOR_VELOCITY]
         self.drive = table[row.DRIVE]
 
     @property
@@ -97,7 +102,8 @@ class TwoMassImpedance(ImplicitImpedance):
             v: Velocity of the links, shape (size,).
             dt: Duration of the step, that of all steps [s].
         """
-        table, elastic = self._table, self._elastic
+        table = self._table
+        elastic = self._elastic
         self._kernel.stretch(table, elastic, q, v, dt, LEARNING)
         self._kernel.pull(table, self.motor_position, self.motor_velocity, dt)
         self._kernel.soften(table, elastic, dt)
@@ -108,7 +114,9 @@ class TwoMassImpedance(ImplicitImpedance):
 
     def _coupled(self, inertia: np.ndarray) -> np.ndarray:
         """Choose gamma, and return what a spring gains for a unit of delta'', K beta dt^2 + D gamma dt."""
-        elastic, dt, row = self._elastic, self._dt, self._kernel
+        elastic = self._elastic
+        dt = self._dt
+        row = self._kernel
         spring, damper = (self._table[each, elastic] for each in (row.SPRING, row.DAMPER))
         alone = mobility_of(inertia, self.springs.rotor, elastic).diagonal()
         damped = dt * damper * alone
@@ -125,7 +133,8 @@ class TwoMassImpedance(ImplicitImpedance):
         Returns:
             Whether drives behind a spring reach their limits; they are constant from now on.
         """
-        table, elastic = self._table, self._elastic
+        table = self._table
+        elastic = self._elastic
         self._kernel.balance(table, elastic)
         self._kernel.move(table, elastic, self._accelerations(q, v))
         self._kernel.limit(table, self.motor_velocity)

@@ -24,8 +24,11 @@ class Overspeed:
     """
 
     def __init__(self, kinematics: Kinematics, factor: float, time: float):
-        self.reason, self._factor, self._time = "", factor, time
-        self._joints, self._calm = kinematics.dofs, 0.0
+        self.reason = ""
+        self._factor = factor
+        self._time = time
+        self._joints = kinematics.dofs
+        self._calm = 0.0
         self._units = [
             "m/s" if joint is not None and joint.type == "prismatic" else "rad/s"
             for joint in map(kinematics.description.joints.get, kinematics.dofs)
@@ -35,11 +38,14 @@ class Overspeed:
         self._bound = factor * self._limit if factor > 0.0 else np.full_like(limit, np.inf)
         self._enabled = bool(np.isfinite(self._bound).any())
         self._speed, self._age, self._change = (np.zeros_like(limit) for _ in range(3))
-        self._beyond, self._counts = np.zeros(limit.shape, dtype=bool), False
+        self._beyond = np.zeros(limit.shape, dtype=bool)
+        self._counts = False
 
     def restart(self) -> None:
         """Forget the past: the robot begins anew."""
-        self.reason, self._calm, self._counts = "", 0.0, False
+        self.reason = ""
+        self._calm = 0.0
+        self._counts = False
         self._age[:] = 0.0
 
     def advance(self, v: np.ndarray, dt: float, stay: bool = False) -> bool:

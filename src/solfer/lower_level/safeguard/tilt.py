@@ -26,10 +26,14 @@ class Tilt:
     """
 
     def __init__(self, kinematics: Kinematics, largest: float, time: float):
-        self.reason, self._largest, self._time, self._age = "", largest, time, 0.0
+        self.reason = ""
+        self._largest = largest
+        self._time = time
+        self._age = 0.0
         self._enabled = kinematics.base is not None and largest > 0.0
         self._vertical = kinematics.base.rotation[2].tolist() if self._enabled else []
-        self._fallen, self._righted = math.cos(largest), math.cos(RIGHTED * largest)
+        self._fallen = math.cos(largest)
+        self._righted = math.cos(RIGHTED * largest)
 
     @property
     def changes(self) -> bool:
@@ -38,7 +42,8 @@ class Tilt:
 
     def restart(self, q: np.ndarray) -> None:
         """Begin anew at q, shape (model size,): whether the robot lies is decided at once."""
-        self.reason, self._age = "", 0.0
+        self.reason = ""
+        self._age = 0.0
         if self._enabled and (cosine := self._cosine(q)) < self._fallen:
             self._fall(cosine)
 
@@ -50,7 +55,8 @@ class Tilt:
         """
         if not self._enabled:
             return False
-        cosine, lay = self._cosine(q), bool(self.reason)
+        cosine = self._cosine(q)
+        lay = bool(self.reason)
         lies = cosine < (self._righted if lay else self._fallen)
         self._age = self._age + dt if lies is not lay else 0.0
         if self._age <= self._time:
@@ -64,7 +70,8 @@ class Tilt:
 
     def _cosine(self, q: np.ndarray) -> float:
         """Compute the tilt's cosine: third entry of R_o Rx(rx) Ry(ry) Rz(rz) e_z, with R_o of the chart's origin."""
-        rx, ry = q.item(3), q.item(4)
+        rx = q.item(3)
+        ry = q.item(4)
         x, y, z = self._vertical
         return x * math.sin(ry) + math.cos(ry) * (z * math.cos(rx) - y * math.sin(rx))
 

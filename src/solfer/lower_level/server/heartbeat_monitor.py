@@ -41,22 +41,28 @@ class HeartbeatMonitor:
     """
 
     def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = CYCLES):
-        self._lower_level, self._process, self._cycles = lower_level, process, cycles
-        self.lost, self.losses = False, 0
-        self._newest, self._age = process.beats(), 0.0
+        self._lower_level = lower_level
+        self._process = process
+        self._cycles = cycles
+        self.lost = False
+        self.losses = 0
+        self._newest = process.beats()
+        self._age = 0.0
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass."""
         newest = self._process.beats()
         if newest is not None and newest != self._newest:
-            self._newest, self._age = newest, 0.0
+            self._newest = newest
+            self._age = 0.0
             if self.lost:
                 self.lost = False
                 logger.info("the commanding process is back")
             return
         self._age += dt
         if self._newest is not None and not self.lost and self._age > self._cycles * self._process.period:
-            self.lost, self.losses = True, self.losses + 1
+            self.lost = True
+            self.losses = self.losses + 1
             self._hold()
 
     def _hold(self) -> None:

@@ -6,7 +6,8 @@ from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
 from solfer.transport.messages import JOINT_FIELDS
 
-LENGTH, NUMBER = 4, 8  # bytes of a length and of a number in a message
+LENGTH = 4
+NUMBER = 8  # bytes of a length and of a number in a message
 HEADER = 1024  # bytes for everything but joints, such as the name of a frame
 NAMES = 4096  # bytes for the names of an owner, of controllers, or of a file
 AMPLE = 2  # names of the hardware may be longer than those of the model

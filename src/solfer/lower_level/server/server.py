@@ -39,12 +39,17 @@ class LowerLevelServer:
     """
 
     def __init__(self, lower_level: LowerLevel, middleware: Middleware, inbox: Inbox):
-        self._lower_level, self._middleware = lower_level, middleware
-        self._throttle, self._refused = Throttle(logging.getLogger(__name__)), lower_level.refused
+        self._lower_level = lower_level
+        self._middleware = middleware
+        self._throttle = Throttle(logging.getLogger(__name__))
+        self._refused = lower_level.refused
         self._starts = lower_level.starts
         self._queues: list[tuple[str, Queue]] = []
-        self._writer, self._published = middleware.writer(REFUSED, REFUSALS), -math.inf
-        self._inbox, self.most, self._ration = inbox, 0, lower_level.ration
+        self._writer = middleware.writer(REFUSED, REFUSALS)
+        self._published = -math.inf
+        self._inbox = inbox
+        self.most = 0
+        self._ration = lower_level.ration
         self._serve(LOWER_LEVEL, lower_level_services(lower_level))
         for name, controller in lower_level.controllers.items():
             largest = self._ration.command or largest_command(controller)

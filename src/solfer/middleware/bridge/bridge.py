@@ -60,8 +60,12 @@ class Bridge:
         wanted: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
         beside: Callable[[], None] = lambda: None,
     ):
-        self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
-        self._wanted, self._beside = wanted, beside
+        self._inside = inside
+        self._outside = outside
+        self._offers = offers
+        self._topics = topics
+        self._wanted = wanted
+        self._beside = beside
         self.forwarding = ServiceForwarder(inside, outside)
         self._ways_in: list[OneWayTopic] = []
         self._ways_out: list[OneWayTopic] = []
@@ -136,7 +140,8 @@ class Bridge:
 
     def _report(self) -> None:
         refused = sum(crossing.refused for crossing in self.crossings.values())
-        news, self._published = refused - self._published, refused
+        news = refused - self._published
+        self._published = refused
         values: dict[str, float | str] = {
             "messages refused": refused,
             "services": len(self.forwarding.names),

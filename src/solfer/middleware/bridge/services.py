@@ -46,7 +46,8 @@ class ServiceForwarder:
     """
 
     def __init__(self, inside: Middleware, outside: Middleware):
-        self._inside, self._outside = inside, outside
+        self._inside = inside
+        self._outside = outside
         self.names: set[str] = set()
         self.requests = 0
         self._waiting: deque[tuple[Callable[[], Future[Any]], Future[Any]]] = deque()

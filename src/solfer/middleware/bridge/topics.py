@@ -29,7 +29,10 @@ class OneWayTopic:
     """
 
     def __init__(self, route: Route, source: Middleware, target: Middleware):
-        self.topic, self.passed, self.refused, self._skipped = route.topic, 0, 0, 0
+        self.topic = route.topic
+        self.passed = 0
+        self.refused = 0
+        self._skipped = 0
         self._queue = source.queue(route.topic, route.message)
         self._writer = target.writer(route.topic, route.message)
         self._each = TYPES.get(route.message, FieldsMessage) is FieldsMessage

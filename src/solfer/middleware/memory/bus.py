@@ -31,7 +31,9 @@ class SenderState:
     """
 
     def __init__(self, sender: str):
-        self.sender, self.arrival, self.sequence = sender, -math.inf, 0
+        self.sender = sender
+        self.arrival = -math.inf
+        self.sequence = 0
         self.newest: Message | None = None
 
 
@@ -50,9 +52,11 @@ class Topic:
     """
 
     def __init__(self, name: str, message_type: str):
-        self.name, self.type = name, message_type
+        self.name = name
+        self.type = message_type
         self.newest: Message | None = None
-        self.arrival, self.sequence = -math.inf, 0
+        self.arrival = -math.inf
+        self.sequence = 0
         self.senders: dict[str, SenderState] = {}
         self.listeners: list[Callable[[Message], None]] = []
         self.ends: tuple[list[object], list[object]] = ([], [])
@@ -85,7 +89,9 @@ class FaultyTopic(Topic):
 
     def __init__(self, name: str, message_type: str, bus: "Bus", faults: TopicFaultsRecord):
         super().__init__(name, message_type)
-        self.lost, self._clock, self._bus = 0, faults.clock, bus
+        self.lost = 0
+        self._clock = faults.clock
+        self._bus = bus
         self._line = Line(faults, bus.faults.draws(f"topic {name.lstrip('/')}"))
 
     def publish(self, message: Message, sender: str, now: float) -> None:
@@ -142,7 +148,9 @@ class Bus:
         self.time, self.faults = 0.0, faults or FaultsRecord()
         self.parameters = dict(parameters or {})
         self.reports: dict[str, HealthReport] = {}
-        self.ended, self.rewinds, self._published = False, 0, -math.inf
+        self.ended = False
+        self.rewinds = 0
+        self._published = -math.inf
         self._topics: dict[str, Topic] = {}
         self._services: dict[str, tuple[Service, Submit]] = {}
         self._agenda: list[_Entry] = []

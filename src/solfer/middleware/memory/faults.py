@@ -71,7 +71,9 @@ class Line:
     """
 
     def __init__(self, faults: TopicFaultsRecord, draws: random.Random):
-        self._faults, self._draw, self._last = faults, draws.random, -math.inf
+        self._faults = faults
+        self._draw = draws.random
+        self._last = -math.inf
 
     def due(self, now: float) -> float | None:
         """Return when a message of the time `now` arrives [s]; None: never."""
@@ -98,7 +100,10 @@ class Stalls:
     """
 
     def __init__(self, faults: LoopFaultsRecord, draws: random.Random, period: float):
-        self._faults, self._draw, self._chance, self._end = faults, draws.random, faults.stalls * period, -math.inf
+        self._faults = faults
+        self._draw = draws.random
+        self._chance = faults.stalls * period
+        self._end = -math.inf
 
     def leaves_out(self, now: float) -> bool:
         """Return whether the cycle of the time `now` [s] is left out."""

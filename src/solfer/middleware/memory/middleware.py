@@ -27,7 +27,8 @@ class MemoryPublisher(Publisher):
 
     def __init__(self, state: SenderState):
         super().__init__(state.sender)
-        self.state, self.seen = state, 0
+        self.state = state
+        self.seen = 0
 
 
 class MemoryReader(Reader):
@@ -40,7 +41,10 @@ class MemoryReader(Reader):
     """
 
     def __init__(self, bus: Bus, topic: Topic, kept: int = 0):
-        self.topic, self._bus, self._source, self._seen = topic.name, bus, topic, 0
+        self.topic = topic.name
+        self._bus = bus
+        self._source = topic
+        self._seen = 0
         self.carries = topic.type
         self.publishers: list[MemoryPublisher] = []
         self._backlog: Backlog[tuple[Message, float]] = Backlog(kept)
@@ -61,7 +65,9 @@ class MemoryReader(Reader):
         if self._source.sequence == self._seen:
             return OLD if self._seen else NONE
         source = self._source
-        self._seen, self.message, self.arrival = source.sequence, source.newest, source.arrival
+        self._seen = source.sequence
+        self.message = source.newest
+        self.arrival = source.arrival
         if len(source.senders) > 1:
             for publisher in self.update():
                 publisher.arrival = publisher.state.arrival
@@ -69,7 +75,8 @@ class MemoryReader(Reader):
 
     def update(self) -> Sequence[MemoryPublisher]:
         """See `Reader.update`."""
-        known, senders = self.publishers, self._source.senders
+        known = self.publishers
+        senders = self._source.senders
         if len(known) < len(senders):
             known.extend(MemoryPublisher(each) for each in list(senders.values())[len(known) :])
         return known
@@ -79,7 +86,8 @@ class MemoryReader(Reader):
         state = publisher.state
         if state.sequence == publisher.seen:
             return NONE if self.message is None else OLD
-        publisher.seen, self.message = state.sequence, state.newest
+        publisher.seen = state.sequence
+        self.message = state.newest
         publisher.arrival = self.arrival = state.arrival
         return NEW
 
@@ -133,7 +141,10 @@ class MemoryWriter(Writer):
     """Writes to a topic on a bus."""
 
     def __init__(self, bus: Bus, topic: Topic, sender: str):
-        self.topic, self._bus, self._target, self._sender = topic.name, bus, topic, sender
+        self.topic = topic.name
+        self._bus = bus
+        self._target = topic
+        self._sender = sender
         self.carries = topic.type
 
     def write(self, message: Message) -> None:
@@ -152,7 +163,8 @@ class MemoryMiddleware(Middleware):
     """
 
     def __init__(self, bus: Bus, name: str = "node"):
-        self.bus, self.name = bus, name
+        self.bus = bus
+        self.name = name
         self._offered = list[str]()
 
     def now(self) -> float:

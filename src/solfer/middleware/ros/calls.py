@@ -69,7 +69,8 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         MiddlewareError: There was no reply within `timeout`.
         Ended: The node was asked to end.
     """
-    resolved, ros_class = rospy.resolve_name(name), service_class(interface)
+    resolved = rospy.resolve_name(name)
+    ros_class = service_class(interface)
     values = {field.name: getattr(request, field.name) for field in dataclasses.fields(request)}
     end = time.monotonic() + timeout
     failure = ""

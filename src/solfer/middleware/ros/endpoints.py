@@ -79,8 +79,11 @@ class Subscription:
         largest: int | None = None,
     ):
         self.codec: Codec = codec(message)
-        self._store, self._now, self._throttle = store, now, Throttle(logger)
-        self._largest, self.oversized = largest, 0
+        self._store = store
+        self._now = now
+        self._throttle = Throttle(logger)
+        self._largest = largest
+        self.oversized = 0
         self._newest: dict[str, bytes] = {}
         self._has_numbers: bool = self.codec.ros_class._has_header
         self._counts: dict[str, tuple[object, int]] = {}
@@ -204,7 +207,8 @@ class RosReader(Reader):
     ):
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
-        self._now, self._lock = now, threading.Lock()
+        self._now = now
+        self._lock = threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
         # of messages that are counted none may be left out
         size = 1 if codec(message).ros_class._has_header and not kept else max(kept, COUNTED)
@@ -212,7 +216,8 @@ class RosReader(Reader):
         self._waiting = deque[tuple[Arrival, RosPublisher]]()
         self.subscription = Subscription(topic, message, size, self._store, now)
         self._decode = self.subscription.codec.decode
-        self.topic, self.carries = self.subscription.topic, self.subscription.codec.ros_class._type
+        self.topic = self.subscription.topic
+        self.carries = self.subscription.codec.ros_class._type
         self._attendance = Attendance(
             self.topic,
             self.subscription.senders,
@@ -345,7 +350,8 @@ class RosWriter(Writer):
     def __init__(self, topic: str, message: str):
         self._codec = codec(message)
         self.topic_publisher = TopicPublisher(topic, self._codec.ros_class)
-        self.topic, self.carries = self.topic_publisher.topic, self._codec.ros_class._type
+        self.topic = self.topic_publisher.topic
+        self.carries = self._codec.ros_class._type
 
     def write(self, message: Message) -> None:
         """See `Writer.write`.

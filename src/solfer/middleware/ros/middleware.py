@@ -57,7 +57,9 @@ class RosMiddleware(Middleware):
     """
 
     def __init__(self, node: RosNode):
-        self._node, self._clock, self.name = node, node.clock, node.name
+        self._node = node
+        self._clock = node.clock
+        self.name = node.name
         self._endpoints: list[RosReader | RosQueue | RosWriter] = []
         self._services: list[RosService | ReconfigureServer] = []
         self._tunings: dict[str, dict[str, RosService]] = {}

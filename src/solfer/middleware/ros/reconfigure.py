@@ -104,8 +104,11 @@ class ReconfigureServer:
     """
 
     def __init__(self, owner: str, getting: RosService, setting: RosService):
-        self._owner, self._getting, self._setting = owner, getting, setting
-        self._lock, self._throttle = threading.Lock(), Throttle(logger)
+        self._owner = owner
+        self._getting = getting
+        self._setting = setting
+        self._lock = threading.Lock()
+        self._throttle = Throttle(logger)
         self._rows: dict[str, _Row] = {}
         self._parts: list[rospy.Publisher] = []
         self._server: rospy.Service | None = None

@@ -60,7 +60,10 @@ class RosService:
     """
 
     def __init__(self, owner: str, service: Service, submit: Submit, running: Callable[[], bool]):
-        self._owner, self._service, self._submit, self._running = owner, service, submit, running
+        self._owner = owner
+        self._service = service
+        self._submit = submit
+        self._running = running
         self._interface = service_class(service.interface)
         self.largest = service.largest
         self.done: Callable[[], None] = lambda: None

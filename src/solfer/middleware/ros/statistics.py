@@ -32,7 +32,9 @@ class StatisticsPublisher:
     """
 
     def __init__(self, look: Callable[[], LayerSummary | None], middleware: Middleware, period: float = PERIOD):
-        self._look, self._middleware, self._period = look, middleware, period
+        self._look = look
+        self._middleware = middleware
+        self._period = period
         self._before: LayerSummary | None = None
         self._publisher = rospy.Publisher(f"/{EXECUTOR}/statistics", LayerStatistics, queue_size=1)
         self._end = threading.Event()

@@ -63,7 +63,8 @@ class BaseTransform:
 
 def pack(message: BodyMessage, stamp: tuple[int, int], prefix: str = "") -> bytes:
     """Pack a tf2_msgs/TFMessage with one transform, and its stamp [s, ns]."""
-    frame, child = message.frame.encode(), prefixed(prefix, message.child).encode()
+    frame = message.frame.encode()
+    child = prefixed(prefix, message.child).encode()
     return b"".join(
         (
             LENGTH.pack(1),

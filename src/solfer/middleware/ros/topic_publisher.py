@@ -43,7 +43,8 @@ class SendBacklog:
         self.rest, count = self.rest[count:], count - len(self.rest)
         while count > 0:
             message = self.newest.pop(next(iter(self.newest)))
-            self.rest, count = message[count:], count - len(message)
+            self.rest = message[count:]
+            count = count - len(message)
 
 
 Backlogs = dict[TCPROSTransport, SendBacklog]
@@ -101,7 +102,8 @@ class TopicPublisher:
         """
         if not self.has_subscribers():
             return
-        implementation, data = self._implementation, frame.bytes
+        implementation = self._implementation
+        data = frame.bytes
         implementation.seq += 1
         frame.number(implementation.seq)
         implementation.message_data_sent += len(data)

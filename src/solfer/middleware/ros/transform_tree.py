@@ -41,7 +41,8 @@ class TransformTree:
         stamp = found.header.stamp.to_sec()
         if stamp and self._middleware.stamp_time() - stamp > STALE:
             return missing
-        place, turn = found.transform.translation, found.transform.rotation
+        place = found.transform.translation
+        turn = found.transform.rotation
         heading = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
         if not math.isfinite(place.x + place.y + heading):
             return f"finite numbers from '{self._fixed}' to '{frame}' on /tf"

@@ -9,7 +9,8 @@ from typing import TextIO
 
 from solfer.errors import MiddlewareError
 
-CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
+CLOCK_MONOTONIC = 1
+TIMER_ABSTIME = 1
 
 RESOLUTION = 1e-9
 """Times that differ by less are one time of a stepped clock: sums of periods are not exact [s]."""
@@ -63,8 +64,10 @@ class SteppedClock:
     """
 
     def __init__(self, lines: TextIO, send: Callable[[str], object]):
-        self._lines, self._send = lines, send
-        self._now, self.ended = 0.0, False
+        self._lines = lines
+        self._send = send
+        self._now = 0.0
+        self.ended = False
 
     def now(self) -> float:
         """Return the time [s]."""
@@ -93,4 +96,5 @@ class SteppedClock:
                 )
             self._now = max(self._now, newest)
             if self._now == math.inf:
-                self._now, self.ended = deadline, True
+                self._now = deadline
+                self.ended = True

@@ -15,7 +15,8 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-KIND, REPORTS = "report", "reports"
+KIND = "report"
+REPORTS = "reports"
 SIZE = 8192
 """Longest report [B]; figures at its end that do not fit are left out."""
 

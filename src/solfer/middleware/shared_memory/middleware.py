@@ -23,7 +23,8 @@ from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
-PARAMETERS, PARAMETER = "provided", "parameter"
+PARAMETERS = "provided"
+PARAMETER = "parameter"
 WAIT = 1e-3
 """Time between two checks of a condition that is waited for [s]."""
 
@@ -73,7 +74,8 @@ class XbotMiddleware(Middleware):
         self._offers: list[ServiceServer] = []
         self._provided: dict[str, Segment] = {}
         self._ears = Ears(self.namespace, name) if listens else None
-        self._any, self._busy = self.namespace.any_bell(), True
+        self._any = self.namespace.any_bell()
+        self._busy = True
         self._survey = Survey(self.namespace)
         self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
         self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
@@ -138,7 +140,8 @@ class XbotMiddleware(Middleware):
         Raises:
             MiddlewareError: There is no room for it, or another node provides it.
         """
-        key, content = name.lstrip("/"), json.dumps(value).encode()
+        key = name.lstrip("/")
+        content = json.dumps(value).encode()
         if key in self._provided:
             self._provided[key] = self._provided[key].recreate(content, 0)
         else:

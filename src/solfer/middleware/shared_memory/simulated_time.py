@@ -4,7 +4,9 @@ from pathlib import Path
 
 from solfer.middleware.shared_memory.memory.latched import latched
 
-FILE, KIND, LAYOUT = "simulated_time", "simulated time", b'{"words": ["rewinds", "time [ns]"]}'
+FILE = "simulated_time"
+KIND = "simulated time"
+LAYOUT = b'{"words": ["rewinds", "time [ns]"]}'
 REWINDS, TIME = range(2)
 
 
@@ -36,7 +38,8 @@ class SimulatedTime:
 
     def publish(self, simulated: float) -> None:
         """Set the time [s]; only the simulator may."""
-        words, time = self.words, round(1e9 * simulated)
+        words = self.words
+        time = round(1e9 * simulated)
         if time < words[TIME]:
             words[REWINDS] += 1
         words[TIME] = time

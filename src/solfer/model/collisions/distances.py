@@ -41,7 +41,8 @@ class LinkDistances:
     """
 
     def __init__(self, kinematics: Kinematics, pairs: Sequence[LinkPair], influence: float, most: int = 32):
-        self._kinematics, self._influence = kinematics, influence
+        self._kinematics = kinematics
+        self._influence = influence
         self._geometry = _geometry(kinematics, {link for pair in pairs for link in pair})
         shapes = _shapes_by_link(kinematics, self._geometry)
         for first, second in pairs:
@@ -60,8 +61,11 @@ class LinkDistances:
         self._carriers, self._centers, radii = _spheres(self._geometry)
         self._reach = (radii[self._first] + radii[self._second] + influence) ** 2
         most = min(most, self.shapes)
-        self.count, self.distance, self.normal = 0, np.zeros(most), np.zeros((most, 3))
-        self.points, self.joints = np.zeros((2, most, 3)), np.zeros((2, most), dtype=np.int64)
+        self.count = 0
+        self.distance = np.zeros(most)
+        self.normal = np.zeros((most, 3))
+        self.points = np.zeros((2, most, 3))
+        self.joints = np.zeros((2, most), dtype=np.int64)
 
     def update(self) -> None:
         """Compute the distances at the last update of the kinematics."""
@@ -123,7 +127,8 @@ def pairs_that_may_touch(
 
 def are_neighbours(kinematics: Kinematics, first: str, second: str) -> bool:
     """Return whether at most one moving joint is between two links."""
-    one, other = kinematics.attachment(first).joint, kinematics.attachment(second).joint
+    one = kinematics.attachment(first).joint
+    other = kinematics.attachment(second).joint
     parents = kinematics.tree.parents
     return one == other or parents[one] == other or parents[other] == one
 

@@ -75,7 +75,8 @@ def read_states(robot: Element, models: Models, where: str, findings: Findings) 
     groups = [element.get("name", "") for element in robot.findall("group")]
     virtual = _virtual_joints(robot)
     for element in robot.findall("group_state"):
-        name, group = element.get("name", ""), element.get("group", "")
+        name = element.get("name", "")
+        group = element.get("group", "")
         place = f"{where}: group_state '{name}'"
         if not name:
             faults.append(
@@ -122,8 +123,10 @@ def note_unknown_elements(robot: Element, where: str, findings: Findings) -> Non
 
 
 def _read_value(joint: Element, models: Models, values: dict[str, float], place: str, findings: Findings) -> None:
-    name, text = joint.get("name", ""), joint.get("value", "")
-    value, faults = _number(text), findings.faults
+    name = joint.get("name", "")
+    text = joint.get("value", "")
+    value = _number(text)
+    faults = findings.faults
     if _places_robot(name, text, models):
         what = f"joint '{name}' has {len(text.split())} values, which place the robot in the world"
         findings.left_out.append(ModelError(what, where=place, expected="one value, of a joint that moves"))
@@ -148,7 +151,9 @@ class _GroupReader:
     """Reads groups one by one, since a group may contain groups that follow it."""
 
     def __init__(self, robot: Element, models: Models, where: str, findings: Findings):
-        self._models, self._where, self._findings = models, where, findings
+        self._models = models
+        self._where = where
+        self._findings = findings
         self._virtual = _virtual_joints(robot)
         self._groups: dict[str, Group] = {}
         self.elements: dict[str, Element] = {}
@@ -212,7 +217,8 @@ class _GroupReader:
             return []
         path = _path(candidates[0], base, tip)
         if path is None:
-            what, expected = f"no chain leads from link '{base}' out to link '{tip}'", "a tip that the base carries"
+            what = f"no chain leads from link '{base}' out to link '{tip}'"
+            expected = "a tip that the base carries"
             self._findings.left_out.append(ModelError(what, where=self._place(group), expected=expected))
         return path or []
 

@@ -47,7 +47,9 @@ class Semantics:
         apart: Iterable[frozenset[str]] = (),
         text: str = "",
     ):
-        self.groups, self.states, self.apart = groups or {}, states or {}, frozenset(apart)
+        self.groups = groups or {}
+        self.states = states or {}
+        self.apart = frozenset(apart)
         self.text = text
 
     @classmethod
@@ -78,7 +80,8 @@ class Semantics:
             UnknownName: Nothing in it belongs to the robot.
         """
         text, element = parse_robot(text, where, "SRDF")
-        models, findings = (description, *others), Findings()
+        models = (description, *others)
+        findings = Findings()
         groups = read_groups(element, models, where, findings)
         states = read_states(element, models, where, findings)
         own = any(states.values()) or any(group.links or group.joints for group in groups.values())

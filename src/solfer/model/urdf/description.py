@@ -33,7 +33,9 @@ class Description:
 
     def __init__(self, text: str, where: str, element: ElementTree.Element):
         faults: list[SolferError] = []
-        self.name, self.text, self.where = element.get("name", ""), text, where
+        self.name = element.get("name", "")
+        self.text = text
+        self.where = where
         if not self.name:
             faults.append(ModelError("the robot has no name", where=where, expected='<robot name="...">'))
         self.links: dict[str, LinkInfo] = _read_all(element, "link", read_link, where, faults)
@@ -118,7 +120,8 @@ class Description:
 
     def _lead(self, name: str, mimic: Mimic) -> list[SolferError]:
         """Find the joint at the end of the chain that a joint follows; return what keeps it from moving that way."""
-        where, way = self.joints[name].where, [name]
+        where = self.joints[name].where
+        way = [name]
         while mimic is not None:
             if mimic.joint not in self.joints:
                 if len(way) == 1:
@@ -145,7 +148,8 @@ class Description:
             above = self.joints[mimic.joint].mimic
             if above is None:
                 return []
-            ratio, offset = mimic.multiplier, mimic.offset
+            ratio = mimic.multiplier
+            offset = mimic.offset
             mimic = Mimic(above.joint, ratio * above.multiplier, ratio * above.offset + offset)
         return []
 

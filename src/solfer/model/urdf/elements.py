@@ -123,7 +123,10 @@ class ElementReader:
     """
 
     def __init__(self, element: Element, file: str, name: str, faults: list[SolferError]):
-        self.element, self._file, self._name, self.faults = element, file, name, faults
+        self.element = element
+        self._file = file
+        self._name = name
+        self.faults = faults
 
     def where(self, element: Element | None = None) -> str:
         """Return the place of the element, or of another one inside of it."""
@@ -190,7 +193,8 @@ class ElementReader:
 def read_link(reader: ElementReader) -> LinkInfo:
     """Read a link without its joints, which only the whole tree knows."""
     element = reader.element
-    visuals, collisions = tuple(element.findall("visual")), tuple(element.findall("collision"))
+    visuals = tuple(element.findall("visual"))
+    collisions = tuple(element.findall("collision"))
     for shape in visuals + collisions:
         _check_shape(reader.inside(shape))
     inertial = reader.find("inertial")
@@ -258,7 +262,8 @@ def read_joint(reader: ElementReader) -> JointInfo:
     length = math.hypot(*axis)
     if length == 0.0 and kind in MOVING_TYPES:
         reader.fault("the axis is zero", expected="a direction")
-    mimic, limits = _read_mimic(reader, kind), _read_limits(reader, kind)
+    mimic = _read_mimic(reader, kind)
+    limits = _read_limits(reader, kind)
     if mimic is not None and limits.get("lower") == limits.get("upper"):
         limits = {name: value for name, value in limits.items() if name not in ("lower", "upper")}
     return JointInfo(

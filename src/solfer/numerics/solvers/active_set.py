@@ -114,7 +114,8 @@ def _directions(normal, turned, factor, active, d, z, r):
 def _rotate(turned, i, j, cosine, sine):
     """Rotate two rows into each other."""
     for k in range(turned.shape[1]):
-        first, second = turned[i, k], turned[j, k]
+        first = turned[i, k]
+        second = turned[j, k]
         turned[i, k] = cosine * first + sine * second
         turned[j, k] = cosine * second - sine * first
 
@@ -126,7 +127,8 @@ def _add(turned, factor, active, d):
         length = math.hypot(d[j - 1], d[j])
         if length > 0.0:
             _rotate(turned, j - 1, j, d[j - 1] / length, d[j] / length)
-            d[j - 1], d[j] = length, 0.0
+            d[j - 1] = length
+            d[j] = 0.0
     for i in range(active + 1):
         factor[i, active] = d[i]
 
@@ -141,10 +143,12 @@ def _drop(turned, factor, active, which, names, multipliers):
     for j in range(which, active - 1):
         length = math.hypot(factor[j, j], factor[j + 1, j])
         if length > 0.0:
-            cosine, sine = factor[j, j] / length, factor[j + 1, j] / length
+            cosine = factor[j, j] / length
+            sine = factor[j + 1, j] / length
             _rotate(turned, j, j + 1, cosine, sine)
             for k in range(j, active - 1):
-                first, second = factor[j, k], factor[j + 1, k]
+                first = factor[j, k]
+                second = factor[j + 1, k]
                 factor[j, k], factor[j + 1, k] = cosine * first + sine * second, cosine * second - sine * first
 
 
@@ -153,18 +157,25 @@ def _most_violated(limits, tolerance, x, normal, is_active):
     """Find the constraint that x violates most: its name (-1 for none) and by how much; write its normal."""
     _, _, matrix, lower, upper, least, largest = limits
     rows, size = matrix.shape
-    name, worst = -1, 0.0
+    name = -1
+    worst = 0.0
     for i in range(rows + size):
         if i < rows:
-            value, low, high = 0.0, lower[i], upper[i]
+            value = 0.0
+            low = lower[i]
+            high = upper[i]
             for k in range(size):
                 value += matrix[i, k] * x[k]
         else:
-            value, low, high = x[i - rows], least[i - rows], largest[i - rows]
+            value = x[i - rows]
+            low = least[i - rows]
+            high = largest[i - rows]
         if low - value > worst and not is_active[2 * i] and low - value > tolerance * max(1.0, abs(low)):
-            name, worst = 2 * i, low - value
+            name = 2 * i
+            worst = low - value
         if value - high > worst and not is_active[2 * i + 1] and value - high > tolerance * max(1.0, abs(high)):
-            name, worst = 2 * i + 1, value - high
+            name = 2 * i + 1
+            worst = value - high
     if name >= 0:
         normal[:] = 0.0
         add_normal(name, 1.0, limits, normal)
@@ -174,7 +185,12 @@ def _most_violated(limits, tolerance, x, normal, is_active):
 @part
 def _equalities(limits, tolerance, turned, factor, x, vectors, names):
     """Make all equalities active that do not depend on others; return their number, -1 for a contradiction."""
-    normal, d, z, r, multipliers, slope = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
+    normal = vectors[0]
+    d = vectors[1]
+    z = vectors[2]
+    r = vectors[3]
+    multipliers = vectors[4]
+    slope = vectors[5]
     active = 0
     for i in range(len(limits[1])):
         normal[:] = 0.0
@@ -187,7 +203,8 @@ def _equalities(limits, tolerance, turned, factor, x, vectors, names):
         for k in range(len(x)):
             x[k] += step * z[k]
         _add(turned, factor, active, d)
-        names[active], multipliers[active] = -1 - i, 0.0
+        names[active] = -1 - i
+        multipliers[active] = 0.0
         active += 1
     return active
 
@@ -195,35 +212,46 @@ def _equalities(limits, tolerance, turned, factor, x, vectors, names):
 @part
 def _blocking(names, multipliers, r, active):
     """Find the active inequality whose multiplier is the first to reach zero (-1 for none), and the step until then."""
-    blocking, step = -1, np.inf
+    blocking = -1
+    step = np.inf
     for j in range(active):
         if names[j] >= 0 and r[j] > 0.0 and multipliers[j] < step * r[j]:
-            blocking, step = j, multipliers[j] / r[j]
+            blocking = j
+            step = multipliers[j] / r[j]
     return blocking, step
 
 
 @part
 def _negative(names, multipliers, active, scale, tolerance):
     """Find the active inequality with the least multiplier that is clearly negative (-1 for none)."""
-    which, least = -1, -tolerance * scale
+    which = -1
+    least = -tolerance * scale
     for j in range(active):
         if names[j] >= 0 and multipliers[j] < least:
-            which, least = j, multipliers[j]
+            which = j
+            least = multipliers[j]
     return which
 
 
 @part
 def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active, x):
     """Write x, the least of 1/2 x^T (H + shift) x + g^T x; return outcome, steps, and the largest residual."""
-    normal, d, z, r, multipliers, slope = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
+    normal = vectors[0]
+    d = vectors[1]
+    z = vectors[2]
+    r = vectors[3]
+    multipliers = vectors[4]
+    slope = vectors[5]
     hessian, gradient, shift = cost
-    residual, is_active[:] = np.inf, 0
+    residual = np.inf
+    is_active[:] = 0
     if not _factorise(hessian, gradient, shift, factor, turned, x):
         return GAVE_UP, 0, residual
     active = _equalities(limits, tolerance, turned, factor, x, vectors, names)
     if active < 0:
         return INFEASIBLE, 0, residual
-    steps, most = 0, 4 * len(is_active)
+    steps = 0
+    most = 4 * len(is_active)
     while steps < most:
         name, violation = _most_violated(limits, tolerance, x, normal, is_active)
         if name < 0:
@@ -260,7 +288,9 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
                 violation *= 1.0 - step / full
             if step == full:
                 _add(turned, factor, active, d)
-                names[active], multipliers[active], is_active[name] = name, multiplier, 1
+                names[active] = name
+                multipliers[active] = multiplier
+                is_active[name] = 1
                 active += 1
                 break
             is_active[names[blocking]] = 0
@@ -269,7 +299,8 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
     return GAVE_UP, steps, residual
 
 
-_MATRIX, _VECTOR = "float64[:, ::1]", "float64[::1]"
+_MATRIX = "float64[:, ::1]"
+_VECTOR = "float64[::1]"
 _PROBLEM = f"{_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}"
 _TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
 
@@ -307,7 +338,9 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
             return NOT_FINITE, 0, np.inf
         if is_contradictory(lower, upper) or is_contradictory(least, largest):
             return INFEASIBLE, 0, np.inf
-        work, moved, before = vectors[:6], vectors[6], vectors[7]
+        work = vectors[:6]
+        moved = vectors[6]
+        before = vectors[7]
         outcome, steps, residual = _attempt(
             (hessian, gradient, 0.0), limits, tolerance, turned, factor, work, names, is_active, x
         )
@@ -316,7 +349,8 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
         entry = 0.0
         for i in range(len(x)):
             entry = max(entry, hessian[i, i])
-        shift, before[:] = SHIFT * entry, 0.0
+        shift = SHIFT * entry
+        before[:] = 0.0
         for _ in range(ROUNDS):
             for i in range(len(x)):
                 moved[i] = gradient[i] - shift * before[i]
@@ -326,7 +360,8 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
             steps += more
             if outcome != SOLVED:
                 return outcome, steps, residual
-            slope, scale = 0.0, 0.0
+            slope = 0.0
+            scale = 0.0
             for i in range(len(x)):
                 slope = max(slope, shift * abs(x[i] - before[i]))
                 scale = max(scale, abs(gradient[i]), entry * abs(x[i]))
@@ -353,7 +388,9 @@ class ActiveSet:
 
     def __init__(self, size: int, inequalities: int, tolerance: float):
         self._tolerance = tolerance
-        self._turned, self._factor, self._vectors = np.zeros((size, size)), np.zeros((size, size)), np.zeros((8, size))
+        self._turned = np.zeros((size, size))
+        self._factor = np.zeros((size, size))
+        self._vectors = np.zeros((8, size))
         self._names = np.zeros(size, dtype=np.int64)
         self._is_active = np.zeros(2 * (size + inequalities), dtype=np.int64)
 

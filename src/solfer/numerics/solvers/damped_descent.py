@@ -17,7 +17,8 @@ SMALLEST = 1e-9
 @part
 def _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers):
     """Write the columns that count of the rows that are not zero, their rates and damping; return their number."""
-    count, width = 0, len(columns)
+    count = 0
+    width = len(columns)
     used[0] = 0
     for level in range(len(ends) - 1):
         for i in range(ends[level], ends[level + 1]):
@@ -36,9 +37,13 @@ def _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers):
 @part
 def _subtract(solved, row, start, end, shares):
     """Subtract the rows from `start` to `end`, times their shares, from another one."""
-    width, k = solved.shape[1], start
+    width = solved.shape[1]
+    k = start
     while k + 3 < end:
-        p, q, r, s = shares[k], shares[k + 1], shares[k + 2], shares[k + 3]
+        p = shares[k]
+        q = shares[k + 1]
+        r = shares[k + 2]
+        s = shares[k + 3]
         for a in range(width):
             solved[row, a] -= p * solved[k, a] + q * solved[k + 1, a] + r * solved[k + 2, a] + s * solved[k + 3, a]
         k += 4
@@ -58,7 +63,8 @@ def _decompose(rows, used, damping, solved, factor):
     """
     width = rows.shape[1]
     for level in range(len(used) - 1):
-        start, end = used[level], used[level + 1]
+        start = used[level]
+        end = used[level + 1]
         for i in range(start, end):
             for a in range(width):
                 solved[i, a] = rows[i, a]
@@ -92,7 +98,8 @@ def _advance(rows, used, rates, solved, factor, shares, out):
     for a in range(width):
         out[a] = 0.0
     for level in range(len(used) - 1):
-        start, end = used[level], used[level + 1]
+        start = used[level]
+        end = used[level + 1]
         for i in range(start, end):
             entry = rates[i]
             for a in range(width):
@@ -112,22 +119,27 @@ def _scale(columns, speed, found):
 
     And the place of the one that it is for; -1: there is none.
     """
-    scale, place = 1.0, -1
+    scale = 1.0
+    place = -1
     for a in range(len(columns)):
-        size, most = abs(found[a]), speed[columns[a]]
+        size = abs(found[a])
+        most = speed[columns[a]]
         if size * scale > most > 0.0:
-            scale, place = most / size, a
+            scale = most / size
+            place = a
     return scale, place
 
 
 @part
 def _shorten(columns, lower, upper, found):
     """Scale velocities so that all are within their bounds; return the scale, and the place of what it is for."""
-    scale, place = 1.0, -1
+    scale = 1.0
+    place = -1
     for a in range(len(columns)):
         bound = upper[columns[a]] if found[a] > 0.0 else -lower[columns[a]]
         if abs(found[a]) * scale > bound:
-            scale, place = bound / abs(found[a]), a
+            scale = bound / abs(found[a])
+            place = a
     return scale, place
 
 
@@ -147,13 +159,15 @@ def _slides(rows, rates, count, found, is_free):
 @part
 def _farthest(columns, lower, upper, is_free, found, scale):
     """Find the place of the velocity that is farthest beyond its bounds; -1: there is none."""
-    place, farthest = -1, SMALLEST
+    place = -1
+    farthest = SMALLEST
     for a in range(len(columns)):
         if is_free[a]:
             value = scale * found[a]
             beyond = max(value - upper[columns[a]], lower[columns[a]] - value)
             if beyond > farthest:
-                place, farthest = a, beyond
+                place = a
+                farthest = beyond
     return place
 
 
@@ -180,16 +194,25 @@ def _descend(
 
     See `DampedDescent`.
     """
-    size, width = _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers), len(columns)
-    rows, solved, factor = rows[:size], solved[:size], factor[:size]
-    rates, squares, shares = numbers[0], numbers[1], numbers[2]
+    size = _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers)
+    width = len(columns)
+    rows = rows[:size]
+    solved = solved[:size]
+    factor = factor[:size]
+    rates = numbers[0]
+    squares = numbers[1]
+    shares = numbers[2]
     _decompose(rows, used, squares, solved, factor)
     _advance(rows, used, rates, solved, factor, shares, found)
     for k in range(len(out)):
         out[k] = 0.0
-    count, scale, last = 0, 1.0, -1
+    count = 0
+    scale = 1.0
+    last = -1
     if len(bounds):
-        lower, upper, speed = bounds[0], bounds[1], bounds[2]
+        lower = bounds[0]
+        upper = bounds[1]
+        speed = bounds[2]
         for a in range(width):
             is_free[a], first[a] = True, found[a]
         while True:
@@ -200,7 +223,8 @@ def _descend(
                 break
             last = place
             value = upper[columns[place]] if found[place] > 0.0 else lower[columns[place]]
-            held[place], is_free[place] = value, False
+            held[place] = value
+            is_free[place] = False
             for i in range(size):
                 rates[i] -= value * rows[i, place]
                 rows[i, place] = 0.0
@@ -219,7 +243,9 @@ def _descend(
     return count, scale, columns[last] if last >= 0 else -1
 
 
-_MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
+_MATRIX = "float64[:, ::1]"
+_VECTOR = "float64[::1]"
+_INDICES = "int64[::1]"
 
 descend = cached(
     f"Tuple((int64, float64, int64))({_MATRIX}, {_VECTOR}, float64[:], {_INDICES}, {_INDICES}, int64, {_MATRIX}, "
@@ -265,15 +291,21 @@ class DampedDescent:
     """
 
     def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray, rigid: int = 0):
-        rows, width = int(ends[-1]), len(columns)
+        rows = int(ends[-1])
+        width = len(columns)
         self._ends, self._columns = ends.astype(np.int64), columns.astype(np.int64)
         self._rows, self._solved = np.zeros((2, rows, width))
-        self._factor, self._numbers = np.zeros((rows, rows)), np.zeros((3, rows))
+        self._factor = np.zeros((rows, rows))
+        self._numbers = np.zeros((3, rows))
         self._found, self._held, self._first = np.zeros((3, width))
         self._rigid = rigid
-        self._used, self._is_free = np.zeros(len(ends), dtype=np.int64), np.zeros(width, dtype=np.bool_)
+        self._used = np.zeros(len(ends), dtype=np.int64)
+        self._is_free = np.zeros(width, dtype=np.bool_)
         self._unbounded = np.zeros((0, size))
-        self.velocity, self.count, self.scale, self.last = np.zeros(size), 0, 1.0, -1
+        self.velocity = np.zeros(size)
+        self.count = 0
+        self.scale = 1.0
+        self.last = -1
 
     def update(
         self, jacobian: np.ndarray, velocity: np.ndarray, damping: np.ndarray, bounds: VelocityBounds | None = None

@@ -23,16 +23,19 @@ class NullSpace:
     """
 
     def __init__(self, size: int):
-        self.size, self.rank = size, 0
+        self.size = size
+        self.rank = 0
         self._packed = np.zeros((size, size), order="F")
-        self._reflectors, self._scales = self._packed[:, :0], np.zeros(0)
+        self._reflectors = self._packed[:, :0]
+        self._scales = np.zeros(0)
         self._identity = np.eye(size)
         self._basis = np.eye(size, order="F")
         self._rows = self._basis.T
         self._span = np.zeros((size, size), order="F")
         self._column = np.zeros((size, 1), order="F")
         # the least work space of LAPACK, which is allocated at each call
-        self._work, self._work_of_pivoting = size, 3 * size + 1
+        self._work = size
+        self._work_of_pivoting = 3 * size + 1
         self._basis_is_current = False
 
     def update(self, matrix: np.ndarray) -> int:
@@ -43,7 +46,8 @@ class NullSpace:
         """
         if matrix.ndim != 2 or matrix.shape[1] != self.size or matrix.shape[0] > self.size:
             raise SizeMismatch(f"a matrix of shape {matrix.shape}, expected (k, {self.size}), k <= {self.size}")
-        self.rank, self._basis_is_current = 0, False
+        self.rank = 0
+        self._basis_is_current = False
         if matrix.shape[0] == 0:
             return 0
         packed = self._packed[:, : matrix.shape[0]]
@@ -51,7 +55,8 @@ class NullSpace:
         packed, _, scales, _, _ = lapack.dgeqp3(packed, lwork=self._work_of_pivoting, overwrite_a=1)
         diagonal = np.abs(packed.diagonal())
         self.rank = int(np.count_nonzero(diagonal > TOLERANCE * diagonal[0]))
-        self._reflectors, self._scales = packed[:, : self.rank], scales[: self.rank]
+        self._reflectors = packed[:, : self.rank]
+        self._scales = scales[: self.rank]
         return self.rank
 
     @property

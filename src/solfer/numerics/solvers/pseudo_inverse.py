@@ -25,7 +25,8 @@ class SymmetricPseudoInverse:
 
     def __init__(self, size: int):
         self.matrix, self.value, self._scaled = np.zeros((3, size, size))
-        self._inverses, self._counts = np.zeros(size), np.zeros(size, dtype=bool)
+        self._inverses = np.zeros(size)
+        self._counts = np.zeros(size, dtype=bool)
         self.rank = 0
 
     def update(self) -> np.ndarray:

@@ -55,11 +55,16 @@ def is_contradictory(lower, upper):
 @part
 def normal_times(name, limits, x):
     """Compute the normal of a constraint times x."""
-    matrix, row, sign, total = limits[2], name // 2, 1.0 - 2.0 * (name % 2), 0.0
+    matrix = limits[2]
+    row = name // 2
+    sign = 1.0 - 2.0 * (name % 2)
+    total = 0.0
     if name >= 2 * len(matrix):
         return sign * x[row - len(matrix)]
     if name < 0:
-        matrix, row, sign = limits[0], -1 - name, 1.0
+        matrix = limits[0]
+        row = -1 - name
+        sign = 1.0
     for k in range(len(x)):
         total += matrix[row, k] * x[k]
     return sign * total
@@ -68,12 +73,16 @@ def normal_times(name, limits, x):
 @part
 def add_normal(name, factor, limits, out):
     """Add `factor` times the normal of a constraint."""
-    matrix, row, sign = limits[2], name // 2, 1.0 - 2.0 * (name % 2)
+    matrix = limits[2]
+    row = name // 2
+    sign = 1.0 - 2.0 * (name % 2)
     if name >= 2 * len(matrix):
         out[row - len(matrix)] += sign * factor
         return
     if name < 0:
-        matrix, row, sign = limits[0], -1 - name, 1.0
+        matrix = limits[0]
+        row = -1 - name
+        sign = 1.0
     for k in range(len(out)):
         out[k] += sign * factor * matrix[row, k]
 
@@ -83,7 +92,9 @@ def side(name, limits):
     """Return the side of a constraint."""
     if name < 0:
         return limits[1][-1 - name]
-    row, rows, is_upper = name // 2, len(limits[2]), name % 2 == 1
+    row = name // 2
+    rows = len(limits[2])
+    is_upper = name % 2 == 1
     if row < rows:
         return -limits[4][row] if is_upper else limits[3][row]
     return -limits[6][row - rows] if is_upper else limits[5][row - rows]
@@ -120,7 +131,8 @@ def is_proof(name, names, active, r, limits, x, rest, tolerance):
         gap -= share
         scale = max(scale, abs(share))
         add_normal(names[j], -r[j], limits, rest)
-    left, largest = 0.0, 1.0
+    left = 0.0
+    largest = 1.0
     for k in range(len(x)):
         left += abs(rest[k])
         largest = max(largest, abs(x[k]))
@@ -131,14 +143,18 @@ def is_proof(name, names, active, r, limits, x, rest, tolerance):
 def _balance(cost, limits, turned, factor, active, names, multipliers, x, slope, d):
     """Write slope H x + g, d = turned slope, and the multipliers; return the share of the slope that they leave."""
     hessian, gradient, shift = cost
-    size, largest, entry_of_hessian, entry_of_x = len(x), 0.0, 0.0, 0.0
+    size = len(x)
+    largest = 0.0
+    entry_of_hessian = 0.0
+    entry_of_x = 0.0
     for i in range(size):
         entry = gradient[i] + shift * x[i]
         for k in range(size):
             entry += hessian[i, k] * x[k]
         slope[i] = entry
         largest = max(largest, abs(gradient[i]))
-        entry_of_hessian, entry_of_x = max(entry_of_hessian, hessian[i, i] + shift), max(entry_of_x, abs(x[i]))
+        entry_of_hessian = max(entry_of_hessian, hessian[i, i] + shift)
+        entry_of_x = max(entry_of_x, abs(x[i]))
     for i in range(size):
         d[i] = 0.0
         for k in range(size):
@@ -168,7 +184,9 @@ def refine(cost, limits, turned, factor, active, names, multipliers, x, vectors,
     Returns:
         The largest of the shares that are left of slope and active constraints, and the scale of the slope.
     """
-    slope, d, lacks = vectors[5], vectors[1], vectors[3]
+    slope = vectors[5]
+    d = vectors[1]
+    lacks = vectors[3]
     for index in range(passes + 1):
         worst, scale = _balance(cost, limits, turned, factor, active, names, multipliers, x, slope, d)
         for j in range(active):

@@ -17,7 +17,8 @@ class Alignment:
     """
 
     def __init__(self, numbers: np.ndarray):
-        self.turn, self.shift = numbers[:9].reshape(3, 3), numbers[9:]
+        self.turn = numbers[:9].reshape(3, 3)
+        self.shift = numbers[9:]
 
     def fit(self, published: tuple[np.ndarray, np.ndarray], known: tuple[np.ndarray, np.ndarray]) -> None:
         """Choose turn and shift so that the pose `published` gets the heading and position of `known`.
@@ -27,7 +28,8 @@ class Alignment:
             known: The same in the Robot's world.
         """
         angle = _heading(known[1]) - _heading(published[1])
-        cosine, sine = math.cos(angle), math.sin(angle)
+        cosine = math.cos(angle)
+        sine = math.sin(angle)
         self.turn[:2, :2] = ((cosine, -sine), (sine, cosine))
         np.subtract(known[0], self.turn @ published[0], out=self.shift)
 

@@ -47,7 +47,9 @@ class BodyCommandPipe(CommandPipe):
     ):
         self._frame = frame
         self._covariances = None if covariances is None else tuple(each.reshape(6, 6) for each in covariances)
-        self._kinematics, self._state, self._link = kinematics, state, link
+        self._kinematics = kinematics
+        self._state = state
+        self._link = link
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._twist_frame = convention.twist.frame

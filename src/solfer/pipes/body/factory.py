@@ -15,7 +15,8 @@ from solfer.pipes.dofs import require_base, require_link
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
     """Make a pipe from a topic to the floating base of a State; see `factory.feedback`."""
-    robot, convention = context.robot, record.convention or ConventionRecord()
+    robot = context.robot
+    convention = record.convention or ConventionRecord()
     link = require_base(record, robot)
     fields = _fields(record)
     message = message_of(record, READINGS, "rigid body")
@@ -48,7 +49,8 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
 
 def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPipe:
     """Make a pipe from pose and twist of a link of a State to a topic; see `factory.controller`."""
-    robot, convention = context.robot, record.convention or ConventionRecord()
+    robot = context.robot
+    convention = record.convention or ConventionRecord()
     if record.filter is not None and record.filter.run:
         raise PipeError(
             f"controller '{record.name}' filters the state of a link",
@@ -134,7 +136,8 @@ def _check_carried(
 
 
 def _mount(record: FeedbackRecord, context: PipeContext, link: str) -> SensorMount:
-    position, rotation = record.offset_position, record.offset_orientation
+    position = record.offset_position
+    rotation = record.offset_orientation
     try:
         return SensorMount(
             context.robot.description,

@@ -70,10 +70,15 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         # imported here: its compiler takes a while to load
         from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
 
-        self._chart, self._mount, self._reading = chart, mount, reading
-        self._carried, self._own_axes, self._go_on = Carried(chart, reading.values, mount.numbers), OWN_AXES, GO_ON
+        self._chart = chart
+        self._mount = mount
+        self._reading = reading
+        self._carried = Carried(chart, reading.values, mount.numbers)
+        self._own_axes = OWN_AXES
+        self._go_on = GO_ON
         self._alignment = Alignment(self._carried.world) if calibrated else None
-        self._measures_pose, self._known = "position" in fields, state.position[:6]
+        self._measures_pose = "position" in fields
+        self._known = state.position[:6]
         self._options = (POSE if self._measures_pose else 0) | (TWIST if "velocity" in fields else 0)
         self._oriented = ORIENTED if "orientation" in reading.carries else 0
         is_turned = measured and self._measures_pose and "orientation" in reading.carries
@@ -103,7 +108,9 @@ class BodyFeedbackPipe(StateFeedbackPipe):
 
     def _decode(self, message: Message) -> None:
         self._match(message)
-        reading, carried, options = self._reading, self._carried, self._options
+        reading = self._reading
+        carried = self._carried
+        options = self._options
         if "orientation" not in reading.lacks:
             options |= self._oriented
         if self._turn_check is not None:
@@ -127,7 +134,9 @@ class BodyFeedbackPipe(StateFeedbackPipe):
 
     def _align(self) -> None:
         """Align the sender's world so that the base is at the pose of the State."""
-        values, mount, state = self._reading.values, self._mount, self._state.position
+        values = self._reading.values
+        mount = self._mount
+        state = self._state.position
         rotation = rotation_from_quaternion(values[:4]) @ mount.rotation.T
         known = self._chart.position + self._chart.rotation @ state[:3]
         self._alignment.fit(

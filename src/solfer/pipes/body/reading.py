@@ -55,14 +55,19 @@ class BodyReading(abc.ABC):
     carries: ClassVar[frozenset[str]]
 
     def __init__(self, body: str, convention: ConventionRecord, axes: tuple[int, int, int] = MOVING):
-        self._body, self._axes, self._twist_frame = body, axes, convention.twist.frame
+        self._body = body
+        self._axes = axes
+        self._twist_frame = convention.twist.frame
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
-        self.values, self.own_axes = np.zeros(13), False
+        self.values = np.zeros(13)
+        self.own_axes = False
         self.force = np.zeros(3)
         self.lacks: frozenset[str] = frozenset()
-        self._quaternion, self._position, self._twist = self.values[:4], self.values[4:7], self.values[7:]
+        self._quaternion = self.values[:4]
+        self._position = self.values[4:7]
+        self._twist = self.values[7:]
         self._angular = self._twist[3:]
         self._quaternion[3] = 1.0
 

@@ -42,14 +42,18 @@ class SensorMount:
     ):
         # kinematics of its own: the Robot's are of another moment, and others update them
         self._kinematics = Kinematics(description, True)
-        self._link, self._state = link, state
+        self._link = link
+        self._state = state
         self._offset = np.zeros(3) if position is None else position
         self._turn = np.eye(3) if rotation is None else rotation
         self.still = not _moving_joints(description, self._kinematics.base_link, link)
-        self._q, self._v = np.zeros(state.size), np.zeros(state.size)
+        self._q = np.zeros(state.size)
+        self._v = np.zeros(state.size)
         self.numbers = np.zeros(18)
-        self.rotation, self.position = self.numbers[:9].reshape(3, 3), self.numbers[9:12]
-        self.linear, self.angular = self.numbers[12:15], self.numbers[15:]
+        self.rotation = self.numbers[:9].reshape(3, 3)
+        self.position = self.numbers[9:12]
+        self.linear = self.numbers[12:15]
+        self.angular = self.numbers[15:]
         self.follow()
 
     def update(self) -> None:
@@ -59,7 +63,8 @@ class SensorMount:
 
     def follow(self) -> None:
         """Compute everything from the State; the base itself is held at the origin of its chart."""
-        kinematics, chart = self._kinematics, self._kinematics.base
+        kinematics = self._kinematics
+        chart = self._kinematics.base
         self._q[6:], self._v[6:] = self._state.position[6:], self._state.velocity[6:]
         kinematics.update(self._q, self._v)
         link_to_base = chart.rotation.T @ kinematics.rotation(self._link)

@@ -40,11 +40,15 @@ class _Wrenches:
         # imported here: its compiler takes a while to load
         from solfer.numerics.wrenches import shift
 
-        self._shift, self._robot, self._contacts, self._published = shift, robot, tuple(contacts), published
+        self._shift = shift
+        self._robot = robot
+        self._contacts = tuple(contacts)
+        self._published = published
         self._turned = np.zeros_like(published) if fixed else published
         self._origins = Handler(LinearPoint(contact.link, robot) for contact in contacts)
         self.all = np.arange(len(published))
-        self._members, self._memory = self.all, np.zeros(0)
+        self._members = self.all
+        self._memory = np.zeros(0)
 
     def write(self, places: np.ndarray) -> None:
         """Write rows of the message to their contacts."""
@@ -63,7 +67,8 @@ class _Wrenches:
     def _move(
         self, source: np.ndarray, taken: np.ndarray, sign: float, out: np.ndarray, put: np.ndarray, places: np.ndarray
     ) -> None:
-        positions, origins = self._robot.contacts.positions, self._origins.value.reshape(-1, 3)
+        positions = self._robot.contacts.positions
+        origins = self._origins.value.reshape(-1, 3)
         self._shift(source, taken, positions, self._members, origins, sign, out, put, places)
 
     def _rotation(self) -> np.ndarray:
@@ -118,7 +123,8 @@ class ContactFeedbackPipe(PointFeedbackPipe):
         rows = port.value.reshape(-1, 6)
         self._robots = _Wrenches(robot, contacts, fixed, rows)
         self._brought = self._robots.all
-        self.frame, self.wrenches = _frame(contacts, fixed), dict(zip(names or ("value",), rows, strict=True))
+        self.frame = _frame(contacts, fixed)
+        self.wrenches = dict(zip(names or ("value",), rows, strict=True))
 
     def repeat(self, arrival: float) -> None:
         """See `FeedbackPipe.repeat`; writes them to the contacts."""

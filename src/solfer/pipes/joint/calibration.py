@@ -34,14 +34,16 @@ class Calibration:
 
     def __init__(self, names: Sequence[str], sign: ArrayLike, offset: ArrayLike):
         self.names = tuple(names)
-        self.sign, self.offset = np.array(sign, dtype=float), np.array(offset, dtype=float)
+        self.sign = np.array(sign, dtype=float)
+        self.offset = np.array(offset, dtype=float)
         for what, values in (("signs", self.sign), ("offsets", self.offset)):
             if values.shape != (len(self.names),):
                 raise SizeMismatch(f"{values.size} {what} for {len(self.names)} joints")
 
     def to_robot(self, field: str) -> Correction:
         """Return the conversion of a message's `field` from hardware to model."""
-        sign, offset = self.sign, self.offset
+        sign = self.sign
+        offset = self.offset
 
         def position(values: np.ndarray, out: np.ndarray) -> None:
             np.subtract(values, offset, out=out)
@@ -51,7 +53,8 @@ class Calibration:
 
     def to_hardware(self, field: str) -> Correction:
         """Return the conversion of a message's `field` from model to hardware."""
-        sign, offset = self.sign, self.offset
+        sign = self.sign
+        offset = self.offset
 
         def position(values: np.ndarray, out: np.ndarray) -> None:
             np.multiply(values, sign, out=out)

@@ -62,7 +62,9 @@ def _turns(record: FeedbackRecord, context: PipeContext, dofs: np.ndarray) -> Jo
 def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPipe:
     """Make a pipe from DoFs of a State to a topic; of a lower-level controller its name plus the sink."""
     fields, message = _carried(record)
-    topic, name, writer = record.sink, record.dofs.mapping, context.writer
+    topic = record.sink
+    name = record.dofs.mapping
+    writer = context.writer
     if record.lower_level:
         writer = context.commander
         if record.sink is not None and not record.sink.startswith("/"):
@@ -75,7 +77,8 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         _check_commanded(record, fields)
         if name in LOWER_LEVEL_MAPS:
             name = controller_map(record.leads_to)  # a controller accepts its own joints only
-    mapping, state = joint_map(record.dofs, name, context.robot, record.name), _state(record, context, fields)
+    mapping = joint_map(record.dofs, name, context.robot, record.name)
+    state = _state(record, context, fields)
     standing = _published_gains(record, context, mapping) if record.lower_level else {}
     for gain, published in standing.items():
         _begin_with(state[gain], mapping.robot_indices, published)
@@ -112,7 +115,8 @@ def _state(record: FeedbackRecord | ControllerRecord, context: PipeContext, fiel
     """Return the State of a pipe, which has all its interfaces: gains are added where the component has not."""
     state = context.state(record.function)
     for field in fields:
-        name, where = interface_of(field), record.interface.where(field)
+        name = interface_of(field)
+        where = record.interface.where(field)
         if name in GAINS and name not in state:
             state.add(name)
         if name not in state:
@@ -185,7 +189,8 @@ def _calibration(record: PipeRecord, context: PipeContext, mapping: Bidirectiona
     """Make a pipe's calibration; it has to have every joint of the robot that the pipe could carry."""
     if record.calibration is None:
         return None
-    robot, calibration = context.robot, context.calibrations[record.calibration]
+    robot = context.robot
+    calibration = context.calibrations[record.calibration]
     wanted = np.intersect1d(select(record.dofs, robot), robot.actuated)
     missing = [robot.dofs[dof] for dof in wanted if robot.dofs[dof] not in calibration.joints]
     if missing:

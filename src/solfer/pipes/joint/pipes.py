@@ -67,7 +67,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
         leaps: JointLeaps | None = None,
         turns: JointTurns | None = None,
     ):
-        dofs, required = np.array(mapping.robot_indices), required or limits is not None
+        dofs = np.array(mapping.robot_indices)
+        required = required or limits is not None
         super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import gather
@@ -124,10 +125,12 @@ class JointFeedbackPipe(StateFeedbackPipe):
         self.part = self._names.match(message.names).target
 
     def _decode(self, message: JointMessage) -> None:
-        names, numbers = message.names, message.block
+        names = message.names
+        numbers = message.block
         order = self._names.match(names)
         if numbers is None:
-            rows, numbers = self._in_order, self._stacked(message)
+            rows = self._in_order
+            numbers = self._stacked(message)
         else:
             if message.rows is not self._carried:
                 self._find_rows(message.rows, len(names))
@@ -136,7 +139,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
         wrong = self._gather(numbers, rows, order.source, order.places, self.values)
         if wrong >= 0:
             row, place = divmod(wrong, len(order.source))
-            field, name = self.state_fields[row].field, names[order.source[place]]
+            field = self.state_fields[row].field
+            name = names[order.source[place]]
             raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
         for correct, values in self._corrections:
             correct(values, values)

@@ -27,7 +27,8 @@ class StartLimits:
 
     def __init__(self, pipe: str, record: LimitsRecord, robot: Robot, dofs: np.ndarray, fields: Sequence[str]):
         self._pipe, self._where = pipe, record.where("tolerance")
-        self._dofs, self._joints = np.array(dofs), tuple(robot.dofs[dof] for dof in dofs)
+        self._dofs = np.array(dofs)
+        self._joints = tuple(robot.dofs[dof] for dof in dofs)
         tolerance = record.tolerance
         turns = np.array([_turns(robot, joint) for joint in self._joints], dtype=bool)
         wider = {

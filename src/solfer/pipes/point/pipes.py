@@ -49,7 +49,9 @@ class PointFeedbackPipe(FeedbackPipe):
         notation: PointNotation | None = None,
     ):
         super().__init__(name, reader, required)
-        self._port, self._frame, self._notation = port, frame, notation
+        self._port = port
+        self._frame = frame
+        self._notation = notation
         self._names = None if names is None else NameOrder(names, known, self.what)
         self._oriented = port.quantity in ("orientation", "pose")
         self._values = np.zeros_like(port.value)
@@ -58,7 +60,8 @@ class PointFeedbackPipe(FeedbackPipe):
     @property
     def lacks(self) -> str:
         """See `FeedbackPipe.lacks`."""
-        absent, whole = [] if self._names is None else self._names.absent(), super().lacks
+        absent = [] if self._names is None else self._names.absent()
+        whole = super().lacks
         return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._values) else whole
 
     def run(self) -> MessageStatus:
@@ -157,7 +160,8 @@ class PointCommandPipe(CommandPipe):
     ):
         self._port, self._throttle, self._notation = port, Throttle(logging.getLogger(__name__)), notation
         self._values = np.zeros_like(port.value)
-        self._numbers, self._finite = self._values.reshape(-1), True
+        self._numbers = self._values.reshape(-1)
+        self._finite = True
         if port.count is not None:
             super().__init__(name, writer, PointsMessage(frame, names or (), self._values))
         elif port.quantity == "wrench":

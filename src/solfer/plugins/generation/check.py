@@ -192,7 +192,8 @@ def _check_module(
     sinks: frozenset[str],
 ) -> bool:
     """Check one module; return whether its component is there, or is reported."""
-    configuration, found = part.configuration, Problems()
+    configuration = part.configuration
+    found = Problems()
     whole = configuration.name in report.configurations
     generator = _generator(part, report, registry, plugin, found)
     record = None if generator is None else generator.component.Tags
@@ -314,7 +315,8 @@ def _generator(
     part: Part, report: CheckReport, registry: Registry, plugin: str | None, problems: Problems
 ) -> type[Generator] | None:
     """Find the generator of a module; None if its component is not available here, or not known, with a warning."""
-    name, class_name = part.configuration.name, part.class_name
+    name = part.configuration.name
+    class_name = part.class_name
     plugins = (plugin,) if plugin else _plugins(name, report, registry)
     runnable = [each for each in plugins if each in registry.names()]
     if class_name is None and not runnable:

@@ -53,7 +53,8 @@ class DryReader(Reader):
     """
 
     def __init__(self, topic: str, message: str):
-        self.topic, self.carries = topic, message
+        self.topic = topic
+        self.carries = message
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
@@ -109,7 +110,9 @@ class DryMiddleware(Middleware):
     """
 
     def __init__(self, configuration: Configuration, files: RobotFiles):
-        self.name, self._configuration, self._files = configuration.module.name, configuration, files
+        self.name = configuration.module.name
+        self._configuration = configuration
+        self._files = files
         self._texts = dict(_texts(configuration.sources, files))
         self._models = {record.urdf.parameter for record in configuration.mappings.values() if record.urdf is not None}
         self._services: set[str] = set()
@@ -257,7 +260,8 @@ def known_without_robot(configuration: Configuration, files: RobotFiles, whole: 
 
 def _known(configuration: Configuration, files: RobotFiles) -> Configuration:
     """Leave out what only the running robot knows: contacts and actuators of a parameter."""
-    sources, robot = configuration.sources, configuration.robot
+    sources = configuration.sources
+    robot = configuration.robot
     if sources is None or sources.urdf is None or not sources.urdf.given:
         given = {key: _as_source(path) for key, path in (("urdf", files.urdf), ("srdf", files.srdf)) if path}
         sources = (sources or SourceRecord()).model_copy(update=given)
@@ -315,7 +319,8 @@ def _filtered(configuration: Configuration, keeps: Callable[[Any], bool]) -> Con
 def _texts(sources: SourceRecord, files: RobotFiles) -> Iterator[tuple[str, Path]]:
     """Yield the parameters of the descriptions, each with the file that has the same text."""
     for key in ("urdf", "srdf", "actuators", "contacts"):
-        source, file = getattr(sources, key), getattr(files, key)
+        source = getattr(sources, key)
+        file = getattr(files, key)
         if source is not None and source.parameter is not None and file is not None:
             yield source.parameter, file
 

@@ -57,7 +57,8 @@ class Generator:
     """Whether the component is known; if not, it is not made, nor are pipes to its ports."""
 
     def __init__(self, configuration: Configuration, middleware: Middleware, sharing: Sharing | None = None):
-        self.configuration, self.middleware = configuration, middleware
+        self.configuration = configuration
+        self.middleware = middleware
         self.inbox = Inbox()
         self.publish: Bindings = ()
         self.requests = RequestNotes()
@@ -156,13 +157,15 @@ class Generator:
 
     def make_component(self, robot: Robot) -> Component:
         """Make the component on `robot`, with its tags and flags from the configuration."""
-        module, tags = self.configuration.module, self.read_tags()
+        module = self.configuration.module
+        tags = self.read_tags()
         if tags is not None:
             problems = Problems()
             check_tags(tags, RobotNames.of_robot(robot), problems)
             problems.raise_if_any()
         component = self._asked(lambda: self.component(robot, tags, module.name), "be made")
-        component.kinematics, component.dynamics = module.kinematics, module.dynamics
+        component.kinematics = module.kinematics
+        component.dynamics = module.dynamics
         component.modify = module.model_change
         component.set_rate(self.configuration.rate)
         return component
@@ -185,7 +188,8 @@ class Generator:
         watches: list[FeedbackTimeout] = []
         controllers: list[tuple[CommandPipe, CommandGate | None]] = []
         errors: list[SolferError] = []
-        configuration, module = self.configuration, self.configuration.module
+        configuration = self.configuration
+        module = self.configuration.module
         gains = [gain for gain in GAINS if gain in robot.command]  # the component's own: pipes add theirs below
         context = PipeContext(
             robot,

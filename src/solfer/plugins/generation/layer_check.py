@@ -35,7 +35,8 @@ def check_layer(
         robot: The robot that the names refer to; by default the one that the main configuration names.
         registry: The plugins that there are; by default the built-in ones.
     """
-    registry, report = registry or Registry(), CheckReport()
+    registry = registry or Registry()
+    report = CheckReport()
     try:
         layer = read_layer(file, registry.configuration)
     except SolferError as error:

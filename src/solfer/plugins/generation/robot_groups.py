@@ -71,7 +71,8 @@ def _received(configuration: Configuration) -> list[dict[str, Any]]:
 
 def apart(one: Configuration, other: Configuration) -> tuple[str, ...]:
     """Return in what the Robots of two plugins differ; empty: they share one."""
-    mine, theirs = _description(one), _description(other)
+    mine = _description(one)
+    theirs = _description(other)
     return tuple(name for name in mine if mine[name] != theirs[name])
 
 
@@ -165,7 +166,8 @@ class MeasuredSources:
         Raises:
             PipeError: Another plugin's feedback feeds one of these numbers from another source.
         """
-        source, plugin = origin(record, configuration), configuration.module.name
+        source = origin(record, configuration)
+        plugin = configuration.module.name
         if source["source"] in self._inside:
             return
         for number in numbers:
@@ -183,7 +185,8 @@ def numbers_of(record: FeedbackRecord) -> Iterator[Number]:
     if isinstance(record, ContactTags):
         yield from (("contact", "wrench", name) for name in record.contacts or ("all",))
         return
-    dofs, body = record.dofs, record.content.body
+    dofs = record.dofs
+    body = record.content.body
     parts: tuple[str, ...] = (UNACTUATED,) if body else {"all": ("actuated", UNACTUATED)}.get(dofs.type, (dofs.type,))
     if not body and dofs.mapping in (FEEDBACK, ACTUATED):  # the orders of what is measured and driven lack a base
         parts = tuple(part for part in parts if part != UNACTUATED)
@@ -200,7 +203,8 @@ def conflicts(
     received: Callable[[Configuration], Iterable[FeedbackRecord]] = lambda each: each.feedbacks,
 ) -> list[SolferError]:
     """Return an error for each feedback of a group that feeds a number which another source feeds, too."""
-    sources, errors = MeasuredSources(group), list[SolferError]()
+    sources = MeasuredSources(group)
+    errors = list[SolferError]()
     for configuration in group:
         for record in received(configuration):
             if record.of_plugins:
@@ -234,8 +238,10 @@ _SIDES = {"state": "measured ", "motor": "motor side's "}
 
 def _description(configuration: Configuration) -> dict[str, Any]:
     """Return what plugins that share a Robot have in common, by the words of `apart`."""
-    sources, robot = configuration.sources, configuration.robot
-    actuators, contacts = robot.actuators.read, robot.contacts.read
+    sources = configuration.sources
+    robot = configuration.robot
+    actuators = robot.actuators.read
+    contacts = robot.contacts.read
     return {
         "model": (robot.name, _text(sources.urdf), _text(sources.srdf)),
         "system": configuration.system,

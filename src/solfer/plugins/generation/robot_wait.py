@@ -46,7 +46,9 @@ def wait_for_robot(
     Raises:
         UnknownName: A description has a misspelt name.
     """
-    configurations, looks, said = tuple(configurations), 0, ""
+    configurations = tuple(configurations)
+    looks = 0
+    said = ""
     while running():
         found = missing(configurations, middleware)
         if not found:
@@ -55,7 +57,8 @@ def wait_for_robot(
             return True
         if found != said or looks % round(AGAIN / LOOK) == 0:
             logger.warning("waits for the robot: %s", found)
-            said, looks = found, 0
+            said = found
+            looks = 0
         looks += 1
         pause()
     return False

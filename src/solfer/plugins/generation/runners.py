@@ -43,7 +43,8 @@ def require_ros(configuration: Configuration, default: Naming, shared: bool = Fa
     Raises:
         ConfigError: Its `middleware` is not ROS, or its `layer` is not NRT; the error names the command that runs it.
     """
-    name, foreign = configuration.name, _foreign(configuration)
+    name = configuration.name
+    foreign = _foreign(configuration)
     if foreign is not None:
         raise ConfigError(
             f"'{name}' is for the {foreign.what}, and this node runs the layer NRT on ROS",
@@ -81,7 +82,8 @@ def note_runners(report: CheckReport, default: Naming) -> None:
         if foreign is not None:
             refused.setdefault(foreign, {})[name] = configuration
     for foreign, found in refused.items():
-        first, command = next(iter(found)), _command(next(iter(found.values())), default)
+        first = next(iter(found))
+        command = _command(next(iter(found.values())), default)
         what = f"`rosrun plugins plugin` refuses {', '.join(found)}, for the {foreign.what}; {command} runs '{first}'"
         report.problems.inform(foreign.mark, what)
     _note_required(report)
@@ -94,7 +96,8 @@ def start_line(configuration: Configuration, component: str) -> str:
         configuration: The configuration.
         component: Name of the component's class.
     """
-    module, robot = configuration.module, configuration.robot
+    module = configuration.module
+    robot = configuration.robot
     named = module.name if module.name == configuration.name else f"{module.name} ({configuration.name})"
     return (
         f"{component} runs as {named} of {configuration.file}: layer {module.layer}, middleware "
@@ -123,7 +126,8 @@ def _note_required(report: CheckReport) -> None:
 def _foreign(configuration: Configuration) -> Foreign | None:
     """Return what says that a configuration is not for the layer NRT on ROS; also of one with mistakes."""
     tree = configuration.tree
-    middleware, layer = tree.get("middleware"), tree.get("modules", configuration.name, "layer")
+    middleware = tree.get("middleware")
+    layer = tree.get("modules", configuration.name, "layer")
     if middleware is not None and middleware.value != DEFAULT:
         return Foreign(middleware.mark, f"middleware {middleware.value}", f"`middleware: {DEFAULT}`")
     if layer is not None and layer.value == "RT":

@@ -42,7 +42,8 @@ def check_sources(
         source = (record.source or "").lstrip("/")
         if not source or _spelling(source) in spellings:
             continue
-        close, mark = nearest(source, published, likeness=ALIKE), record.place("source")
+        close = nearest(source, published, likeness=ALIKE)
+        mark = record.place("source")
         if close and mark is not None:
             what = f"neither the simulated robot nor a plugin of this file publishes '{record.source}'"
             problems.warn(mark, f"{what}; did you mean {' or '.join(close)}?")
@@ -65,7 +66,8 @@ def _listed(configuration: Configuration) -> Iterator[str]:
     tree = configuration.tree
     library = tree.get(configuration.section, "controller") if configuration.middleware else None
     for name, pipe in library.items() if library is not None else ():
-        sink, kind = pipe.get("sink"), tree.get("controller", name, "type")
+        sink = pipe.get("sink")
+        kind = tree.get("controller", name, "type")
         if sink is not None and isinstance(sink.value, str):
             owner = tree.get("controller", name, "controller")
             leads_to = name if owner is None else owner.value

@@ -30,7 +30,9 @@ class LeakyCounter:
     """
 
     def __init__(self, limit: int):
-        self.limit, self.count, self.total = limit, 0, 0
+        self.limit = limit
+        self.count = 0
+        self.total = 0
 
     def add(self, bad: bool) -> bool:
         """Count a turn; return whether bad ones are too often now."""
@@ -59,8 +61,10 @@ class Budget:
     """
 
     def __init__(self, rules: BudgetRules, period: int):
-        self.limit, self._grace = int(rules.share * period), rules.grace
-        self.overruns, self._begin = LeakyCounter(rules.overruns), 0
+        self.limit = int(rules.share * period)
+        self._grace = rules.grace
+        self.overruns = LeakyCounter(rules.overruns)
+        self._begin = 0
 
     def restart(self, cycle: int) -> None:
         """Begin anew with a start of the plugin in this cycle of the loop."""

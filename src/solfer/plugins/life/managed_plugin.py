@@ -27,7 +27,9 @@ class ManagedPlugin:
     """
 
     def __init__(self, plugin: Plugin, blend: float | None = None):
-        self.plugin, self.state, self.reason = plugin, PluginState.CONFIGURED, ""
+        self.plugin = plugin
+        self.state = PluginState.CONFIGURED
+        self.reason = ""
         self.failure: BaseException | None = None
         self.starts = self.aborts = 0
         self.changed: Callable[[ManagedPlugin], None] = lambda _: None
@@ -67,7 +69,8 @@ class ManagedPlugin:
         """Start as soon as the plugins of `after` are at rest; one that is new starts with what it has received."""
         new = self.state is PluginState.CONFIGURED
         self.starts += 1
-        self.failure, self._before = None, tuple(after)
+        self.failure = None
+        self._before = tuple(after)
         self._go(PluginState.STARTING)
         if not (self._before or new):
             self._try(self.plugin.restart, PluginState.STARTING)
@@ -80,7 +83,8 @@ class ManagedPlugin:
     def abort(self, reason: str, failure: BaseException | None = None) -> None:
         """Hold at once, without calling the component; `failure`: what its run failed with, None: it is a request."""
         self.aborts += 1
-        self._before, self.failure = (), failure
+        self._before = ()
+        self.failure = failure
         try:
             self.plugin.abort()
         except BaseException as error:
@@ -140,9 +144,12 @@ class ManagedPlugin:
 
     def _go(self, state: PluginState, reason: str = "") -> None:
         if state is not self.state or reason != self.reason:
-            self.state, self.reason = state, reason
+            self.state = state
+            self.reason = reason
             self.changed(self)
 
 
 # module globals: the lookup in the control cycle is several times as fast as on the class
-STARTING, RUNNING, STOPPING = PluginState.STARTING, PluginState.RUNNING, PluginState.STOPPING
+STARTING = PluginState.STARTING
+RUNNING = PluginState.RUNNING
+STOPPING = PluginState.STOPPING

@@ -72,7 +72,9 @@ class PluginSet:
         requires: Mapping[str, Sequence[str]] = NOTHING,
     ):
         _check(plugins)
-        self.rate, self.cycles, self._polls = plugins[0].rate, 0, tuple(polls)
+        self.rate = plugins[0].rate
+        self.cycles = 0
+        self._polls = tuple(polls)
         self._interrupted = interrupted
         period = round(1e9 / self.rate)
         self.plugins = tuple(ManagedPlugin(plugin, blend) for plugin in plugins)
@@ -138,7 +140,8 @@ class PluginSet:
         """Count a cycle in which a component `took` so long [ns]; abort its plugin if it is too slow too often."""
         if not managed.active or (took > budget.limit >= took - self._interrupted()):
             return
-        before, often = budget.overruns.total, budget.exceeded(took, self.cycles)
+        before = budget.overruns.total
+        often = budget.exceeded(took, self.cycles)
         if budget.overruns.total != before:
             managed.changed(managed)
         if often:
@@ -162,7 +165,8 @@ class PluginSet:
 
 def _measure(plugins: Sequence[Plugin], nanoseconds: Callable[[], int], times: np.ndarray) -> tuple[memoryview, ...]:
     """Let each plugin measure its stages in its part of `times`; return these parts."""
-    words, stages = memoryview(times).cast("B").cast("q"), len(STAGES)
+    words = memoryview(times).cast("B").cast("q")
+    stages = len(STAGES)
     parts = tuple(words[index * stages : (index + 1) * stages] for index in range(len(plugins)))
     for plugin, part in zip(plugins, parts, strict=True):
         plugin.measure_with(nanoseconds, part)

@@ -39,7 +39,8 @@ class CommandGate:
         from solfer.numerics.kernels import inside
 
         self._inside = inside
-        self._owner, self._pipe = owner, pipe
+        self._owner = owner
+        self._pipe = pipe
         self.kinds = (NOT_FINITE, *(field for field, _ in pipe.fields))
         self._counts = memoryview(bytearray(8 * len(self.kinds))).cast("q")
         self._throttle = Throttle(logging.getLogger(__name__))

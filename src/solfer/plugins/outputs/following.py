@@ -28,7 +28,8 @@ class JointFollowing:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import find_astray, find_stuck
 
-        self._owner, self._names = owner, robot.dofs
+        self._owner = owner
+        self._names = robot.dofs
         state = robot.state
         self._watched: list[tuple[Callable[..., int], tuple[np.ndarray, ...]]] = []
         for pipe in pipes:

@@ -56,9 +56,15 @@ class Outputs:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import finite, keep
 
-        self._finite, self._keep, self._requests = finite, keep, requests
-        self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
-        self._idle, self._reported = idle, [0] * len(self.controllers)
+        self._finite = finite
+        self._keep = keep
+        self._requests = requests
+        self.controllers = tuple(controllers)
+        self.blend = blend
+        self._robot = robot
+        self._sent = False
+        self._idle = idle
+        self._reported = [0] * len(self.controllers)
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
@@ -78,7 +84,8 @@ class Outputs:
             if field == "position"
         ]
         self.following = following
-        self.start_position, self._are_followed = np.array(robot.state.position), False
+        self.start_position = np.array(robot.state.position)
+        self._are_followed = False
         self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
 
     def _moves(self, pipe: JointCommandPipe) -> bool:
@@ -176,7 +183,8 @@ class Outputs:
         """
         for place, (pipe, gate) in enumerate(self.controllers):
             counts = {} if gate is None else gate.counts
-            news, self._reported[place] = sum(counts.values()) - self._reported[place], sum(counts.values())
+            news = sum(counts.values()) - self._reported[place]
+            self._reported[place] = sum(counts.values())
             state = "computed, not sent: idle" if self._idle and gate is not None else "sent" if running else "not sent"
             summary = f"{state}; {news} numbers were not finite, or held at a limit" if news else state
             yield pipe.name, HealthReport(Health.WARNING if news else Health.GOOD, summary, dict(counts))

@@ -56,7 +56,9 @@ class StartBlend:
         measured: np.ndarray | None = None,
         efforts: np.ndarray | None = None,
     ):
-        self._owner, self._rate, self.shortest = owner, rate, shortest
+        self._owner = owner
+        self._rate = rate
+        self.shortest = shortest
         known = {"position": measured, "effort": np.zeros(robot.size, dtype=bool) if efforts is None else efforts}
         self._position = robot.state.position
         self._fields = [
@@ -74,7 +76,8 @@ class StartBlend:
 
     def start(self, position: np.ndarray) -> None:
         """Start again at the next `step`, with joints at `position`, shape (robot.size,) [rad, m]."""
-        self._position, self._planned = position, False
+        self._position = position
+        self._planned = False
 
     def step(self) -> None:
         """Blend what the pipes have collected, in place; to be called once a cycle, before sending."""
@@ -114,8 +117,10 @@ class _Field:
     """
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
-        self._values, self._dofs = values, pipe.dofs
-        self._start, self.gap = np.zeros_like(values), np.zeros_like(values)
+        self._values = values
+        self._dofs = pipe.dofs
+        self._start = np.zeros_like(values)
+        self.gap = np.zeros_like(values)
         self._unknown = np.zeros(len(pipe.dofs), dtype=bool) if known is None else ~known[pipe.dofs]
 
     def begin(self, position: np.ndarray) -> None:
@@ -139,8 +144,10 @@ class _Limited(_Field):
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
         super().__init__(name, values, pipe, robot, known)
-        dofs, interface = pipe.dofs, interface_of(name)
-        self._lower, self._upper = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
+        dofs = pipe.dofs
+        interface = interface_of(name)
+        self._lower = robot.lower_limits[interface][dofs]
+        self._upper = robot.upper_limits[interface][dofs]
 
     def _begin_at(self, state: np.ndarray) -> None:
         np.take(state, self._dofs, out=self._start, mode="clip")

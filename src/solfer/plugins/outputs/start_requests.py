@@ -47,7 +47,9 @@ class StartRequests:
     """
 
     def __init__(self, plugin: str, middleware: Middleware, requests: Sequence[StartRequest]):
-        self._plugin, self._middleware, self.requests = plugin, middleware, tuple(requests)
+        self._plugin = plugin
+        self._middleware = middleware
+        self.requests = tuple(requests)
 
     def send(self) -> None:
         """Send them all."""
@@ -83,7 +85,8 @@ def requests_of(records: Sequence[ControllerRecord], gains: TextRecord | None) -
             what = "switch feed-forward torques on"
             yield StartRequest(_service(record, record.ff_service), SWITCH_FEED_FORWARD, Flag(True), what)
         if given is not None and (record.load_service is not None or record.has_springs):
-            request, what = FileRequest(str(given.location)), f"load {given.location}"
+            request = FileRequest(str(given.location))
+            what = f"load {given.location}"
             yield StartRequest(_service(record, record.load_service or LOAD), LOAD_GAINS, request, what)
 
 

@@ -16,7 +16,8 @@ def publications(configuration: Configuration, resolve: Callable[[str], str]) ->
         configuration: The plugin's configuration.
         resolve: See `Middleware.resolve`.
     """
-    module, found = configuration.module, list[SharedTopic]()
+    module = configuration.module
+    found = list[SharedTopic]()
     if module.silent:
         return []
     for record in configuration.controllers:

@@ -23,7 +23,9 @@ class SpaceMember(Middleware):
     """
 
     def __init__(self, component: str, space: SharedSpace, outside: Middleware):
-        self.component, self._space, self._outside = component, space, outside
+        self.component = component
+        self._space = space
+        self._outside = outside
         # without a call in between: a cycle reads the time often
         self.now = outside.now  # type: ignore[method-assign]
 
@@ -72,7 +74,8 @@ class SpaceMember(Middleware):
 
     def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
         """See `Middleware.reader`; what another component of the shared plugin publishes comes from there alone."""
-        resolved, message = self.resolve(topic), canonical(message)
+        resolved = self.resolve(topic)
+        message = canonical(message)
         channel = self._space.published_to(self.component, resolved, message)
         if channel is not None:
             channel.heard = True

@@ -67,7 +67,9 @@ class SharedGenerator:
         known: Callable[[Configuration], Configuration] = lambda configuration: configuration,
     ):
         self.faults: list[SolferError] = []
-        self._listed, self._generators, self._known = listed, generators, known
+        self._listed = listed
+        self._generators = generators
+        self._known = known
         self._outside = [middleware_of(each.configuration) for each in listed]
         self.spaces = self._make_spaces()
         self.sharing = Sharing([each.configuration for each in listed], [each.group for each in listed])
@@ -109,7 +111,8 @@ class SharedGenerator:
 
     def _check_ends(self, plugins: Sequence[Plugin | None]) -> None:
         """Check the ends of those that could be made."""
-        feedbacks, commands = [], list[CommandPipe]()
+        feedbacks = []
+        commands = list[CommandPipe]()
         for each, plugin in zip(self._listed, plugins, strict=True):
             if plugin is not None:
                 places = {record.name: record.where("source") for record in each.configuration.feedbacks}
@@ -142,7 +145,8 @@ def find_generator(listed: SharedPlugin, registry: Registry) -> type[Generator]:
         SolferError: See `Registry.find`; at the `class` of its configuration, or else in the list.
     """
     configuration = listed.configuration
-    name, class_name = configuration.name, configuration.module.class_
+    name = configuration.name
+    class_name = configuration.module.class_
     where = listed.where if class_name is None else configuration.where("modules", name, "class")
     return registry.find(listed.plugin, class_name, where)
 

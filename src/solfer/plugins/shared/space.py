@@ -48,9 +48,11 @@ class SpaceChannel:
     """
 
     def __init__(self, publication: SharedTopic):
-        self.publication, self.heard = publication, False
+        self.publication = publication
+        self.heard = False
         self.message: Message | None = None
-        self.sequence, self.arrival = 0, -math.inf
+        self.sequence = 0
+        self.arrival = -math.inf
         self._original: Message | None = None
         self._arrays: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
@@ -130,8 +132,11 @@ class SpaceWriter(Writer):
     """
 
     def __init__(self, outside: Writer, channel: SpaceChannel, now: Callable[[], float]):
-        self.topic, self.carries, self.channel = outside.topic, outside.carries, channel
-        self._outside, self._now = outside, now
+        self.topic = outside.topic
+        self.carries = outside.carries
+        self.channel = channel
+        self._outside = outside
+        self._now = now
 
     @property
     def heard(self) -> bool:  # type: ignore[override]
@@ -162,7 +167,10 @@ class SpaceReader(Reader):
     """
 
     def __init__(self, topic: str, channel: SpaceChannel, now: Callable[[], float]):
-        self.topic, self.channel, self._now, self._seen = topic, channel, now, 0
+        self.topic = topic
+        self.channel = channel
+        self._now = now
+        self._seen = 0
         self._publisher = Publisher(channel.publication.component)
 
     def read(self) -> MessageStatus:
@@ -180,7 +188,8 @@ class SpaceReader(Reader):
         channel = self.channel
         if channel.sequence == self._seen:
             return OLD if self._seen else NONE
-        self._seen, self.message = channel.sequence, channel.message
+        self._seen = channel.sequence
+        self.message = channel.message
         publisher.arrival = self.arrival = channel.arrival
         return NEW
 
@@ -198,9 +207,12 @@ class OthersReader(Reader):
     """
 
     def __init__(self, outside: Reader, senders: Collection[str]):
-        self.topic, self.carries = outside.topic, outside.carries
-        self._outside, self._senders = outside, frozenset(senders)
-        self._known, self._newest = 0, -math.inf
+        self.topic = outside.topic
+        self.carries = outside.carries
+        self._outside = outside
+        self._senders = frozenset(senders)
+        self._known = 0
+        self._newest = -math.inf
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""

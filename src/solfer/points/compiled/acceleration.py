@@ -27,7 +27,8 @@ from solfer.points.compiled.rigid import placed, turned
 @kernel
 def material_acceleration(row, program, with_jacobian):
     """Write the accelerations of a point on a link and of the link, and their offset; parameters as in `place`."""
-    numbers, offset = numbers_of(row, 3), carray(floats(row.offset), (row.rows,))
+    numbers = numbers_of(row, 3)
+    offset = carray(floats(row.offset), (row.rows,))
     drift, spin, bias, motion = _twists(row, program)
     point = placed(placements_of(program)[row.joint], numbers[0], numbers[1], numbers[2])
     for rates, out in ((bias, offset), (motion, value_of(row))):
@@ -51,7 +52,8 @@ def rolling_acceleration(row, program, with_jacobian):
 
 @njit
 def _touch(row, program, of_material):
-    numbers, offset = numbers_of(row, 11), carray(floats(row.offset), (row.rows,))
+    numbers = numbers_of(row, 11)
+    offset = carray(floats(row.offset), (row.rows,))
     placement = placements_of(program)[row.joint]
     drift, spin, bias, motion = _twists(row, program)
     for rates, out in ((bias, offset), (motion, value_of(row))):
@@ -67,16 +69,21 @@ def _twists(row, program):
     The axis of a joint moves along with what carries it: dS/dt = V x S. Source: R. Featherstone, "Rigid Body Dynamics
     Algorithms", 2008, sections 2.10 and 5.3.
     """
-    joints, velocity, acceleration = joints_of(program), velocity_of(program), acceleration_of(program)
+    joints = joints_of(program)
+    velocity = velocity_of(program)
+    acceleration = acceleration_of(program)
     drift = spin = linear = angular = full_linear = full_angular = (0.0, 0.0, 0.0)
     for k in columns_of(row):
-        column, rate = joints[k], velocity[k]
-        shift, axis = (column[0], column[1], column[2]), (column[3], column[4], column[5])
+        column = joints[k]
+        rate = velocity[k]
+        shift = (column[0], column[1], column[2])
+        axis = (column[3], column[4], column[5])
         linear = _plus(linear, rate, _plus(_cross(spin, shift), 1.0, _cross(drift, axis)))
         angular = _plus(angular, rate, _cross(spin, axis))
         full_linear = _plus(full_linear, acceleration[k], shift)
         full_angular = _plus(full_angular, acceleration[k], axis)
-        drift, spin = _plus(drift, rate, shift), _plus(spin, rate, axis)
+        drift = _plus(drift, rate, shift)
+        spin = _plus(spin, rate, axis)
     motion = _plus(full_linear, 1.0, linear), _plus(full_angular, 1.0, angular)
     return drift, spin, (linear, angular), motion
 
@@ -97,10 +104,14 @@ def _touching(of_material, numbers, placement, drift, spin, linear, angular):
     """
     center = placed(placement, numbers[0], numbers[1], numbers[2])
     axis = turned(placement, numbers[3], numbers[4], numbers[5])
-    normal, ring, tube = (numbers[6], numbers[7], numbers[8]), numbers[9], numbers[10]
+    normal = (numbers[6], numbers[7], numbers[8])
+    ring = numbers[9]
+    tube = numbers[10]
     axis_1 = _cross(spin, axis)
     axis_2 = _plus(_cross(angular, axis), 1.0, _cross(spin, axis_1))
-    along, along_1, along_2 = _dot(axis, normal), _dot(axis_1, normal), _dot(axis_2, normal)
+    along = _dot(axis, normal)
+    along_1 = _dot(axis_1, normal)
+    along_2 = _dot(axis_2, normal)
     down = _plus(normal, -along, axis)
     length = math.sqrt(_dot(down, down))
     # a wheel that lies flat touches the ground with its whole ring: its centre stands for it

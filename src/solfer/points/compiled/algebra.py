@@ -32,7 +32,8 @@ def minus(row, program, with_jacobian):
 def _add(row, program, sign, with_jacobian):
     """Compute the first operand plus `sign` times the second."""
     value = value_of(row)
-    a, b = carray(floats(row.first), (row.size,)), carray(floats(row.second), (row.size,))
+    a = carray(floats(row.first), (row.size,))
+    b = carray(floats(row.second), (row.size,))
     for i in range(row.size):
         value[i] = a[i] + sign * b[i]
     if with_jacobian:
@@ -42,9 +43,14 @@ def _add(row, program, sign, with_jacobian):
 @njit
 def _add_jacobians(row, program, rows, sign):
     """Write the first `rows` rows of the first operand's Jacobian plus `sign` times those of the second's."""
-    dofs, columns, jacobian = program.dofs, columns_of(row), jacobian_of(row, program)
-    length, first, second = rows * dofs, row.first_jacobian, row.second_jacobian
-    a, b = carray(floats(first), (length,)), carray(floats(second), (length,))
+    dofs = program.dofs
+    columns = columns_of(row)
+    jacobian = jacobian_of(row, program)
+    length = rows * dofs
+    first = row.first_jacobian
+    second = row.second_jacobian
+    a = carray(floats(first), (length,))
+    b = carray(floats(second), (length,))
     for index in range(rows):
         start = index * dofs
         for k in columns:
@@ -81,7 +87,9 @@ def _turn_difference(row, program, skipped, d):
     L = I - [d] / 2 + s [d]^2 is the inverse of the left Jacobian of SO(3); that of the right one is its transpose L'.
     Source: G. Chirikjian, "Stochastic Models, Information Theory, and Lie Groups", volume 2, 2012, section 10.6.
     """
-    dofs, columns, jacobian = program.dofs, columns_of(row), jacobian_of(row, program)
+    dofs = program.dofs
+    columns = columns_of(row)
+    jacobian = jacobian_of(row, program)
     for index in range(skipped, skipped + 3):
         for k in columns:
             jacobian[index * dofs + k] = 0.0
@@ -99,8 +107,12 @@ def _add_turned(address, sign, first, dofs, d, columns, jacobian):
     s = (1.0 - 0.5 * angle / math.tan(0.5 * angle)) / angle**2 if angle > 1e-3 else 1.0 / 12.0 + angle**2 / 720.0
     source = carray(floats(address), (first + 3 * dofs,))
     for k in columns:
-        x, y, z = source[first + k], source[first + dofs + k], source[first + 2 * dofs + k]
-        cx, cy, cz = d[1] * z - d[2] * y, d[2] * x - d[0] * z, d[0] * y - d[1] * x
+        x = source[first + k]
+        y = source[first + dofs + k]
+        z = source[first + 2 * dofs + k]
+        cx = d[1] * z - d[2] * y
+        cy = d[2] * x - d[0] * z
+        cz = d[0] * y - d[1] * x
         jacobian[first + k] += sign * (x + s * (d[1] * cz - d[2] * cy)) - 0.5 * cx
         jacobian[first + dofs + k] += sign * (y + s * (d[2] * cx - d[0] * cz)) - 0.5 * cy
         jacobian[first + 2 * dofs + k] += sign * (z + s * (d[0] * cy - d[1] * cx)) - 0.5 * cz
@@ -110,7 +122,8 @@ def _add_turned(address, sign, first, dofs, d, columns, jacobian):
 def pose_minus(row, program, with_jacobian):
     """Compute the difference of two poses: of the positions, then of the orientations."""
     value = value_of(row)
-    a, b = carray(floats(row.first), (7,)), carray(floats(row.second), (7,))
+    a = carray(floats(row.first), (7,))
+    b = carray(floats(row.second), (7,))
     for i in range(3):
         value[i] = a[i] - b[i]
     orientation_difference(a[3:], b[3:], value[3:])
@@ -122,7 +135,8 @@ def pose_minus(row, program, with_jacobian):
 @kernel
 def norm(row, program, with_jacobian):
     """Compute the Euclidean norm of the operand; its Jacobian at zero is zero."""
-    size, value = row.first_size, value_of(row)
+    size = row.first_size
+    value = value_of(row)
     a = carray(floats(row.first), (size,))
     square = 0.0
     for i in range(size):
@@ -130,7 +144,9 @@ def norm(row, program, with_jacobian):
     value[0] = math.sqrt(square)
     if not with_jacobian:
         return
-    dofs, columns, jacobian = program.dofs, columns_of(row), jacobian_of(row, program)
+    dofs = program.dofs
+    columns = columns_of(row)
+    jacobian = jacobian_of(row, program)
     scale = 1.0 / value[0] if value[0] > SMALLEST else 0.0
     for k in columns:
         jacobian[k] = 0.0
@@ -150,8 +166,10 @@ def fold(row, program, with_jacobian):
     """
     if not with_jacobian:
         return
-    dofs, jacobian = program.dofs, jacobian_of(row, program)
-    table, ratios = carray(followers(row.table), (row.table_rows,)), numbers_of(row, row.table_rows)
+    dofs = program.dofs
+    jacobian = jacobian_of(row, program)
+    table = carray(followers(row.table), (row.table_rows,))
+    ratios = numbers_of(row, row.table_rows)
     for index in range(row.table_rows):
         follower = table[index]
         for line in range(row.rows):

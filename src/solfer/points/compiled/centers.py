@@ -24,13 +24,18 @@ def center_of_mass(row, program, with_jacobian):
 
     Parameters: parents of the joints; masses, levers (3), masses and moments (3) of subtrees.
     """
-    joints, placements = joints_of(program), placements_of(program)
-    value, jacobian = value_of(row), jacobian_of(row, program)
+    joints = joints_of(program)
+    placements = placements_of(program)
+    value = value_of(row)
+    jacobian = jacobian_of(row, program)
     dofs = program.dofs
     bodies = dofs + 1
-    parents, numbers = carray(integers(row.table), (bodies,)), numbers_of(row, 8 * bodies)
-    masses, levers = numbers[:bodies], numbers[bodies : 4 * bodies]
-    subtrees, moments = numbers[4 * bodies : 5 * bodies], numbers[5 * bodies :]
+    parents = carray(integers(row.table), (bodies,))
+    numbers = numbers_of(row, 8 * bodies)
+    masses = numbers[:bodies]
+    levers = numbers[bodies : 4 * bodies]
+    subtrees = numbers[4 * bodies : 5 * bodies]
+    moments = numbers[5 * bodies :]
     moments[:3] = 0.0
     for body in range(1, bodies):
         x, y, z = placed(placements[body], levers[3 * body], levers[3 * body + 1], levers[3 * body + 2])
@@ -39,13 +44,17 @@ def center_of_mass(row, program, with_jacobian):
         moments[3 * body + 2] = masses[body] * z
     share = 1.0 / subtrees[0]
     for body in range(bodies - 1, 0, -1):
-        mx, my, mz = moments[3 * body], moments[3 * body + 1], moments[3 * body + 2]
+        mx = moments[3 * body]
+        my = moments[3 * body + 1]
+        mz = moments[3 * body + 2]
         above = 3 * parents[body]
         moments[above] += mx
         moments[above + 1] += my
         moments[above + 2] += mz
         if with_jacobian:
-            column, mass, k = joints[body - 1], subtrees[body], body - 1
+            column = joints[body - 1]
+            mass = subtrees[body]
+            k = body - 1
             jacobian[k] = share * (mass * column[0] + column[4] * mz - column[5] * my)
             jacobian[dofs + k] = share * (mass * column[1] + column[5] * mx - column[3] * mz)
             jacobian[2 * dofs + k] = share * (mass * column[2] + column[3] * my - column[4] * mx)
@@ -60,9 +69,12 @@ def center_of_pressure(row, program, with_jacobian):
     A contact with a moment t and the normal force f presses n x t / f beside its position. Parameters: the normal n
     (3); a table of `PRESSING`. Without normal forces the value stays, and the Jacobian is zero.
     """
-    dofs, columns = program.dofs, columns_of(row)
-    value, jacobian = value_of(row), jacobian_of(row, program)
-    table, normal = carray(contacts(row.table), (row.table_rows,)), numbers_of(row, 3)
+    dofs = program.dofs
+    columns = columns_of(row)
+    value = value_of(row)
+    jacobian = jacobian_of(row, program)
+    table = carray(contacts(row.table), (row.table_rows,))
+    normal = numbers_of(row, 3)
     pressed = 0.0
     for one in range(row.table_rows):
         pressed += _normal_force(table[one], normal)
@@ -83,7 +95,8 @@ def center_of_pressure(row, program, with_jacobian):
         if contact.holds_moment:
             torque = carray(floats(contact.wrench), (6,))[3:]
             for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
+                j = (i + 1) % 3
+                k = (i + 2) % 3
                 value[i] += (normal[j] * torque[k] - normal[k] * torque[j]) / pressed
         if with_jacobian and contact.jacobian != 0:
             source = carray(floats(contact.jacobian), (3 * dofs,))
@@ -94,7 +107,8 @@ def center_of_pressure(row, program, with_jacobian):
 @njit
 def _normal_force(contact, normal):
     """Compute the force of the ground along the normal [N]; a contact does not pull."""
-    force, flags = carray(floats(contact.wrench), (3,)), carray(integers(contact.flags), (2,))
+    force = carray(floats(contact.wrench), (3,))
+    flags = carray(integers(contact.flags), (2,))
     along = normal[0] * force[0] + normal[1] * force[1] + normal[2] * force[2]
     return 0.0 if flags[1] else max(along, 0.0)
 

@@ -9,9 +9,12 @@ from solfer.points.compiled.registry import kernel
 @kernel
 def posture(row, program, with_jacobian):
     """Copy positions of DoFs; parameters: the positions of all, and the indices of those that count."""
-    dofs, columns = program.dofs, columns_of(row)
-    value, jacobian = value_of(row), jacobian_of(row, program)
-    positions, indices = numbers_of(row, dofs), carray(integers(row.table), (len(value),))
+    dofs = program.dofs
+    columns = columns_of(row)
+    value = value_of(row)
+    jacobian = jacobian_of(row, program)
+    positions = numbers_of(row, dofs)
+    indices = carray(integers(row.table), (len(value),))
     for index in range(len(value)):
         value[index] = positions[indices[index]]
         if with_jacobian:

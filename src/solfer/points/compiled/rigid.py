@@ -53,13 +53,25 @@ def quaternion(r):
     """
     trace = r[0] + r[4] + r[8]
     if trace >= r[0] and trace >= r[4] and trace >= r[8]:
-        x, y, z, w = r[5] - r[7], r[6] - r[2], r[1] - r[3], 1.0 + trace
+        x = r[5] - r[7]
+        y = r[6] - r[2]
+        z = r[1] - r[3]
+        w = 1.0 + trace
     elif r[0] >= r[4] and r[0] >= r[8]:
-        x, y, z, w = 1.0 + 2.0 * r[0] - trace, r[1] + r[3], r[2] + r[6], r[5] - r[7]
+        x = 1.0 + 2.0 * r[0] - trace
+        y = r[1] + r[3]
+        z = r[2] + r[6]
+        w = r[5] - r[7]
     elif r[4] >= r[8]:
-        x, y, z, w = r[1] + r[3], 1.0 + 2.0 * r[4] - trace, r[5] + r[7], r[6] - r[2]
+        x = r[1] + r[3]
+        y = 1.0 + 2.0 * r[4] - trace
+        z = r[5] + r[7]
+        w = r[6] - r[2]
     else:
-        x, y, z, w = r[2] + r[6], r[5] + r[7], 1.0 + 2.0 * r[8] - trace, r[1] - r[3]
+        x = r[2] + r[6]
+        y = r[5] + r[7]
+        z = 1.0 + 2.0 * r[8] - trace
+        w = r[1] - r[3]
     scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
     return x * scale, y * scale, z * scale, w * scale
 
@@ -68,7 +80,10 @@ def quaternion(r):
 def write_orientation(placement, fixed, out):
     """Write the quaternion of a frame with the constant quaternion `fixed` in a joint's frame; w >= 0."""
     ax, ay, az, aw = quaternion(placement)
-    bx, by, bz, bw = fixed[0], fixed[1], fixed[2], fixed[3]
+    bx = fixed[0]
+    by = fixed[1]
+    bz = fixed[2]
+    bw = fixed[3]
     w = aw * bw - ax * bx - ay * by - az * bz
     sign = -1.0 if w < 0.0 else 1.0
     out[0] = sign * (aw * bx + ax * bw + ay * bz - az * by)
@@ -92,26 +107,36 @@ def velocity(row, program, with_jacobian):
 @njit
 def _update(row, program, moving, with_jacobian):
     """Write place or velocity, as `moving` says, and the Jacobian, which is the same for both."""
-    has_linear, angular, first = row.motion & LINEAR, row.motion & ANGULAR, 3 if row.motion & LINEAR else 0
-    numbers, placement = numbers_of(row, 7), placements_of(program)[row.joint]
-    value, dofs = value_of(row), program.dofs
+    has_linear = row.motion & LINEAR
+    angular = row.motion & ANGULAR
+    first = 3 if row.motion & LINEAR else 0
+    numbers = numbers_of(row, 7)
+    placement = placements_of(program)[row.joint]
+    value = value_of(row)
+    dofs = program.dofs
     x, y, z = placed(placement, numbers[0], numbers[1], numbers[2])
     if moving:
         value[:] = 0.0
     else:
         if has_linear:
-            value[0], value[1], value[2] = x, y, z
+            value[0] = x
+            value[1] = y
+            value[2] = z
         if angular:
             write_orientation(placement, numbers[3:], value[first:])
     if not (moving or with_jacobian):
         return
-    joints, rates, jacobian = joints_of(program), velocity_of(program), jacobian_of(row, program)
+    joints = joints_of(program)
+    rates = velocity_of(program)
+    jacobian = jacobian_of(row, program)
     for k in columns_of(row):
         column = joints[k]
         if has_linear:
             vx, vy, vz = linear(column, x, y, z)
             if with_jacobian:
-                jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = vx, vy, vz
+                jacobian[k] = vx
+                jacobian[dofs + k] = vy
+                jacobian[2 * dofs + k] = vz
             if moving:
                 value[0] += vx * rates[k]
                 value[1] += vy * rates[k]

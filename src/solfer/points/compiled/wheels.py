@@ -38,44 +38,66 @@ def rolling(row, program, with_jacobian):
 
 @njit
 def _update(row, program, of_material, with_jacobian):
-    value, numbers, placement = value_of(row), numbers_of(row, 11), placements_of(program)[row.joint]
+    value = value_of(row)
+    numbers = numbers_of(row, 11)
+    placement = placements_of(program)[row.joint]
     cx, cy, cz = placed(placement, numbers[0], numbers[1], numbers[2])
     ax, ay, az = turned(placement, numbers[3], numbers[4], numbers[5])
-    nx, ny, nz, ring, tube = numbers[6], numbers[7], numbers[8], numbers[9], numbers[10]
+    nx = numbers[6]
+    ny = numbers[7]
+    nz = numbers[8]
+    ring = numbers[9]
+    tube = numbers[10]
     along = ax * nx + ay * ny + az * nz
-    dx, dy, dz = nx - along * ax, ny - along * ay, nz - along * az
+    dx = nx - along * ax
+    dy = ny - along * ay
+    dz = nz - along * az
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     # a wheel that lies flat touches the ground with its whole ring: its centre stands for it
     scale = 1.0 / length if length > SMALLEST else 0.0
-    dx, dy, dz = dx * scale, dy * scale, dz * scale
-    px, py, pz = cx - ring * dx - tube * nx, cy - ring * dy - tube * ny, cz - ring * dz - tube * nz
-    value[0], value[1], value[2] = px, py, pz
+    dx = dx * scale
+    dy = dy * scale
+    dz = dz * scale
+    px = cx - ring * dx - tube * nx
+    py = cy - ring * dy - tube * ny
+    pz = cz - ring * dz - tube * nz
+    value[0] = px
+    value[1] = py
+    value[2] = pz
     if not with_jacobian:
         return
-    dofs, joints, jacobian = program.dofs, joints_of(program), jacobian_of(row, program)
+    dofs = program.dofs
+    joints = joints_of(program)
+    jacobian = jacobian_of(row, program)
     for k in columns_of(row):
         column = joints[k]
         if of_material:
             vx, vy, vz = linear(column, px, py, pz)
         else:
             vx, vy, vz = linear(column, cx, cy, cz)
-            ux, uy, uz = (
-                column[4] * az - column[5] * ay,
-                column[5] * ax - column[3] * az,
-                column[3] * ay - column[4] * ax,
-            )
+            ux = column[4] * az - column[5] * ay
+            uy = column[5] * ax - column[3] * az
+            uz = column[3] * ay - column[4] * ax
             turn = ux * nx + uy * ny + uz * nz
-            ux, uy, uz = -along * ux - turn * ax, -along * uy - turn * ay, -along * uz - turn * az
+            ux = -along * ux - turn * ax
+            uy = -along * uy - turn * ay
+            uz = -along * uz - turn * az
             part = ux * dx + uy * dy + uz * dz
             factor = ring * scale
-            vx, vy, vz = vx - factor * (ux - part * dx), vy - factor * (uy - part * dy), vz - factor * (uz - part * dz)
-        jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = vx, vy, vz
+            vx = vx - factor * (ux - part * dx)
+            vy = vy - factor * (uy - part * dy)
+            vz = vz - factor * (uz - part * dz)
+        jacobian[k] = vx
+        jacobian[dofs + k] = vy
+        jacobian[2 * dofs + k] = vz
 
 
 @kernel
 def camber(row, program, with_jacobian):
     """Update the camber of one of several wheels; parameters: its axle in the joint's frame (3); its number."""
-    numbers, placement, index = numbers_of(row, 3), placements_of(program)[row.joint], _number_of(row)
+    numbers = numbers_of(row, 3)
+    placement = placements_of(program)[row.joint]
+    index = _number_of(row)
     x, y, z = turned(placement, numbers[0], numbers[1], numbers[2])
     value_of(row)[index] = -math.asin(min(max(z, -1.0), 1.0))
     if with_jacobian:
@@ -89,10 +111,14 @@ def caster(row, program, with_jacobian):
 
     Parameters: its axle n and the axis u of its steering in the joint's frame (3 each); its number.
     """
-    numbers, placement, index = numbers_of(row, 6), placements_of(program)[row.joint], _number_of(row)
+    numbers = numbers_of(row, 6)
+    placement = placements_of(program)[row.joint]
+    index = _number_of(row)
     x, y, z = turned(placement, numbers[0], numbers[1], numbers[2])
     ux, uy, uz = turned(placement, numbers[3], numbers[4], numbers[5])
-    wx, wy, wz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
+    wx = y * uz - z * uy
+    wy = z * ux - x * uz
+    wz = x * uy - y * ux
     value_of(row)[index] = math.atan2(wz, uz)
     if with_jacobian:
         # w x z and u x z, weighed by the parts of z along u and w
@@ -109,7 +135,9 @@ def _number_of(row):
 @njit
 def _write_turn(row, program, index, x, y):
     """Write the row of an angle that changes by x and y times the angular velocity of the link."""
-    joints, jacobian, first = joints_of(program), jacobian_of(row, program), index * program.dofs
+    joints = joints_of(program)
+    jacobian = jacobian_of(row, program)
+    first = index * program.dofs
     for k in columns_of(row):
         jacobian[first + k] = x * joints[k, 3] + y * joints[k, 4]
 
@@ -124,25 +152,40 @@ def rolling_offset(row, program, with_jacobian):
     lifted, and, if x and y of the base are those of the cycle before, the address of their Jacobian.
     """
     table = carray(integers(row.table), (4,))
-    index, count, late = table[0], table[1], table[3]
+    index = table[0]
+    count = table[1]
+    late = table[3]
     is_lifted = carray(booleans(table[2]), (count,))[index]
-    numbers, three, two = numbers_of(row, 14 * count + 3), 3 * index, 2 * index
-    reference, place = numbers[three : three + 3], numbers[3 * count + three : 3 * count + three + 3]
-    error, way = numbers[6 * count + three : 6 * count + three + 3], numbers[9 * count + two : 9 * count + two + 2]
-    axle, base = numbers[11 * count + three : 11 * count + three + 3], numbers[14 * count :]
-    vertex, pose = carray(floats(row.first), (3,)), carray(floats(row.second), (7,))
+    numbers = numbers_of(row, 14 * count + 3)
+    three = 3 * index
+    two = 2 * index
+    reference = numbers[three : three + 3]
+    place = numbers[3 * count + three : 3 * count + three + 3]
+    error = numbers[6 * count + three : 6 * count + three + 3]
+    way = numbers[9 * count + two : 9 * count + two + 2]
+    axle = numbers[11 * count + three : 11 * count + three + 3]
+    base = numbers[14 * count :]
+    vertex = carray(floats(row.first), (3,))
+    pose = carray(floats(row.second), (7,))
     if index == 0:
         angle = 2.0 * math.atan2(pose[5], pose[6])
         base[0] = angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
-    cos, sin = math.cos(base[0]), math.sin(base[0])
+    cos = math.cos(base[0])
+    sin = math.sin(base[0])
     bx, by = (base[1], base[2]) if late else (pose[0], pose[1])
     x, y, _ = turned(placements_of(program)[row.joint], axle[0], axle[1], axle[2])
     length = max(math.hypot(x, y), SMALLEST)
-    fx, fy = y / length, -x / length
-    gx, gy = cos * reference[0] - sin * reference[1], sin * reference[0] + cos * reference[1]
-    ex, ey = gx - (vertex[0] - bx), gy - (vertex[1] - by)
-    px, py, up = vertex[0] - pose[0], vertex[1] - pose[1], vertex[2] - reference[2]
-    way[0], way[1] = fx, fy
+    fx = y / length
+    fy = -x / length
+    gx = cos * reference[0] - sin * reference[1]
+    gy = sin * reference[0] + cos * reference[1]
+    ex = gx - (vertex[0] - bx)
+    ey = gy - (vertex[1] - by)
+    px = vertex[0] - pose[0]
+    py = vertex[1] - pose[1]
+    up = vertex[2] - reference[2]
+    way[0] = fx
+    way[1] = fy
     place[0], place[1], place[2] = cos * px + sin * py, cos * py - sin * px, vertex[2]
     error[0], error[1], error[2] = cos * ex + sin * ey, cos * ey - sin * ex, -up
     value = value_of(row)
@@ -151,16 +194,20 @@ def rolling_offset(row, program, with_jacobian):
     value[2 * count + index] = up if is_lifted else 0.0
     if not with_jacobian:
         return
-    dofs, jacobian = program.dofs, jacobian_of(row, program)
-    of_vertex, of_pose = (
-        carray(floats(row.first_jacobian), (3 * dofs,)),
-        carray(floats(row.second_jacobian), (6 * dofs,)),
-    )
+    dofs = program.dofs
+    jacobian = jacobian_of(row, program)
+    of_vertex = carray(floats(row.first_jacobian), (3 * dofs,))
+    of_pose = carray(floats(row.second_jacobian), (6 * dofs,))
     of_base = carray(floats(late if late else row.second_jacobian), (2 * dofs,))
-    turn, along = fx * gy - fy * gx, fx * gx + fy * gy
-    first, second, third = index * dofs, (count + index) * dofs, (2 * count + index) * dofs
+    turn = fx * gy - fy * gx
+    along = fx * gx + fy * gy
+    first = index * dofs
+    second = (count + index) * dofs
+    third = (2 * count + index) * dofs
     for k in columns_of(row):
-        dx, dy, rate = of_vertex[k] - of_base[k], of_vertex[dofs + k] - of_base[dofs + k], of_pose[5 * dofs + k]
+        dx = of_vertex[k] - of_base[k]
+        dy = of_vertex[dofs + k] - of_base[dofs + k]
+        rate = of_pose[5 * dofs + k]
         jacobian[first + k] = fx * dx + fy * dy + turn * rate
         jacobian[second + k] = fx * dy - fy * dx - along * rate if is_lifted else 0.0
         jacobian[third + k] = of_vertex[2 * dofs + k] if is_lifted else 0.0

@@ -61,7 +61,8 @@ class ConstraintForce(DynamicPoint):
         if not len(self.accelerations):
             raise PointError("forces of no constraint", expected="at least one acceleration")
         robot = cast(DynamicRobotView, self.accelerations[0].robot)
-        rows, cols = self.accelerations.rows, self.accelerations.cols
+        rows = self.accelerations.rows
+        cols = self.accelerations.cols
         super().__init__(vector(rows if size is None else size), robot)
         self._dynamics = robot.dynamics
         self._dynamics.subscribe(CALLS)

@@ -41,9 +41,11 @@ class ContactConstraint(Acceleration):
 
     def __init__(self, contact: Contact):
         self._motion = Handler(_motion(contact))
-        self.contact, self._rows = contact, contact.constraint
+        self.contact = contact
+        self._rows = contact.constraint
         super().__init__(vector(len(self._rows)), _robot(contact))
-        self._turn, self._held = np.zeros((6, 6)), np.zeros_like(self._rows)
+        self._turn = np.zeros((6, 6))
+        self._held = np.zeros_like(self._rows)
         self._velocity, self._drift = np.zeros((2, 6))
 
     @property

@@ -36,7 +36,8 @@ class ContactForces(ConstraintForce):
         sizes = [6 if contact.constraint[:, 3:].any() else 3 for contact in self.contacts]
         super().__init__(held, sum(sizes))
         rows = self.accelerations.rows
-        self._spread, self._gain = np.zeros((self.size, rows)), np.zeros((self.size, rows))
+        self._spread = np.zeros((self.size, rows))
+        self._gain = np.zeros((self.size, rows))
         self._turned = list(self._blocks(sizes))
         first = np.concatenate(([0], np.cumsum(sizes)))
         self._wrenches = [slice(start, start + size) for start, size in zip(first, sizes, strict=False)]
@@ -62,7 +63,8 @@ class ContactForces(ConstraintForce):
                 yield block, acceleration.force_map[:size]
             else:
                 np.fill_diagonal(block, 1.0)
-            first, row = first + size, row + acceleration.rows
+            first = first + size
+            row = row + acceleration.rows
 
     def _spread_forces(self) -> np.ndarray:
         """See `ConstraintForce._spread_forces`: rows in frames of contacts are turned into world axes."""

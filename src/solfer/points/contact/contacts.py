@@ -171,7 +171,9 @@ class RollingContact(SupportVertex, Contact):
             return 0.0, 0.0, 0.0
         # with y across the normal and a = length y + along n: w x a, along n x y
         bx, by, bz = (self.robot.kinematics.rotation(self.link) @ self._axle).tolist()
-        tx, ty, tz = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
+        tx = ny * az - nz * ay
+        ty = nz * ax - nx * az
+        tz = nx * ay - ny * ax
         rate = tx * (wy * bz - wz * by) + ty * (wz * bx - wx * bz) + tz * (wx * by - wy * bx)
         rate /= length
         return rate * nx, rate * ny, rate * nz
@@ -184,7 +186,9 @@ class RollingContact(SupportVertex, Contact):
         bx, by, bz = (self.robot.kinematics.rotation(self.link) @ self._axle).tolist()
         nx, ny, nz = self._numbers[6:9].tolist()
         along = bx * nx + by * ny + bz * nz
-        yx, yy, yz = bx - along * nx, by - along * ny, bz - along * nz
+        yx = bx - along * nx
+        yy = by - along * ny
+        yz = bz - along * nz
         length = math.sqrt(yx * yx + yy * yy + yz * yz)
         if length <= SMALLEST:
             return across(nx, ny, nz), (nx, ny, nz), 0.0
@@ -248,7 +252,9 @@ def make_contact(record: ContactRecord, robot: RobotView) -> PointContact | Roll
         UnknownName: The robot has no such link.
         PointError: A wheel without its radii or its axis.
     """
-    where, link, constraint = record.where("end_frame"), record.end_frame, record.constraint_matrix.matrix()
+    where = record.where("end_frame")
+    link = record.end_frame
+    constraint = record.constraint_matrix.matrix()
     robot.kinematics.frame(link, where)
     down = np.array(record.offset or (0.0, 0.0, 0.0))
     normal = -down if down.any() else UP

@@ -57,7 +57,8 @@ class SupportVertex(LinkPoint):
     ):
         super().__init__(vector(3), link, robot, 11)
         # centre and axis in the frame of the joint, normal, radii
-        rotation, center = self._attachment.rotation, finite(center, 3, f"centre of wheel '{link}'")
+        rotation = self._attachment.rotation
+        center = finite(center, 3, f"centre of wheel '{link}'")
         self._numbers[:3] = rotation @ center + self._attachment.translation
         self._numbers[3:6] = rotation @ direction(axis, f"axis of wheel '{link}'")
         self.set_normal(normal)

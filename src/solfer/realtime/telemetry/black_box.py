@@ -70,7 +70,8 @@ class BlackBox:
     ):
         for plugin in plugins:
             plugin.requests.wanted = True
-        logs, loop = tuple(PluginLog(plugin) for plugin in plugins), Logger(LOOP)
+        logs = tuple(PluginLog(plugin) for plugin in plugins)
+        loop = Logger(LOOP)
         # methods and lists as they are: the cycle looks nothing up
         self._takes = tuple(log.take for log in logs)
         self._notes = tuple((plugin.name, plugin.requests.notes) for plugin in plugins)
@@ -82,7 +83,8 @@ class BlackBox:
         self._ros_time = ros_time
         for plugin in plugins if ros_time is not None else ():  # with each, since it may be recorded alone
             Logger(plugin.name, loop.sources).add("ros_time", words[-1:], ("time",), "s", factor=NANOSECOND)
-        self._truth, self._true = truth, np.full(len(NAMED[TRUTH]), np.nan)
+        self._truth = truth
+        self._true = np.full(len(NAMED[TRUTH]), np.nan)
         for plugin in plugins if truth is not None else ():
             link = plugin.robot.kinematics.base_link or ""
             units = with_units(NAMED[TRUTH], UNITS)
@@ -100,8 +102,10 @@ class BlackBox:
 
     def record(self, time: int, late: int, took: int) -> None:
         """Record a cycle that ends at `time`, began `late` after its deadline and `took` so long [ns]."""
-        words, now = self._words, NANOSECOND * time
-        words[0], words[1] = late, took
+        words = self._words
+        now = NANOSECOND * time
+        words[0] = late
+        words[1] = took
         words[2] += 1
         if self._ros_time is not None:
             words[-1] = round(1e9 * self._ros_time())

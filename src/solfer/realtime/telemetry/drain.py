@@ -44,15 +44,19 @@ class RecordDrain:
                 expected="an RT layer in this namespace, with `record` above 0",
             ) from error
         described = json.loads(self._segment.layout)
-        whole, size, self.rate = RowLayout.from_text(described["rows"]), described["count"], described["rate"]
+        whole = RowLayout.from_text(described["rows"])
+        size = described["count"]
+        self.rate = described["rate"]
         self.layout = whole
-        self.count, self.span = 0, (0.0, 0.0)
+        self.count = 0
+        self.span = (0.0, 0.0)
         self._ring = Ring(self._segment.data, whole.width, size)
         # rows overwritten before this do not count as lost; the oldest one may just be overwritten
         self._ring.sequence = max(0, self._ring.newest - size + 1)
         self._events = events_of(self._segment.data, Ring.size(whole.width, size))
         self._rows = np.zeros((BATCH, whole.width))
-        self._numbers, self._times = np.zeros(BATCH, dtype=np.int64), np.zeros(BATCH, dtype=np.int64)
+        self._numbers = np.zeros(BATCH, dtype=np.int64)
+        self._times = np.zeros(BATCH, dtype=np.int64)
 
     @property
     def lost(self) -> int:
@@ -92,7 +96,8 @@ class RecordDrain:
                 times = self._times[:number]
                 yield self._numbers[:number], times, self.layout.values(self._rows[:number])
                 first = self.span[0] if self.count else 1e-9 * times[0]
-                self.count, self.span = self.count + number, (first, 1e-9 * times[-1])
+                self.count = self.count + number
+                self.span = (first, 1e-9 * times[-1])
 
     def events(self) -> Iterator[Event]:
         """Fetch new events."""

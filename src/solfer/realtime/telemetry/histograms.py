@@ -13,7 +13,8 @@ WIDTH = BUCKETS + 2
 
 def bucket_of(nanoseconds: int) -> int:
     """Compute the index of the bucket of a time [ns]."""
-    units, octave = max(nanoseconds >> UNIT, 0), 0
+    units = max(nanoseconds >> UNIT, 0)
+    octave = 0
     while units >> octave >= 2 << FINE:
         octave += 1
     return min((octave << FINE) + (units >> octave), BUCKETS - 1)

@@ -14,7 +14,8 @@ from solfer.recording.log import LogSource
 from solfer.recording.model import Event
 from solfer.recording.rows import RowLayout
 
-FILE, KIND = "recording", "recording"
+FILE = "recording"
+KIND = "recording"
 SECONDS = 10.0
 """Duration that the memory holds [s]: a reader may hang that long, and after a crash that much is left."""
 

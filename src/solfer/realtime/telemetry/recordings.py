@@ -39,7 +39,8 @@ YOUNG, CRASHED = 60.0, 86400.0
 
 def namespace_of_master() -> str:
     """Return the namespace in which the nodes of this ROS master and of this namespace of ROS are recorded."""
-    port, inside = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311, os.environ.get("ROS_NAMESPACE", "")
+    port = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
+    inside = os.environ.get("ROS_NAMESPACE", "")
     return ".".join((f"{OF_MASTERS}{port}", *filter(None, inside.split("/"))))
 
 

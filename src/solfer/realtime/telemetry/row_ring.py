@@ -28,7 +28,8 @@ def _append(address, stamp):
     """Publish the arrays as they are now as the next row; in the order that `Slots` protects."""
     ring = _ring_at(address)
     words = indices_at(ring.words, ring.size)
-    arrays, sizes = indices_at(ring.arrays, ring.pieces), indices_at(ring.sizes, ring.pieces)
+    arrays = indices_at(ring.arrays, ring.pieces)
+    sizes = indices_at(ring.sizes, ring.pieces)
     number = ring.number + 1
     slot = LINE // 8 + (number % ring.count) * ring.stride
     words[slot + STATE] = 2 * number - 1

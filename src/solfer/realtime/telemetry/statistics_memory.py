@@ -78,7 +78,9 @@ class RuntimeStatistics:
     """
 
     def __init__(self, rate: float, plugins: Sequence[str], stages: Sequence[str], memory: memoryview | None = None):
-        self.rate, self.plugins, self.stages = rate, tuple(plugins), tuple(stages)
+        self.rate = rate
+        self.plugins = tuple(plugins)
+        self.stages = tuple(stages)
         words = len(LoopCount) + WORDS * len(self.plugins)
         rows = len(LOOP) + len(self.stages) * len(self.plugins)
         self.size = 8 * words + 8 * rows * (WIDTH + 1) + TEXT * (1 + len(self.plugins))

@@ -86,7 +86,8 @@ class StatisticsReader:
     """
 
     def __init__(self, folder: Path):
-        self._folder, self._process = folder, 0
+        self._folder = folder
+        self._process = 0
         self._earlier: np.ndarray | None = None
 
     def look(self) -> LayerSummary | None:
@@ -98,8 +99,10 @@ class StatisticsReader:
             return None
         now = statistics.histograms.snapshot()
         if statistics.pid != self._process or self._earlier is None or self._earlier.shape != now.shape:
-            self._process, self._earlier = statistics.pid, np.zeros_like(now)
-        recent, self._earlier = Histograms(now).since(self._earlier), now
+            self._process = statistics.pid
+            self._earlier = np.zeros_like(now)
+        recent = Histograms(now).since(self._earlier)
+        self._earlier = now
         cycles, skipped, overruns, unforgiven = (statistics.counts[word] for word in COUNTED)
         loop = tuple(_stage(statistics, recent, row, name) for row, name in enumerate(LOOP))
         plugins = tuple(_plugin(statistics, recent, index) for index in range(len(statistics.plugins)))

@@ -19,7 +19,8 @@ def shift_of(first: Samples, second: Samples, moving: np.ndarray) -> float:
     """
     total = np.zeros(first.positions.shape[1] + second.positions.shape[1] - 3)
     for joint in moving:
-        a, b = np.diff(first.positions[joint]), np.diff(second.positions[joint])
+        a = np.diff(first.positions[joint])
+        b = np.diff(second.positions[joint])
         total += np.abs(correlate(b, a, method="fft")) / (np.linalg.norm(a) * np.linalg.norm(b))
     lags = correlation_lags(second.positions.shape[1] - 1, first.positions.shape[1] - 1)
     return float(second.start - first.start + first.step * lags[np.argmax(total)])

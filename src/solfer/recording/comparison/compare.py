@@ -23,7 +23,8 @@ FEWEST_BLOCKS = 8
 FEWEST_DELAYS = 3
 """Least number of joints that move for one of them to be late: what all have in common is the clocks."""
 
-FASTEST, SLOWEST = 0.001, 0.025  # limits of the step [s]
+FASTEST = 0.001
+SLOWEST = 0.025  # limits of the step [s]
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,8 @@ class _Pair:
     def __init__(self, one: Sequence[JointMotion], two: Sequence[JointMotion], names: tuple[str, str]):
         periods = [np.median([motion.period for motion in motions]) for motions in (one, two)]
         step = float(np.clip(max(periods), FASTEST, SLOWEST))
-        a, b = sampled(one, step), sampled(two, step)
+        a = sampled(one, step)
+        b = sampled(two, step)
         self._names = names
         self._turns = np.array([motion.turn for motion in one])[:, None]
         for samples, name in ((a, names[0]), (b, names[1])):
@@ -118,7 +120,8 @@ class _Pair:
     def _look(self, first: np.ndarray, second: np.ndarray) -> None:
         """Find the joints that move in both, and those that move in one of them alone: clearly, not just a bit more."""
         least = np.maximum(MOVES, OVER_NOISE * self.noise)
-        one, two = np.ptp(first, axis=1), np.ptp(second, axis=1)
+        one = np.ptp(first, axis=1)
+        two = np.ptp(second, axis=1)
         self._both = np.flatnonzero((one > least) & (two > least))
         self._still = (one > least) & (two < np.minimum(least, 0.5 * one))
         self._alone = (two > least) & (one < np.minimum(least, 0.5 * two))
@@ -153,7 +156,8 @@ class _Pair:
 
     def _fit(self, joint: int, other: int, free: tuple[int, ...]) -> Law:
         """Fit `joint` of the second recording to `other` of the first."""
-        noise, density = float(self.noise[joint]), float(self._density[joint])
+        noise = float(self.noise[joint])
+        density = float(self._density[joint])
         return fit(self._curves[other], self._times, self.second[joint], free, noise, density)
 
     def _law(self, joint: int) -> tuple[Law, Law]:
@@ -163,7 +167,8 @@ class _Pair:
             free = (GAIN, OFFSET, DELAY) if len(self._both) >= FEWEST_DELAYS else (GAIN, OFFSET)
         whole = law = self._fit(joint, joint, free)
         if excess(law, free).max() < 0.5 and _size(self.apart[joint]) < 2.0 * self.noise[joint]:
-            free, law = (), Law(NEUTRAL, law.limits, self.apart[joint])
+            free = ()
+            law = Law(NEUTRAL, law.limits, self.apart[joint])
         while free and (ratios := excess(law, free)).min() < 1.0:
             free = tuple(each for each in free if each != free[int(np.argmin(ratios))])
             law = self._fit(joint, joint, free)
@@ -198,7 +203,8 @@ class _Pair:
         left = float(np.abs(law.residual).max())
         explained = bool(kinds) and _size(law.residual) <= 0.5 * _size(self.apart[index])
         if left > limit and not explained:
-            kinds, text = (Difference.OTHER,), f"by up to {left:.4f}, which no gain, offset or delay explains"
+            kinds = (Difference.OTHER,)
+            text = f"by up to {left:.4f}, which no gain, offset or delay explains"
         return self._made(index, joint, kinds, text, law, whole)
 
     def _made(

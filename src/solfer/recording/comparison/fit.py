@@ -14,7 +14,8 @@ GAIN, OFFSET, DELAY = 0, 1, 2
 NEUTRAL = np.array([1.0, 0.0, 0.0])
 """The law of a joint that does the same."""
 
-ROUNDS, ENOUGH = 12, 1e-5
+ROUNDS = 12
+ENOUGH = 1e-5
 HUBER = 1.345  # residuals beyond so many standard deviations count less (Huber 1964): 95 % efficient for Gaussian ones
 BLOCK = 0.15
 """Least duration of a block [s]: longer than what the smoothing ties together."""
@@ -68,8 +69,10 @@ def fit(
         noise: Standard deviation of the difference [rad, m].
         density: That of a mean of n differences, times the root of n [rad, m].
     """
-    values, chosen = NEUTRAL.copy(), list(free)
-    scale, slope = noise, curve.derivative()
+    values = NEUTRAL.copy()
+    chosen = list(free)
+    scale = noise
+    slope = curve.derivative()
     if GAIN in free:
         values[GAIN] = _first_gain(curve(times), second)
     for _ in range(ROUNDS):

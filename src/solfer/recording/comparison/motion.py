@@ -101,7 +101,8 @@ def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
     for column, joint in enumerate(channel.columns):
         valid = keep & np.isfinite(channel.values[:, column])
         if np.count_nonzero(valid) > 8:
-            positions, turn = channel.values[valid, column], math.tau if joint in continuous else 0.0
+            positions = channel.values[valid, column]
+            turn = math.tau if joint in continuous else 0.0
             # one that was recorded within a turn goes on counting
             motions[joint] = JointMotion(times[valid], np.unwrap(positions) if turn else positions, turn)
     return motions
@@ -151,7 +152,8 @@ class Samples:
 
 def sampled(motions: Sequence[JointMotion], step: float) -> Samples:
     """Sample and smooth joints over the time in which all of them were measured (Savitzky and Golay 1964)."""
-    start, end = max(each.times[0] for each in motions), min(each.times[-1] for each in motions)
+    start = max(each.times[0] for each in motions)
+    end = min(each.times[-1] for each in motions)
     times = start + step * np.arange(max(0, int((end - start) / step) + 1))
     half = max(2, round(0.5 * WINDOW / step))
     weights = savgol_coeffs(2 * half + 1, DEGREE)

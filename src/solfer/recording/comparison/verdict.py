@@ -62,7 +62,8 @@ def judged(law: Law, limits: np.ndarray) -> tuple[tuple[Difference, ...], str]:
         law: The law.
         limits: Least deviation of each parameter that counts, shape (3,).
     """
-    kinds, texts = [], []
+    kinds = []
+    texts = []
     gain, offset, delay = law.values
     if gain < 0.0:
         kinds.append(Difference.SIGN)

@@ -79,7 +79,8 @@ def _moments(places: Sequence[tuple[RecordedTopic, Any]]) -> Iterator[tuple[int,
 
 
 def _message(store: Any, kind: str, channels: Sequence[Channel], row: int, time: int) -> Any:
-    types, first = store.types, channels[0]
+    types = store.types
+    first = channels[0]
     if kind == OTHERS:
         return _labelled(types, first, row)
     stamp = types["builtin_interfaces/msg/Time"](*divmod(time, 1_000_000_000))

@@ -46,7 +46,9 @@ def _title(comparison: Comparison, names: tuple[str, str]) -> str:
 def _joint(
     left: "Axes", right: "Axes", verdict: JointVerdict, comparison: Comparison, row: int, names: tuple[str, str]
 ) -> None:
-    times, first, second = comparison.times, comparison.first[row], comparison.second[row]
+    times = comparison.times
+    first = comparison.first[row]
+    second = comparison.second[row]
     draw(left, times, first, color=FIRST, lw=1.2, label=names[0])
     draw(left, times, second, color=SECOND, lw=1.2, ls="--", label=names[1])
     draw(right, times, 1e3 * (second - first), color="black", lw=0.9)

@@ -96,11 +96,13 @@ def _joint(axes: "Axes", track: Track, limits: Limits, start: float) -> None:
     dress(axes, f"{track.joint}  [{track.unit or '-'}]")
     low, high = axes.get_ylim()
     missing = max(0.0, LEAST_SPAN - (high - low))
-    low, high = low - 0.5 * missing, high + 0.5 * missing
+    low = low - 0.5 * missing
+    high = high + 0.5 * missing
     for limit in limits.get(track.joint, ()) if track.field == "position" else ():
         if low - 0.3 * (high - low) <= limit <= high + 0.3 * (high - low):  # near enough to matter
             axes.axhline(limit, color=WRONG, lw=1.3, ls=":")
-            low, high = min(low, limit), max(high, limit)
+            low = min(low, limit)
+            high = max(high, limit)
     axes.set_ylim(low - 0.02 * (high - low), high + 0.02 * (high - low))
 
 

@@ -40,8 +40,12 @@ class Wiring:
         command: int,
         truth: Container[str],
     ):
-        self._outside, self._encoders, self._controllers = outside, encoders, set(controllers)
-        self._measurement, self._command, self._truth = measurement, command, truth
+        self._outside = outside
+        self._encoders = encoders
+        self._controllers = set(controllers)
+        self._measurement = measurement
+        self._command = command
+        self._truth = truth
         self._writers: list[_LateWriter] = []
         self.cycle = 0
 
@@ -107,7 +111,10 @@ class _LateWriter(Writer):
 
     def __init__(self, wiring: Wiring, outside: Writer, encode: Callable[[Any], Message], line: DelayLine[Message]):
         self.topic = outside.topic
-        self._wiring, self._outside, self._encode, self._line = wiring, outside, encode, line
+        self._wiring = wiring
+        self._outside = outside
+        self._encode = encode
+        self._line = line
 
     def write(self, message: Message) -> None:
         """See `Writer.write`."""
@@ -124,7 +131,10 @@ class _LateQueue(Queue):
 
     def __init__(self, wiring: Wiring, outside: Queue, encoders: Encoders, line: DelayLine[JointMessage]):
         self.topic = outside.topic
-        self._wiring, self._outside, self._encoders, self._line = wiring, outside, encoders, line
+        self._wiring = wiring
+        self._outside = outside
+        self._encoders = encoders
+        self._line = line
         self._throttle = Throttle(logging.getLogger(__name__))
 
     @property

@@ -52,7 +52,8 @@ class Camera:
     """
 
     def __init__(self, scene: Scene):
-        self._scene, self._lock = scene, threading.Lock()
+        self._scene = scene
+        self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
 
     def take(self, shot: Shot) -> None:
@@ -78,7 +79,8 @@ class Camera:
 
     def close(self) -> None:
         """End the child process. May be called twice."""
-        process, self._process = self._process, None
+        process = self._process
+        self._process = None
         if process is None:
             return
         with contextlib.suppress(OSError):
@@ -104,7 +106,8 @@ class Camera:
 def draw_all() -> None:
     """Draw what comes on stdin until it ends; each answer on stdout is an error, or nothing."""
     os.nice(NICENESS)
-    source, answers = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    source = sys.stdin.buffer
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     scene = pickle.load(source)
     description = Description.from_text(scene.urdf, scene.where)

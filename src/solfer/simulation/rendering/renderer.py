@@ -50,7 +50,9 @@ class Renderer:
         pitch: float = -20.0,
         world: WorldRecord = FLAT,
     ):
-        self._size, self._angles, self._chart = (width, height), (yaw, pitch), kinematics.base
+        self._size = (width, height)
+        self._angles = (yaw, pitch)
+        self._chart = kinematics.base
         self._engine = Engine()
         self._body = Body(self._engine, description, kinematics, np.zeros(0, dtype=np.intp), Friction())
         self._first = kinematics.size - len(self._body.joints)
@@ -66,7 +68,8 @@ class Renderer:
             self._world.place(boxes)
         pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if self._chart is None else self._chart.to_pose(q[:6])
         self._body.place(q[self._first :], *pose)
-        bullet, client = self._engine.bullet, self._engine.client
+        bullet = self._engine.bullet
+        client = self._engine.client
         width, height = (SAMPLES * side for side in self._size)
         yaw, pitch = self._angles
         centre, size = self._extent()
@@ -124,14 +127,17 @@ class Renderer:
 
     def _extent(self) -> tuple[list[float], float]:
         """Compute the centre of the robot [m] and its largest extent [m]."""
-        bullet, client = self._engine.bullet, self._engine.client
+        bullet = self._engine.bullet
+        client = self._engine.client
         boxes = np.array([bullet.getAABB(self._body.id, link, client) for link in range(-1, len(self._body.links) - 1)])
-        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        low = boxes[:, 0].min(axis=0)
+        high = boxes[:, 1].max(axis=0)
         return ((low + high) / 2.0).tolist(), float((high - low).max())
 
     def _add_floor(self, orientation: np.ndarray) -> None:
         """Add tiles below the plane of the ground, which are visual only."""
-        bullet, client = self._engine.bullet, self._engine.client
+        bullet = self._engine.bullet
+        client = self._engine.client
         half = [FLOOR_TILE / 2.0, FLOOR_TILE / 2.0, 0.005]
         tiles = [
             bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)

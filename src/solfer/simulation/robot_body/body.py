@@ -57,7 +57,9 @@ class Body:
         friction: Friction,
         lossless: Collection[str] = (),
     ):
-        self._engine, self._bullet, self._client = engine, engine.bullet, engine.client
+        self._engine = engine
+        self._bullet = engine.bullet
+        self._client = engine.client
         self._chart = kinematics.base
         self._first = 0 if self._chart is None else 6
         self.joints = tuple(kinematics.dofs[self._first :])
@@ -72,7 +74,8 @@ class Body:
             from solfer.numerics.twist_transport import ORIENTED, POSE, TWIST, Carried
 
             at_base = np.concatenate((np.eye(3).ravel(), np.zeros(9)))
-            self._in_chart, self._whole = Carried(self._chart, motion, at_base), ORIENTED | POSE | TWIST
+            self._in_chart = Carried(self._chart, motion, at_base)
+            self._whole = ORIENTED | POSE | TWIST
         with tempfile.TemporaryDirectory() as folder:
             urdf = body_urdf(description, self._chart is not None, Path(folder))
             self.base_link = urdf.base
@@ -100,7 +103,8 @@ class Body:
         orientation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0, 1.0),
     ) -> None:
         """Put the robot somewhere at rest: joint positions [rad], pose of the base link's origin in the world."""
-        bullet, client = self._bullet, self._client
+        bullet = self._bullet
+        client = self._client
         bullet.resetJointStatesMultiDof(
             self.id,
             self._indices,
@@ -136,7 +140,9 @@ class Body:
 
     def center_of_mass(self) -> np.ndarray:
         """Compute the centre of mass of the whole body in the world, shape (3,) [m]."""
-        bullet, client, links = self._bullet, self._client, list(range(len(self.links) - 1))
+        bullet = self._bullet
+        client = self._client
+        links = list(range(len(self.links) - 1))
         states = bullet.getLinkStates(self.id, links, computeForwardKinematics=1, physicsClientId=client)
         places = [bullet.getBasePositionAndOrientation(self.id, client)[0], *(state[0] for state in states)]
         return np.average(places, axis=0, weights=self._masses())
@@ -238,7 +244,9 @@ class Body:
         com, orientation = self._bullet.getBasePositionAndOrientation(self.id, self._client)
         (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self.id, self._client)
         x, y, z = rotated(self._from_com, orientation)  # from the centre of mass to the origin
-        cx, cy, cz = -x, -y, -z
+        cx = -x
+        cy = -y
+        cz = -z
         self.position[:] = com[0] + x, com[1] + y, com[2] + z
         self.orientation[:] = quaternion_product(orientation, self._turn_from_com)
         self.linear[:] = vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)
@@ -274,7 +282,8 @@ class Body:
                 expected="links that the URDF of the robot has",
             )
         coefficients = {owner[link]: value for link, value in friction.links.items()}
-        change, client = self._bullet.changeDynamics, self._client
+        change = self._bullet.changeDynamics
+        client = self._client
         change(self.id, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
         change(self.id, -1, maxJointVelocity=LARGEST_SPEED, physicsClientId=client)
         for index in range(-1, len(self.links) - 1):  # calls of their own: some values redirect a call to the base

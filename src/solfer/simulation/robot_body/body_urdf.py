@@ -71,7 +71,8 @@ def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrd
     owner = {link: own for own, links in members.items() for link in links}
     robot = Element("robot", name=description.name)
     robot.extend(parse(description.text).findall("material"))
-    meshes, inertias = Meshes(description.where, folder), Inertias(description.where)
+    meshes = Meshes(description.where, folder)
+    inertias = Inertias(description.where)
     for own, links in members.items():
         link = _link(description, own, links, inertias)
         for name, place in links.items():

@@ -33,7 +33,8 @@ class ContactDetector:
     """
 
     def __init__(self, engine: Engine, body: Body):
-        self._engine, self._body = engine, body
+        self._engine = engine
+        self._body = body
 
     def points(self) -> list[ContactPoint]:
         """List all points at which the world pushes the robot."""

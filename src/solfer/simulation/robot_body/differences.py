@@ -74,7 +74,8 @@ def _shapes(name: str, link: Element, made: tuple[Any, ...]) -> Iterator[str]:
 
 
 def _joint(joint: Element, infos: dict[str, tuple[Any, ...]]) -> Iterator[str]:
-    name, limit = joint.get("name", ""), joint.find("limit")
+    name = joint.get("name", "")
+    limit = joint.find("limit")
     if name not in infos:
         yield f"joint '{name}' is not there"
     elif limit is not None and joint.get("type") != "continuous":

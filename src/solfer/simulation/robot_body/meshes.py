@@ -29,7 +29,8 @@ class Meshes:
     """
 
     def __init__(self, where: str, folder: Path):
-        self._urdf, self._folder = where, folder
+        self._urdf = where
+        self._folder = folder
         self._absent: list[str] = []
 
     def resolve(self, shape: Element, where: str) -> bool:

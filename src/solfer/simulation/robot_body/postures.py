@@ -25,10 +25,12 @@ class Postures:
     """
 
     def __init__(self, states: Mapping[str, Mapping[str, float]], start: str | None, kinematics: Kinematics):
-        self._start, self._states = start, states
+        self._start = start
+        self._states = states
         joints = slice(0 if kinematics.base is None else 6, None)
         self._joints = kinematics.dofs[joints]
-        self._lower, self._upper = kinematics.lower_position[joints], kinematics.upper_position[joints]
+        self._lower = kinematics.lower_position[joints]
+        self._upper = kinematics.upper_position[joints]
         self._neutral = neutral_posture(kinematics)[joints]
         self._followers = Followers(self._joints, kinematics.description.mimics)
 

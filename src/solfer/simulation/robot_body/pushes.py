@@ -29,7 +29,9 @@ class Pushes:
     """
 
     def __init__(self, engine: Engine, body: Body, now: Moment):
-        self._engine, self._body, self._now = engine, body, now
+        self._engine = engine
+        self._body = body
+        self._now = now
         self._acting: list[tuple[str, list[float], list[float], int]] = []
 
     def add(self, link: str, force: Vector, torque: Vector, duration: float) -> None:
@@ -68,7 +70,9 @@ class Pushes:
         """Apply the pushes in the step that begins now."""
         if not self._acting:
             return
-        bullet, client, body = self._engine.bullet, self._engine.client, self._body
+        bullet = self._engine.bullet
+        client = self._engine.client
+        body = self._body
         for link, force, torque, _ in self._acting:
             index = body.index(link)
             at = self._now.position(link).tolist()

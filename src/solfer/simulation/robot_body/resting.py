@@ -58,17 +58,20 @@ def resting_orientation(
     start = rotation_from_quaternion(upright)
     soles = _vertices(body, joints, start, ground, _tilts(start, (GENTLE,)))
     body.place(joints)
-    center, normal = body.center_of_mass(), start[:, 2]
+    center = body.center_of_mass()
+    normal = start[:, 2]
     heights = soles @ start.T @ normal
     if _carried(soles[heights < heights.min() + TOUCHING] @ start.T, start @ center):
         return None
     steps = np.linspace(0.0, LARGEST_TILT, STEPS + 1)
-    nearest, found = LARGEST_TILT, None
+    nearest = LARGEST_TILT
+    found = None
     for corners, outward in _faces(_vertices(body, joints, start, ground, _tilts(start, steps)), center):
         turn = _turn(start @ outward, -normal)
         rotation = _rotation(turn) @ start
         if np.linalg.norm(turn) < nearest and _below(center, corners, -rotation[2]):
-            nearest, found = float(np.linalg.norm(turn)), quaternion_from_rotation(rotation)
+            nearest = float(np.linalg.norm(turn))
+            found = quaternion_from_rotation(rotation)
     return found if nearest > LEAST_TILT else None
 
 
@@ -91,7 +94,8 @@ def _vertices(
     body: Body, joints: Sequence[float] | np.ndarray, start: np.ndarray, ground: int, tilts: Iterable[np.ndarray]
 ) -> np.ndarray:
     """Collect the lowest points of the tilted robot, in axes of its base link, shape (n, 3) [m]."""
-    normal, found = start[:, 2], []
+    normal = start[:, 2]
+    found = []
     for tilt in tilts:
         rotation = _rotation(tilt) @ start
         body.place(joints, normal, quaternion_from_rotation(rotation))

@@ -36,15 +36,18 @@ class AttitudeFilter:
     """
 
     def __init__(self, time_constant: float, bias_time: float):
-        self._time_constant, self._bias_time = time_constant, bias_time
-        self.rotation, self.bias = np.eye(3), np.zeros(3)
+        self._time_constant = time_constant
+        self._bias_time = bias_time
+        self.rotation = np.eye(3)
+        self.bias = np.zeros(3)
 
     def start(self, rotation: np.ndarray, force: np.ndarray) -> None:
         """Begin with the heading of a rotation, shape (3, 3), and the tilt of a specific force, shape (3,) [m/s^2].
 
         Without weight it begins with the rotation.
         """
-        self.bias[:], self.rotation[:] = 0.0, rotation
+        self.bias[:] = 0.0
+        self.rotation[:] = rotation
         size = float(np.linalg.norm(force))
         if size < WEIGHTLESS:
             return

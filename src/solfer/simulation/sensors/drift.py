@@ -29,7 +29,9 @@ class Drift:
 
     def __init__(self, seed: int, sensor: str, density: float, bias: float, walk: float, axes: int = 3):
         self._noise = Noise(seed, f"drift of {sensor}")
-        self._density, self._start, self._walk = density, bias, walk
+        self._density = density
+        self._start = bias
+        self._walk = walk
         self.bias = np.zeros(axes)
         self._switch_on()
 

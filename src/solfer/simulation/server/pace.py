@@ -21,7 +21,8 @@ class Pace:
     """
 
     def __init__(self, clock: Clock, factor: float = 1.0):
-        self._now, self.measured = clock.now, 0.0
+        self._now = clock.now
+        self.measured = 0.0
         self._loop = FixedRateLoop(clock, factor / STEP, CATCH_UP) if factor else None
         self._newest: float | None = None
         self._window = (0.0, 0.0)
@@ -33,7 +34,9 @@ class Pace:
 
     def wait(self, time: float) -> None:
         """Return when the simulated `time` [s] is due; the first call and a time that goes back start anew."""
-        now, newest, self._newest = self._now(), self._newest, time
+        now = self._now()
+        newest = self._newest
+        self._newest = time
         if newest is None or time < newest:
             self._window = (now, time)
             if self._loop is not None:

@@ -79,20 +79,26 @@ class SimulationServer:
         followers: StepHook | None = None,
         pictures: Pictures | None = None,
     ):
-        self.simulation, self.middleware, self._name = simulation, middleware, name
+        self.simulation = simulation
+        self.middleware = middleware
+        self._name = name
         self.pace = Pace(middleware, factor)
         ration = simulation.lower_level.ration
         self.inbox = Inbox(ration=ration.requests, waiting=ration.waiting)
-        self.paused, self.stands, self._idle = False, False, 0.0
+        self.paused = False
+        self.stands = False
+        self._idle = 0.0
         self._followers = followers or StepHook()
-        self._refused, self._lost = simulation.lower_level.refused, 0.0
+        self._refused = simulation.lower_level.refused
+        self._lost = 0.0
         self._diverged = -math.inf
         self._news: list[str] = []
         self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
         middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
-        description, floating = simulation.kinematics.description, simulation.floating
+        description = simulation.kinematics.description
+        floating = simulation.floating
         self._camera = Camera(Scene(description.text, description.where, floating, simulation.world.record))
         self._drawing, self._pictures = ThreadPoolExecutor(1), pictures or Pictures()
         self._drawings: list[Future[Any]] = []
@@ -151,7 +157,8 @@ class SimulationServer:
         Raises:
             SimulationError: The name is wrong, the file cannot be written, or the simulation does not run.
         """
-        simulation, path = self.simulation, self._pictures.place(name)
+        simulation = self.simulation
+        path = self._pictures.place(name)
         moment = self.inbox.submit(lambda: Shot(simulation.q.copy(), simulation.world.poses(), path))
         try:
             shot = moment.result(STANDSTILL)
@@ -241,14 +248,17 @@ class SimulationServer:
 
     def _report(self) -> None:
         """Report the health: how fast, what was lost, what was refused, what touches the ground."""
-        pace, refused = self.pace, self.simulation.lower_level.refused
-        news, level = self._news, Health.ERROR if self._news else Health.WARNING
+        pace = self.pace
+        refused = self.simulation.lower_level.refused
+        news = self._news
+        level = Health.ERROR if self._news else Health.WARNING
         self._news = []
         if refused > self._refused:
             news.append(f"{refused - self._refused} commands refused")
         if pace.lost > self._lost:
             news.append(f"{pace.lost - self._lost:.3f} s lost")
-        self._refused, self._lost = refused, pace.lost
+        self._refused = refused
+        self._lost = pace.lost
         life = "paused" if self.paused else "running"
         self.middleware.report(
             self._name,

@@ -13,7 +13,8 @@ from solfer.errors import MissingDependency, SimulationError
 STEP = 0.001  # [s]
 GRAVITY = 9.81  # [m/s^2], along -z
 SOLVER_ITERATIONS = 50
-STDOUT, STDERR = 1, 2  # file descriptors
+STDOUT = 1
+STDERR = 2  # file descriptors
 VIEW = (2.5, 50.0, -20.0)
 """Distance [m], yaw and pitch [deg] of the window's camera at first."""
 

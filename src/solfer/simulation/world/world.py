@@ -58,8 +58,10 @@ class World:
     """
 
     def __init__(self, engine: Engine, record: WorldRecord = FLAT, ground_friction: float | None = None):
-        self._bullet, self._client = engine.bullet, engine.client
-        self.record, self._slope = record, record.ground.slope
+        self._bullet = engine.bullet
+        self._client = engine.client
+        self.record = record
+        self._slope = record.ground.slope
         self._bodies: dict[str, list[int]] = {}
         self._movable: list[tuple[int, Pose]] = []
         if ground_friction is not None:
@@ -82,7 +84,8 @@ class World:
 
     def orientation(self, yaw: float = 0.0) -> np.ndarray:
         """Compute the quaternion (x, y, z, w) of a body upright on the ground, turned by `yaw` [rad] from its x."""
-        tilt, turn = rotation_from_rpy((0.0, -self._slope, 0.0)), rotation_from_rpy((0.0, 0.0, yaw))
+        tilt = rotation_from_rpy((0.0, -self._slope, 0.0))
+        turn = rotation_from_rpy((0.0, 0.0, yaw))
         return quaternion_from_rotation(tilt @ turn)
 
     def reset(self) -> None:
@@ -121,7 +124,8 @@ class World:
         Returns:
             The bodies of the world that lie under the box, or in it; and the height [m] above which none of them is.
         """
-        found, tops = [], []
+        found = []
+        tops = []
         for name, ids in self._bodies.items():
             for body in ids:
                 if name == GROUND_NAME:
@@ -143,7 +147,8 @@ class World:
 
     def _box(self, box: BoxRecord) -> int:
         half = [edge / 2.0 for edge in box.size]
-        bullet, client = self._bullet, self._client
+        bullet = self._bullet
+        client = self._client
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
         visual = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=COLOUR, physicsClientId=client)
         pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))
@@ -173,7 +178,8 @@ def steps_of(stairs: StairsRecord) -> list[BoxRecord]:
     forward = np.array([math.cos(stairs.yaw), math.sin(stairs.yaw)])
     boxes = []
     for index in range(stairs.count):
-        depth, height = (stairs.count - index) * stairs.tread, (index + 1) * stairs.rise
+        depth = (stairs.count - index) * stairs.tread
+        height = (index + 1) * stairs.rise
         x, y = np.array(stairs.position) + (index * stairs.tread + depth / 2.0) * forward
         boxes.append(
             BoxRecord(

@@ -59,7 +59,8 @@ class ConfiguredTasks:
     def start(self) -> None:
         """Make where the points are the reference of all tasks without one; the Robot and its points are updated."""
         for name, record in self._held:
-            task, reference = self.tasks[name], self.references[name]
+            task = self.tasks[name]
+            reference = self.references[name]
             if isinstance(task.point, LookAt):
                 reference.set(ahead(task.point.frame, record))
             else:
@@ -106,7 +107,8 @@ class ConfiguredTasks:
 
     def _made(self, name: str, record: TaskRecord) -> Iterator[Task]:
         """Make the tasks of a record: one, or one a link."""
-        faults, dofs = self._faults, None
+        faults = self._faults
+        dofs = None
         with faults.at(record, "dofs" if record.without is None else "without"):
             dofs = self._dofs(record)
         links: list[tuple[int, str]] = []
@@ -139,8 +141,11 @@ class ConfiguredTasks:
         self, name: str, record: TaskRecord, point: Point, dofs: np.ndarray | None, place: int, count: int
     ) -> Task | None:
         """Make the task number `place` of `count` of a record; None if there is a mistake."""
-        faults, before = self._faults, len(self._faults.errors)
-        reference, rows, task = None, None, None
+        faults = self._faults
+        before = len(self._faults.errors)
+        reference = None
+        rows = None
+        task = None
         with faults.at(record, "reference"):
             reference = self._reference(record, point)
         with faults.at(record, "rows"):
@@ -219,7 +224,8 @@ class ConfiguredTasks:
         return np.unique(found).astype(np.int64)
 
     def _levels(self) -> list[list[Task]]:
-        used, before = set[str](), len(self._faults.errors)
+        used = set[str]()
+        before = len(self._faults.errors)
         levels: list[list[Task]] = []
         for index, names in enumerate(self._record.levels):
             levels.append([])

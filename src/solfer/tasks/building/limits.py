@@ -31,11 +31,14 @@ class LimitMaker:
     """
 
     def __init__(self, robot: Robot, record: StackRecord, maker: PointMaker, faults: Faults):
-        self._robot, self._record, self._limits = robot, record, record.limits
+        self._robot = robot
+        self._record = record
+        self._limits = record.limits
         self._fixed = np.zeros(robot.size, dtype=bool)
         self._workspaces: list[WorkspaceLimit] = []
         self._bounds: list[VelocityBounds] = []
-        self._maker, self._faults = maker, faults
+        self._maker = maker
+        self._faults = faults
         for name, one in self._limits.workspace.items():
             for link, other in self._pairs(one):
                 with faults.at(one):
@@ -52,7 +55,9 @@ class LimitMaker:
                     raise UnknownName("limit", name, self._names, expected="a limit that this stack has")
 
     def _collision_limit(self, record: CollisionsRecord) -> CollisionLimit | None:
-        kinematics, apart, before = self._robot.kinematics, self._robot.semantics.apart, len(self._faults.errors)
+        kinematics = self._robot.kinematics
+        apart = self._robot.semantics.apart
+        before = len(self._faults.errors)
         if record.pairs is None:
             posture = neutral_posture(kinematics.twin())
             pairs = pairs_that_may_touch(kinematics.twin(), apart, record.distance, posture)
@@ -114,7 +119,8 @@ class LimitMaker:
 
     def bounds(self, period: float) -> VelocityBounds:
         """Make the bounds of joint velocities; see `ConfiguredStack.bounds`."""
-        kinematics, limits = self._robot.kinematics, self._limits
+        kinematics = self._robot.kinematics
+        limits = self._limits
         free = np.full(kinematics.size, np.inf)
         speed = kinematics.velocity_limit * limits.speed_scale if limits.speeds else free
         bounds = VelocityBounds(
@@ -141,7 +147,8 @@ class LimitMaker:
 
     def constraints(self, period: float) -> list[Constraint]:
         """Make all other limits for a control cycle of `period` [s]."""
-        faults, made = Faults(), list[Constraint]()
+        faults = Faults()
+        made = list[Constraint]()
         for workspace in self._workspaces:
             workspace.set_horizon(horizon_of(self._limits, period))
             made.append(workspace)

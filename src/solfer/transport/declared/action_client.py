@@ -25,7 +25,9 @@ class Goal:
     """
 
     def __init__(self, name: GoalName):
-        self.name, self.status, self.text = name, GoalStatus.PENDING, ""
+        self.name = name
+        self.status = GoalStatus.PENDING
+        self.text = ""
         self.feedback: Any = None
         self.known = False
         self.result: Any = None
@@ -82,16 +84,20 @@ class ActionClient:
             news = value_of(self._types.feedback, message)
             goal = self.goals.get(news.status.goal_id.id)
             if goal is not None:
-                goal.status, goal.feedback = GoalStatus(news.status.status), news.feedback
+                goal.status = GoalStatus(news.status.status)
+                goal.feedback = news.feedback
         for message in self._results.drain():
             news = value_of(self._types.result, message)
             goal = self.goals.pop(news.status.goal_id.id, None)
             if goal is not None:
-                goal.status, goal.text, goal.result = GoalStatus(news.status.status), news.status.text, news.result
+                goal.status = GoalStatus(news.status.status)
+                goal.text = news.status.text
+                goal.result = news.result
         for message in self._statuses.drain():
             listed = {entry.goal_id.id for entry in value_of(StatusList, message).status_list}
             for name, goal in list(self.goals.items()):
                 if goal.known and name not in listed:
-                    goal.status, goal.text = GoalStatus.LOST, "the owner of the action has ended"
+                    goal.status = GoalStatus.LOST
+                    goal.text = "the owner of the action has ended"
                     del self.goals[name]
                 goal.known = name in listed

@@ -49,7 +49,9 @@ class ActionServer:
     """
 
     def __init__(self, owner: str, action: Action, middleware: Middleware):
-        self._action, self._now, self._throttle = action, middleware.now, Throttle(logger)
+        self._action = action
+        self._now = middleware.now
+        self._throttle = Throttle(logger)
         self._stamp_time = middleware.stamp_time
         self._types = envelopes(action.goal, action.feedback, action.result)
         self._name = name = full_name(owner, action.name)
@@ -62,8 +64,10 @@ class ActionServer:
         self._cancels = middleware.declared_queue(f"{name}/cancel", GOAL_ID)
         self.queues = self._goals, self._cancels
         self._status = middleware.writer(f"{name}/status", STATUS)
-        self._feedback, self._feedback_type = middleware.writer(f"{name}/feedback", feedback), feedback
-        self._result, self._result_type = middleware.writer(f"{name}/result", result), result
+        self._feedback = middleware.writer(f"{name}/feedback", feedback)
+        self._feedback_type = feedback
+        self._result = middleware.writer(f"{name}/result", result)
+        self._result_type = result
         self.active: GoalName | None = None
         self._past: dict[str, StatusEntry] = {}
         self._next_status = self._next_feedback = self._before = -float("inf")
@@ -140,7 +144,8 @@ class ActionServer:
             return
         if self.active is not None:
             self._end(self.active, GoalStatus.PREEMPTED, "another goal has taken over")
-        self.active, self._next_feedback = name, -float("inf")
+        self.active = name
+        self._next_feedback = -float("inf")
         self._last_taken = name.stamp
         self._publish_status()
 

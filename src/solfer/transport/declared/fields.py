@@ -21,7 +21,8 @@ from solfer.transport.messages import (
 
 Converter = Callable[[Any], Any]
 
-_XYZ, _XYZW = ("x", "y", "z"), ("x", "y", "z", "w")
+_XYZ = ("x", "y", "z")
+_XYZW = ("x", "y", "z", "w")
 _PLACES: dict[str, tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = {
     "geometry_msgs/PointStamped": ((("point",), _XYZ),),
     "geometry_msgs/Vector3Stamped": ((("vector",), _XYZ),),
@@ -52,7 +53,8 @@ def message_of(interface: str, value: Any) -> Message:
     if interface not in _PLACES:
         return FieldsMessage(fields)
     header = fields.get("header", {})
-    frame, stamp = header.get("frame_id", ""), header.get("stamp", 0.0)
+    frame = header.get("frame_id", "")
+    stamp = header.get("stamp", 0.0)
     numbers = np.array([float(_at(fields, way).get(name, 0.0)) for way, names in _PLACES[interface] for name in names])
     if interface in WRENCH_MESSAGES:
         return WrenchMessage(frame, numbers[:3], numbers[3:], stamp)
@@ -146,7 +148,8 @@ def _fields_of(message: Message) -> dict[str, Any]:
     assert isinstance(message, VectorMessage | WrenchMessage)
     fields: dict[str, Any] = {"header": {"stamp": message.stamp, "frame_id": message.frame}}
     if isinstance(message, WrenchMessage):
-        interfaces, numbers = WRENCH_MESSAGES, [*message.force.tolist(), *message.torque.tolist()]
+        interfaces = WRENCH_MESSAGES
+        numbers = [*message.force.tolist(), *message.torque.tolist()]
     else:
         numbers = message.values.tolist()
         interfaces = tuple(each for each, size in VECTOR_MESSAGES.items() if size == len(numbers))

@@ -7,7 +7,8 @@ import enum
 from dataclasses import dataclass, field, make_dataclass
 from typing import Any
 
-GOAL_ID, STATUS = "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatusArray"
+GOAL_ID = "actionlib_msgs/GoalID"
+STATUS = "actionlib_msgs/GoalStatusArray"
 
 
 class GoalStatus(enum.IntEnum):

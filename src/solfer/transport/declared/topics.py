@@ -23,13 +23,15 @@ class SoleSender:
     """Admits one sender of a stream at a time: the first, until it is silent."""
 
     def __init__(self) -> None:
-        self.name, self._newest = "", -math.inf
+        self.name = ""
+        self._newest = -math.inf
 
     def admits(self, sender: str, now: float) -> bool:
         """Decide whether a message that is received `now` [s] counts."""
         if sender != self.name and now - self._newest <= SILENCE:
             return False
-        self.name, self._newest = sender, now
+        self.name = sender
+        self._newest = now
         return True
 
 
@@ -52,7 +54,9 @@ class DeclaredIn:
     def __init__(self, owner: str, topic: TopicIn, middleware: Middleware, sole: SoleSender | None = None):
         require_carried(topic.interface)
         middleware.require_fields(topic.interface, topic.message)
-        self._topic, self._sole, self._throttle = topic, sole, Throttle(logger)
+        self._topic = topic
+        self._sole = sole
+        self._throttle = Throttle(logger)
         self._now = middleware.now
         self.queue = middleware.declared_queue(full_name(owner, topic.name), topic.interface)
 
@@ -61,7 +65,8 @@ class DeclaredIn:
         messages = self.queue.drain()
         if not messages or refusal:
             return
-        now, sole = self._now(), self._sole
+        now = self._now()
+        sole = self._sole
         for message in messages:
             if sole is not None and not sole.admits(message.sender, now):
                 self._throttle.warning(
@@ -97,7 +102,9 @@ class DeclaredOut:
         middleware.require_fields(topic.interface, topic.message)
         self._topic = topic
         self._writer = middleware.declared_writer(full_name(owner, topic.name), topic.interface)
-        self._now, self._has_worked, self._next = middleware.now, False, -math.inf
+        self._now = middleware.now
+        self._has_worked = False
+        self._next = -math.inf
 
     def publish(self) -> None:
         """Publish what the component has.

@@ -67,7 +67,8 @@ def _follow(before, speed_before, last, angle, speed, margin):
 @part
 def merge(wheel, law, wx, wy, ex, ey, speed):
     """Steer as the original program does; see `Steering`."""
-    is_still, distance = wx == 0.0 and wy == 0.0, math.hypot(ex, ey)
+    is_still = wx == 0.0 and wy == 0.0
+    distance = math.hypot(ex, ey)
     if law.rests != 0.0 and is_still and distance < RESTING:
         return
     wheel.aim = math.atan2(wy, wx)
@@ -83,7 +84,8 @@ def merge(wheel, law, wx, wy, ex, ey, speed):
     trust = 1.0
     if scale < 1.0 and abs(wheel.motion_speed) < SLOW:
         trust = scale + GAIN * abs(wheel.motion_speed)
-    a, b = law.icm * wheel.motion_speed, law.sp * wheel.error_speed
+    a = law.icm * wheel.motion_speed
+    b = law.sp * wheel.error_speed
     size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel.motion - wheel.error), 0.0))
     b *= scale
     y = a * math.sin(wheel.motion) + b * math.sin(wheel.error)

@@ -25,7 +25,8 @@ class Resteering:
     def __init__(self, lower: np.ndarray, upper: np.ndarray):
         self._lower, self._upper, count = lower.copy(), upper.copy(), len(lower)
         self.sides = np.zeros(count)
-        self._counts, self._starts = [0] * count, [0.0] * count
+        self._counts = [0] * count
+        self._starts = [0.0] * count
 
     def start(self) -> None:
         """Let all joints steer."""
@@ -42,10 +43,12 @@ class Resteering:
                 commanded[index] = state + self.sides[index] * STEP
 
     def _watch(self, index: int, state: float, command: float) -> None:
-        lower, upper = self._lower[index], self._upper[index]
+        lower = self._lower[index]
+        upper = self._upper[index]
         is_low = command < lower - BEYOND and state < lower + BEYOND
         is_high = command > upper + BEYOND and state > upper - BEYOND
         self._counts[index] = self._counts[index] + 1 if is_low or is_high else 0
         if self._counts[index] >= CYCLES:
             self.sides[index] = 1.0 if is_low else -1.0
-            self._starts[index], self._counts[index] = state, 0
+            self._starts[index] = state
+            self._counts[index] = 0

@@ -50,7 +50,8 @@ WANTED_X, WANTED_Y, WANTED_Z, WANTED_TURN, IN_WORLD, AGE, BEFORE = range(7)
 @part
 def _limit(memory, state):
     """Find the share of what is desired that is not larger than it may be."""
-    velocity, turn = vector_at(memory.velocity, 3), vector_at(memory.turn, 3)
+    velocity = vector_at(memory.velocity, 3)
+    turn = vector_at(memory.turn, 3)
     vertices = matrix_at(memory.vertex_velocity, memory.count, 3)
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
     share = memory.base_speed / max(memory.base_speed, speed)
@@ -64,8 +65,10 @@ def _limit(memory, state):
 @part
 def _update(memory, state, is_held, most, passed):
     """Find the share with which wheels and joints can follow."""
-    steered, heading = matrix_at(memory.steered, 4, memory.count), vector_at(memory.base, 1)[0]
-    fastest, across = 0.0, SIDEWAYS
+    steered = matrix_at(memory.steered, 4, memory.count)
+    heading = vector_at(memory.base, 1)[0]
+    fastest = 0.0
+    across = SIDEWAYS
     for index in range(memory.count):
         speed = steered[SPEEDS, index]
         fastest = max(fastest, speed)
@@ -74,7 +77,8 @@ def _update(memory, state, is_held, most, passed):
     state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - SLOWER * passed))
     share = min(SIDEWAYS / across, state[HELD])
     if fastest > 0.0:
-        before, step = state[SHARE], memory.acceleration * passed / fastest
+        before = state[SHARE]
+        step = memory.acceleration * passed / fastest
         least = min(before, state[SPEED] / fastest) - BRAKING * step
         share = min(max(share, least), before + RISING * step, state[SPEED] / fastest + STARTING * step)
     state[SHARE], state[SPEED] = share, share * fastest
@@ -102,7 +106,8 @@ def _step(numbers, velocity, turn, position, vertex_velocity, vertices, orientat
     heading = numbers[HEADING] + time * turn[2]
     numbers[HEADING] = heading - 2.0 * math.pi * math.floor(heading / (2.0 * math.pi) + 0.5)
     if turn[0] != 0.0 or turn[1] != 0.0:
-        roll, pitch = 0.5 * time * turn[0], 0.5 * time * turn[1]
+        roll = 0.5 * time * turn[0]
+        pitch = 0.5 * time * turn[1]
         both = (
             math.sin(roll) * math.cos(pitch),
             math.cos(roll) * math.sin(pitch),
@@ -126,7 +131,8 @@ def _advance(start, is_paced, is_first, is_held, most, passed):
         passed: Time for which they go on [s].
     """
     memory = _going_at(start)
-    count, numbers = memory.count, vector_at(memory.numbers, 4)
+    count = memory.count
+    numbers = vector_at(memory.numbers, 4)
     if is_paced:
         state = vector_at(memory.state, 5)
         _limit(memory, state)
@@ -158,23 +164,33 @@ def _step_alone(motion, places, orientations, numbers, period):
 def _follow(state, velocity, turn, heading, counted, passed, patience, change, turn_change):
     """Write the velocity of this cycle that follows a share of one that is sent; return whether it rests for good."""
     state[AGE] += passed
-    x, y, z = velocity[0], velocity[1], velocity[2]
-    in_world, is_old = state[IN_WORLD] != 0.0, state[AGE] > patience
+    x = velocity[0]
+    y = velocity[1]
+    z = velocity[2]
+    in_world = state[IN_WORLD] != 0.0
+    is_old = state[AGE] > patience
     # what is seen from the heading turns with it, which is no change
     before = 0.0 if in_world else (heading if math.isnan(state[BEFORE]) else state[BEFORE])
     state[BEFORE] = heading
-    cos, sin = math.cos(before), math.sin(before)
-    vx, vy = cos * x + sin * y, cos * y - sin * x
+    cos = math.cos(before)
+    sin = math.sin(before)
+    vx = cos * x + sin * y
+    vy = cos * y - sin * x
     counts = 0.0 if is_old else counted
-    dx, dy, dz = counts * state[WANTED_X] - vx, counts * state[WANTED_Y] - vy, counts * state[WANTED_Z] - z
+    dx = counts * state[WANTED_X] - vx
+    dy = counts * state[WANTED_Y] - vy
+    dz = counts * state[WANTED_Z] - z
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     share = 1.0 if size <= change else change / size
-    vx, vy, z = vx + share * dx, vy + share * dy, z + share * dz
+    vx = vx + share * dx
+    vy = vy + share * dy
+    z = z + share * dz
     turn[2] += min(max(counts * state[WANTED_TURN] - turn[2], -turn_change), turn_change)
     cos, sin = (1.0, 0.0) if in_world else (math.cos(heading), math.sin(heading))
     velocity[0], velocity[1], velocity[2] = cos * vx - sin * vy, sin * vx + cos * vy, z
     if is_old and math.sqrt(vx * vx + vy * vy + z * z + turn[2] * turn[2]) < 1e-12:
-        velocity[:], turn[2] = 0.0, 0.0
+        velocity[:] = 0.0
+        turn[2] = 0.0
         return True
     return False
 
@@ -193,7 +209,8 @@ def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead
     """
     share = 1.0
     for index in range(first, last):
-        error, step = errors[index], 0.5 * limits[index, 1] * passed
+        error = errors[index]
+        step = 0.5 * limits[index, 1] * passed
         distance = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
         most = min(limits[index, 0], math.sqrt(step * step + 2.0 * limits[index, 1] * distance) - step)
         speed = _gain(distance, lead, passed) * distance
@@ -201,7 +218,9 @@ def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead
             share = min(share, most / speed)
     for index in range(first, last):
         rate = velocity if index == 0 else turn if index == 1 else vertex_velocity[index - 2]
-        error, begin, most = errors[index], 2 if index == 1 else 0, limits[index, 1] * passed
+        error = errors[index]
+        begin = 2 if index == 1 else 0
+        most = limits[index, 1] * passed
         gain = share * _gain(math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2), lead, passed)
         size = 0.0
         for k in range(begin, 3):
@@ -212,7 +231,8 @@ def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead
     return share
 
 
-_VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
+_VECTOR = "float64[::1]"
+_MATRIX = "float64[:, ::1]"
 
 advance = cached("void(int64, boolean, boolean, boolean, float64, float64)", _advance)
 step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)

@@ -79,7 +79,8 @@ class PathPace:
 
     def start(self) -> None:
         """Begin without a motion, which could go on in full."""
-        self._state[[VALUE, MOST, HELD, SHARE]], self._state[SPEED] = 1.0, 0.0
+        self._state[[VALUE, MOST, HELD, SHARE]] = 1.0
+        self._state[SPEED] = 0.0
 
     def advance(self, is_paced: bool, is_first: bool, is_held: bool, most: float, passed: float) -> None:
         """Let references go on for a cycle, at the pace where it counts, and write the desired vertices.

@@ -23,8 +23,10 @@ class PacePublisher:
     """
 
     def __init__(self, pace: Callable[[], float], period: float):
-        self._pace, self._cycles = pace, max(1, round(PUBLISH_PERIOD / period))
-        self._left, self._published = 0, 1.0
+        self._pace = pace
+        self._cycles = max(1, round(PUBLISH_PERIOD / period))
+        self._left = 0
+        self._published = 1.0
 
     def start(self) -> None:
         """Publish the pace of the next cycle in any case."""
@@ -36,5 +38,6 @@ class PacePublisher:
         pace = self._pace()
         if self._left > 0 and abs(pace - self._published) < PUBLISH_CHANGE:
             return None
-        self._left, self._published = self._cycles, pace
+        self._left = self._cycles
+        self._published = pace
         return MotionPace(pace)

@@ -69,7 +69,8 @@ class MotionGuard:
         turning: np.ndarray,
         velocity: np.ndarray,
     ):
-        self.polygon, self._names = polygon, tuple(legs)
+        self.polygon = polygon
+        self._names = tuple(legs)
         kinds = ((CAMBER, "camber", "rad", LEAN), (CASTER, "caster", "rad", LEAN), (VERTICES, "vertex", "m", AWAY))
         watched = [
             (f"{what} of '{wheel}'", unit, most, rows[task].start + index)
@@ -119,7 +120,8 @@ class MotionGuard:
     @property
     def why(self) -> str:
         """What holds the motion; empty: nothing."""
-        why, amount = int(self._state[WHY]), self._state[AMOUNT]
+        why = int(self._state[WHY])
+        amount = self._state[AMOUNT]
         if why == NOTHING:
             return ""
         if why == POLYGON:

@@ -63,17 +63,24 @@ _guard_at = record_at(GUARD)
 @part
 def _find(points, lifted, order, edges):
     """Write the edges between vertices on the ground, counterclockwise; return their number."""
-    count, size, x, y = len(lifted), 0, 0.0, 0.0
+    count = len(lifted)
+    size = 0
+    x = 0.0
+    y = 0.0
     for index in range(count):
         if not lifted[index]:
             place = vector_at(points[index, 0], 2)
             order[size] = index
-            x, y, size = x + place[0], y + place[1], size + 1
-    x, y = x / size, y / size
+            x = x + place[0]
+            y = y + place[1]
+            size = size + 1
+    x = x / size
+    y = y / size
     for i in range(1, size):
         index = order[i]
         place = vector_at(points[index, 0], 2)
-        angle, k = math.atan2(place[1] - y, place[0] - x), i
+        angle = math.atan2(place[1] - y, place[0] - x)
+        k = i
         while k > 0:
             other = vector_at(points[order[k - 1], 0], 2)
             if math.atan2(other[1] - y, other[0] - x) <= angle:
@@ -83,12 +90,18 @@ def _find(points, lifted, order, edges):
         order[k] = index
     center = vector_at(points[count, 0], 2)
     for i in range(size):
-        first, second = order[i], order[(i + 1) % size]
-        a, b = vector_at(points[first, 0], 2), vector_at(points[second, 0], 2)
+        first = order[i]
+        second = order[(i + 1) % size]
+        a = vector_at(points[first, 0], 2)
+        b = vector_at(points[second, 0], 2)
         length = max(math.hypot(b[0] - a[0], b[1] - a[1]), 1e-9)
-        nx, ny = (a[1] - b[1]) / length, (b[0] - a[0]) / length
+        nx = (a[1] - b[1]) / length
+        ny = (b[0] - a[0]) / length
         edge = edges[i]
-        edge[FIRST], edge[SECOND], edge[NORMAL_X], edge[NORMAL_Y] = first, second, nx, ny
+        edge[FIRST] = first
+        edge[SECOND] = second
+        edge[NORMAL_X] = nx
+        edge[NORMAL_Y] = ny
         edge[INSIDE] = nx * (center[0] - a[0]) + ny * (center[1] - a[1])
     return size
 
@@ -96,7 +109,9 @@ def _find(points, lifted, order, edges):
 @part
 def _along(jacobian, dofs, nx, ny, velocity):
     """Return how fast a point moves along a normal [m/s]."""
-    rows, x, y = matrix_at(jacobian, 2, dofs), 0.0, 0.0
+    rows = matrix_at(jacobian, 2, dofs)
+    x = 0.0
+    y = 0.0
     for k in range(dofs):
         x += rows[0, k] * velocity[k]
         y += rows[1, k] * velocity[k]
@@ -106,11 +121,17 @@ def _along(jacobian, dofs, nx, ny, velocity):
 @part
 def _rate(memory, points, edge, velocity):
     """Return how fast the centre of mass moves away from an edge [m/s]."""
-    first, second, center = int(edge[FIRST]), int(edge[SECOND]), memory.count
-    a, b, c = vector_at(points[first, 0], 2), vector_at(points[second, 0], 2), vector_at(points[center, 0], 2)
+    first = int(edge[FIRST])
+    second = int(edge[SECOND])
+    center = memory.count
+    a = vector_at(points[first, 0], 2)
+    b = vector_at(points[second, 0], 2)
+    c = vector_at(points[center, 0], 2)
     way = (c[0] - a[0]) * (b[0] - a[0]) + (c[1] - a[1]) * (b[1] - a[1])
     share = way / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
-    nx, ny, dofs = edge[NORMAL_X], edge[NORMAL_Y], memory.dofs
+    nx = edge[NORMAL_X]
+    ny = edge[NORMAL_Y]
+    dofs = memory.dofs
     start = _along(points[first, 1], dofs, nx, ny, velocity)
     end = _along(points[second, 1], dofs, nx, ny, velocity)
     return _along(points[center, 1], dofs, nx, ny, velocity) - start - share * (end - start)
@@ -121,16 +142,21 @@ def _keep_margin(memory, state, velocity):
     """Find the share of joint velocities with which the margin does not fall below what is left, and the margin."""
     points = indices_at(memory.points, 2 * (memory.count + 1)).reshape((memory.count + 1, 2))
     edges = matrix_at(memory.edges, memory.count, EDGE_SIZE)
-    lifted, order = flags_at(memory.lifted, memory.count), indices_at(memory.order, memory.count)
-    share, is_short, margin = 1.0, False, math.inf
+    lifted = flags_at(memory.lifted, memory.count)
+    order = indices_at(memory.order, memory.count)
+    share = 1.0
+    is_short = False
+    margin = math.inf
     for index in range(_find(points, lifted, order, edges)):
         edge = edges[index]
-        margin, left = min(margin, edge[INSIDE]), edge[INSIDE] - memory.least
+        margin = min(margin, edge[INSIDE])
+        left = edge[INSIDE] - memory.least
         if left > HORIZON * FASTEST:
             continue
         rate = _rate(memory, points, edge, velocity)
         if left + HORIZON * share * rate < 0.0:
-            share, is_short = max(0.0, -left / (HORIZON * rate)) if rate < 0.0 else 1.0, True
+            share = max(0.0, -left / (HORIZON * rate)) if rate < 0.0 else 1.0
+            is_short = True
     state[MARGIN] = margin
     return share, is_short
 
@@ -155,20 +181,27 @@ def _lacks(memory, away, forward):
 def _reason(memory, is_short, margin, speed, velocity):
     """Return what is beyond its bound most, how far it is, and by which share of the bound."""
     why, amount, worst = (POLYGON, margin, 1.0) if is_short else (NOTHING, 0.0, 1.0)
-    watched, bounds = indices_at(memory.watched, memory.watched_count), vector_at(memory.bounds, memory.watched_count)
+    watched = indices_at(memory.watched, memory.watched_count)
+    bounds = vector_at(memory.bounds, memory.watched_count)
     error = vector_at(memory.error, memory.rows)
     for index in range(memory.watched_count):
         size = abs(error[watched[index]])
         if size > worst * bounds[index]:
-            why, amount, worst = FIRST_ROW + index, size, size / bounds[index]
+            why = FIRST_ROW + index
+            amount = size
+            worst = size / bounds[index]
     if why != NOTHING:
         return why, amount, worst
-    legs, fastest, place = indices_at(memory.legs, memory.leg_count), -1.0, 0
+    legs = indices_at(memory.legs, memory.leg_count)
+    fastest = -1.0
+    place = 0
     for index in range(memory.leg_count):
         size = abs(velocity[legs[index]])
         if size > fastest:
-            fastest, place = size, index
-    steering, turning = 0.0, indices_at(memory.turning, memory.turning_count)
+            fastest = size
+            place = index
+    steering = 0.0
+    turning = indices_at(memory.turning, memory.turning_count)
     for index in range(memory.turning_count):
         steering = max(steering, abs(velocity[turning[index]]))
     if fastest > max(SWIFT, STRAIGHT * speed, STEERING * steering):
@@ -179,7 +212,9 @@ def _reason(memory, is_short, margin, speed, velocity):
 @part
 def _guard(memory, state, is_short, forward, pace, velocity):
     """Whether the motion is held, since it leads where the robot does not get on."""
-    way, size, along = vector_at(memory.way, memory.rows), 0.0, 0.0
+    way = vector_at(memory.way, memory.rows)
+    size = 0.0
+    along = 0.0
     for k in range(memory.rows):
         size += forward[k] * forward[k]
         along += forward[k] * way[k]
@@ -189,7 +224,10 @@ def _guard(memory, state, is_short, forward, pace, velocity):
     is_other = along < ASIDE * size
     why, amount, worst = _reason(memory, is_short, state[MARGIN], pace * size, velocity)
     if why != NOTHING and worst > (WORSE * state[WORST] if state[WHY] != NOTHING and is_other else 0.0):
-        state[WHY], state[AMOUNT], state[WORST], state[AGE] = why, amount, worst, 0.0
+        state[WHY] = why
+        state[AMOUNT] = amount
+        state[WORST] = worst
+        state[AGE] = 0.0
         for k in range(memory.rows):
             way[k] = forward[k] / size
         return True
@@ -210,8 +248,10 @@ def _hold_back(start, pace, is_bound):
         is_bound: Whether a joint is at its bound.
     """
     memory = _guard_at(start)
-    state, velocity = vector_at(memory.state, STATE_SIZE), vector_at(memory.velocity, memory.dofs)
-    forward, away = vector_at(memory.forward, memory.rows), vector_at(memory.away, memory.rows)
+    state = vector_at(memory.state, STATE_SIZE)
+    velocity = vector_at(memory.velocity, memory.dofs)
+    forward = vector_at(memory.forward, memory.rows)
+    away = vector_at(memory.away, memory.rows)
     share, is_short = _keep_margin(memory, state, velocity)
     if share < 1.0:
         for k in range(memory.dofs):

@@ -91,10 +91,16 @@ class Lifting:
         margin: float,
         is_whole: bool,
     ):
-        self._names, self._indices = tuple(names), {name: index for index, name in enumerate(names)}
-        self._holding, self._offsets, self._references = tuple(holding), offsets, references
-        self._polygon, self.margin, self._is_whole = polygon, margin, is_whole
-        self._base_velocity, self._forces = base_velocity, forces
+        self._names = tuple(names)
+        self._indices = {name: index for index, name in enumerate(names)}
+        self._holding = tuple(holding)
+        self._offsets = offsets
+        self._references = references
+        self._polygon = polygon
+        self.margin = margin
+        self._is_whole = is_whole
+        self._base_velocity = base_velocity
+        self._forces = forces
         self._ground, self._shift, self.goal, self._left, self._moved = np.zeros(len(names)), *np.zeros((4, 2))
         self._asked: list[int] = []
         self._answers: list[Future[LiftReply]] = []
@@ -155,7 +161,9 @@ class Lifting:
         references.waits = self.phase is not Phase.NONE
         if not references.waits:
             return
-        references.velocity[:], references.turn[:], references.vertex_velocity[:] = 0.0, 0.0, 0.0
+        references.velocity[:] = 0.0
+        references.turn[:] = 0.0
+        references.vertex_velocity[:] = 0.0
         if self.phase is Phase.LOWER:
             self._lower()
             return
@@ -164,7 +172,8 @@ class Lifting:
             self._settle()
         elif self._go():
             if self.phase is Phase.SHIFT:
-                self.phase, self._waited = Phase.SETTLE, 0.0
+                self.phase = Phase.SETTLE
+                self._waited = 0.0
             else:
                 references.vertices[:, :2] += self._moved
                 self._shift[:] = self._moved[:] = 0.0
@@ -187,7 +196,8 @@ class Lifting:
             if not self._asked:
                 answer.set_result(LiftReply())
                 return
-            self.phase, self._speed = Phase.LOWER, 0.0
+            self.phase = Phase.LOWER
+            self._speed = 0.0
         self._answers.append(answer)
 
     def _begin(self, phase: Phase, x: float, y: float) -> None:
@@ -195,7 +205,8 @@ class Lifting:
         position = self._references.position
         self.goal[:] = position[0] + x, position[1] + y
         self._shift += self._seen(np.array((x, y)))
-        self.phase, self._speed = phase, 0.0
+        self.phase = phase
+        self._speed = 0.0
 
     def _go(self) -> bool:
         """Move the base over its wheels towards its goal; True when it is there."""
@@ -232,8 +243,10 @@ class Lifting:
 
     def _lower(self) -> None:
         """Let wheels go down until they stand."""
-        references, forces = self._references, self._forces()
-        feels, lost = bool(np.delete(forces, self._asked).any()), ""
+        references = self._references
+        forces = self._forces()
+        feels = bool(np.delete(forces, self._asked).any())
+        lost = ""
         for index in list(self._asked):
             height = float(references.vertices[index, 2]) - self._plane(index) - self._ground[index]
             force = float(forces[index]) * len(forces)
@@ -285,19 +298,23 @@ class Lifting:
             return
         if self.phase is Phase.SHIFT:  # the rest of the way was not gone
             self._shift += self._seen(references.position[:2] - self.goal)
-        cos, sin = math.cos(references.heading), math.sin(references.heading)
+        cos = math.cos(references.heading)
+        sin = math.sin(references.heading)
         x, y = self._shift.tolist()
         self._begin(Phase.BACK, sin * y - cos * x, -sin * x - cos * y)
 
     def _seen(self, way: np.ndarray) -> np.ndarray:
         """Return a way in the world as seen from the heading [m]."""
-        cos, sin = math.cos(self._references.heading), math.sin(self._references.heading)
+        cos = math.cos(self._references.heading)
+        sin = math.sin(self._references.heading)
         x, y = way.tolist()
         return np.array((cos * x + sin * y, cos * y - sin * x))
 
     def _end(self, failure: str) -> None:
         """Answer all who wait, and let other motions go on."""
-        self.phase, self._speed = Phase.NONE, 0.0
-        answers, self._answers = self._answers, []
+        self.phase = Phase.NONE
+        self._speed = 0.0
+        answers = self._answers
+        self._answers = []
         for answer in answers:
             answer.set_result(LiftReply(not failure, failure))

@@ -28,9 +28,12 @@ class SupportPolygon:
     """
 
     def __init__(self, vertices: Sequence[SupportVertex], center: CenterOfMass, least: float):
-        self._points, count, self.least = (*vertices, center), len(vertices), least
+        self._points = (*vertices, center)
+        count = len(vertices)
+        self.least = least
         self.points = np.array([(address(point.value), address(point.jacobian)) for point in self._points])
-        self.order, self.edges = np.zeros(count, dtype=np.int64), np.zeros((count, EDGE_SIZE))
+        self.order = np.zeros(count, dtype=np.int64)
+        self.edges = np.zeros((count, EDGE_SIZE))
 
     def towards(self, lifted: Sequence[int], least: float) -> tuple[float, float]:
         """Return the shortest way of the centre of mass to where the others carry it with a margin [m], world x, y.
@@ -42,7 +45,8 @@ class SupportPolygon:
         flags = np.zeros(len(self.edges), dtype=bool)
         flags[list(lifted)] = True
         edges = self.edges[: find_edges(self.points, flags, self.order, self.edges)]
-        normals, way = edges[:, [NORMAL_X, NORMAL_Y]], np.zeros(2)
+        normals = edges[:, [NORMAL_X, NORMAL_Y]]
+        way = np.zeros(2)
         for _ in range(32):  # projections on half-planes, in turn, meet in their common part
             lacks = least - (edges[:, INSIDE] + normals @ way)
             shortest = int(lacks.argmax())

@@ -22,7 +22,9 @@ class StraightAhead:
 
     def __init__(self, wheels: Sequence[str]):
         self._wheels = ", ".join(f"'{wheel}'" for wheel in wheels)
-        self._across, self._base, self._turn = np.zeros(2), np.zeros(3), 0.0
+        self._across = np.zeros(2)
+        self._base = np.zeros(3)
+        self._turn = 0.0
         self._vertices = np.zeros((len(wheels), 3))
 
     def update(self, references: References, direction: np.ndarray, heading: float) -> str:
@@ -38,12 +40,14 @@ class StraightAhead:
         dx, dy = direction.tolist()
         self._across[:] = -dy, dx
         base = self._remove(references.velocity)
-        cos, sin = math.cos(heading), math.sin(heading)
+        cos = math.cos(heading)
+        sin = math.sin(heading)
         self._across[:] = sin * dx - cos * dy, cos * dx + sin * dy
         footprint = 0.0
         for velocity, is_lifted in zip(references.vertex_velocity, references.lifted.tolist(), strict=True):
             footprint = max(footprint, 0.0 if is_lifted else self._remove(velocity))
-        turn, references.turn[2] = abs(self._turn), 0.0
+        turn = abs(self._turn)
+        references.turn[2] = 0.0
         left = [
             text
             for size, text in (

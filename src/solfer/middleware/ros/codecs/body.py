@@ -67,7 +67,8 @@ class BodyCodec(Codec):
 
     def encode(self, message: BodyMessage) -> PackedMessage:
         """See `Codec.encode`."""
-        numbers, rotation = self._out.view(message.frame, message.child), rotation_from_quaternion(message.orientation)
+        numbers = self._out.view(message.frame, message.child)
+        rotation = rotation_from_quaternion(message.orientation)
         numbers[0:3], numbers[3:7] = message.position, message.orientation
         numbers[7:43] = message.pose_covariance.ravel()
         numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
@@ -77,7 +78,8 @@ class BodyCodec(Codec):
     def decode(self, packed: bytes, sender: str) -> BodyMessage:
         """See `Codec.decode`."""
         odometry = unpack(Odometry, packed)
-        pose, twist = odometry.pose.pose, odometry.twist.twist
+        pose = odometry.pose.pose
+        twist = odometry.twist.twist
         orientation = _orientation(pose.orientation)
         rotation = rotation_from_quaternion(orientation)
         return BodyMessage(
@@ -154,7 +156,8 @@ class WrenchCodec(Codec):
     def decode(self, packed: bytes, sender: str) -> WrenchMessage:
         """See `Codec.decode`."""
         stamped = unpack(WrenchStamped, packed)
-        header, wrench = stamped.header, stamped.wrench
+        header = stamped.header
+        wrench = stamped.wrench
         return WrenchMessage(header.frame_id, _get(wrench.force), _get(wrench.torque), header.stamp.to_sec(), sender)
 
 

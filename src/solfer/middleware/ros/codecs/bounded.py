@@ -38,8 +38,10 @@ class Rate:
     """
 
     def __init__(self, rate: float, burst: int):
-        self._period, self._ahead = 1.0 / rate, burst / rate
-        self._next, self._lock = 0.0, threading.Lock()
+        self._period = 1.0 / rate
+        self._ahead = burst / rate
+        self._next = 0.0
+        self._lock = threading.Lock()
 
     def wait(self, patience: float = PATIENCE) -> bool:
         """Wait for the caller's turn; returns False, at once, if that takes longer than `patience` [s]."""

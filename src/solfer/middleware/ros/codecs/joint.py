@@ -39,11 +39,16 @@ class JointLayout:
     """
 
     def __init__(self, packed: bytes, start: int, message: JointMessage, places: dict[str, int]):
-        self.names, self.component, self.rows = message.names, message.component, tuple(places)
-        offsets, size = tuple(places.values()), NUMBER.itemsize * len(message.names)
-        self._shape, self._first = (len(offsets), len(message.names)), offsets[0]
+        self.names = message.names
+        self.component = message.component
+        self.rows = tuple(places)
+        offsets = tuple(places.values())
+        size = NUMBER.itemsize * len(message.names)
+        self._shape = (len(offsets), len(message.names))
+        self._first = offsets[0]
         self._strides = (offsets[1] - offsets[0] if len(offsets) > 1 else size, NUMBER.itemsize)
-        begins, ends = (start, *(offset + size for offset in offsets)), (*offsets, len(packed))
+        begins = (start, *(offset + size for offset in offsets))
+        ends = (*offsets, len(packed))
         self._constants = [(packed[begin:end], begin) for begin, end in zip(begins, ends, strict=True)]
 
     @classmethod
@@ -77,7 +82,8 @@ class JointCodec(Codec):
     messages = JOINT_MESSAGES
 
     def __init__(self, message: str):
-        self._fields, self._open = JOINT_MESSAGES[message], message == ANY_INTERFACE
+        self._fields = JOINT_MESSAGES[message]
+        self._open = message == ANY_INTERFACE
         self.ros_class = packed_class(message_class(message))
         self._layout: tuple[tuple[str, ...], list[int], tuple[str, ...], str] | None = None
         self._frame = PackedMessage(b"")
@@ -109,7 +115,8 @@ class JointCodec(Codec):
 
     def _lay_out(self, names: tuple[str, ...], counts: list[int], interfaces: tuple[str, ...], component: str) -> None:
         """Make the buffer for these names, lengths of the arrays, further interfaces, and name of a component."""
-        body, offsets = _pack_names(names), []
+        body = _pack_names(names)
+        offsets = []
         for index, count in enumerate(counts):
             if index == len(self._fields):
                 body += _pack_names(interfaces)
@@ -118,7 +125,8 @@ class JointCodec(Codec):
             body += bytes(8 * count)
         if self._open:
             body += _pack_text(component)
-        self._frame, self._layout = PackedMessage(body), (names, counts, interfaces, component)
+        self._frame = PackedMessage(body)
+        self._layout = (names, counts, interfaces, component)
         self._arrays = [self._frame.numbers(offset, count) for offset, count in zip(offsets, counts, strict=True)]
 
     def decode(self, packed: bytes, sender: str) -> JointMessage:
@@ -142,7 +150,8 @@ class JointCodec(Codec):
         """Decode what follows the header, part by part, and remember how it lies."""
         self._decoded, offset = _unpack_names(packed, start, self._decoded)
         names = self._decoded[0]
-        message, places = JointMessage(names, stamp=stamp, sender=sender), {}
+        message = JointMessage(names, stamp=stamp, sender=sender)
+        places = {}
         for name in self._fields:
             values, offset = _unpack_array(packed, offset)
             if len(values) not in (0, len(names)):
@@ -207,7 +216,8 @@ def _unpack_names(
     if packed.startswith(known[1], offset):
         return known, offset + len(known[1])
     (count,) = LENGTH.unpack_from(packed, offset)
-    start, offset = offset, offset + LENGTH.size
+    start = offset
+    offset = offset + LENGTH.size
     found = []
     for _ in range(count):
         (length,) = LENGTH.unpack_from(packed, offset)

@@ -50,7 +50,8 @@ class PackedMessage:
     """
 
     def __init__(self, body: bytes, name: str | None = ""):
-        self._stamped, header = name is not None, b""
+        self._stamped = name is not None
+        header = b""
         if name is not None:
             encoded = name.encode()
             header = HEADER.pack(0, 0, 0, len(encoded)) + encoded

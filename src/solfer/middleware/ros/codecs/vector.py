@@ -65,7 +65,8 @@ class PointsCodec(Codec):
 
     def encode(self, message: PointsMessage) -> PackedMessage:
         """See `Codec.encode`; the packed message is a new one each time."""
-        count, values = len(message.values), message.values.ravel().tolist()
+        count = len(message.values)
+        values = message.values.ravel().tolist()
         buffer = io.BytesIO()
         self._type(name=message.names, count=count, value=values).serialize(buffer)
         frame = PackedMessage(buffer.getvalue()[HEADER.size :], message.frame)

@@ -96,12 +96,15 @@ def wait_for_connections(endpoints: Iterable[Endpoint], name: str, running: Call
         Ended: The node was asked to end.
     """
     publishers, subscribers, _ = rosgraph.Master(name).getSystemState()
-    writing, reading = dict(publishers), dict(subscribers)
+    writing = dict(publishers)
+    reading = dict(subscribers)
     for endpoint in endpoints:
         if isinstance(endpoint, RosWriter):
-            nodes, connected = reading.get(endpoint.topic, []), endpoint.topic_publisher.receivers
+            nodes = reading.get(endpoint.topic, [])
+            connected = endpoint.topic_publisher.receivers
         else:
-            nodes, connected = writing.get(endpoint.topic, []), endpoint.subscription.senders
+            nodes = writing.get(endpoint.topic, [])
+            connected = endpoint.subscription.senders
         missing = _wait_for_nodes(set(nodes) - {name}, connected, running)
         if missing:
             logger.warning(
@@ -136,8 +139,11 @@ class LockstepClient:
         requests: Callable[[], Sequence[Future]],
         running: Callable[[], bool],
     ):
-        self._name, self._clock, self._endpoints = name, clock, endpoints
-        self._requests, self._running = requests, running
+        self._name = name
+        self._clock = clock
+        self._endpoints = endpoints
+        self._requests = requests
+        self._running = running
         self._server: rospy.Service | None = None
         self._published: dict[str, int] = {}
 
@@ -156,7 +162,8 @@ class LockstepClient:
 
     def _answer(self, tick: Any) -> Any:
         keys = tuple(zip(tick.topics, tick.senders, strict=True))
-        numbers, before = dict(zip(keys, tick.numbers, strict=True)), dict(zip(keys, tick.before, strict=True))
+        numbers = dict(zip(keys, tick.numbers, strict=True))
+        before = dict(zip(keys, tick.before, strict=True))
         try:
             due = self._clock.grant(
                 tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running, before)

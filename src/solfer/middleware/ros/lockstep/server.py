@@ -44,7 +44,8 @@ class LockstepMember:
     """
 
     def __init__(self, name: str):
-        self.name, self.due = name, 0.0
+        self.name = name
+        self.due = 0.0
         self.before: Numbers = {}
         self._service = f"{name}/{SERVICE}"
         self._proxy: rospy.ServiceProxy | None = None
@@ -63,7 +64,9 @@ class LockstepMember:
             return False
         if uri is None or not alive(self._service, uri):
             return False
-        self._proxy, self.due, self.before = rospy.ServiceProxy(self._service, service_class(TICK), True), 0.0, numbers
+        self._proxy = rospy.ServiceProxy(self._service, service_class(TICK), True)
+        self.due = 0.0
+        self.before = numbers
         return True
 
     def tick(self, now: float, numbers: Numbers, meanwhile: Callable[[], None], running: Callable[[], bool]) -> Numbers:
@@ -83,7 +86,8 @@ class LockstepMember:
             list(received.values()),
             [self.before.get(key, 0) for key in received],
         )
-        answer, slow = self._thread.submit(self._proxy, request), time.monotonic() + SLOW
+        answer = self._thread.submit(self._proxy, request)
+        slow = time.monotonic() + SLOW
         while not wait((answer,), ANSWER).done and running():
             meanwhile()
             if time.monotonic() > slow:
@@ -123,7 +127,9 @@ class LockstepServer:
 
     def __init__(self, names: Sequence[str], name: str, endpoints: Sequence[Endpoint], running: Callable[[], bool]):
         self._members = [LockstepMember(each) for each in names]
-        self._name, self._endpoints, self._running = name, endpoints, running
+        self._name = name
+        self._endpoints = endpoints
+        self._running = running
         self._numbers: Numbers = {}
         self._throttle = Throttle(logger)
 

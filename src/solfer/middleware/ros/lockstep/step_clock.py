@@ -25,7 +25,8 @@ class StepClock(RosClock):
 
     def __init__(self, running: Callable[[], bool]):
         super().__init__(running)
-        self._time, self._granted = 0.0, False
+        self._time = 0.0
+        self._granted = False
         self._published = self._ahead = 0.0
         """Newest simulated time, and by how much `now` is ahead of it since that went back [s]."""
         self._deadline: float | None = None
@@ -42,7 +43,8 @@ class StepClock(RosClock):
             self._moved.notify_all()
             while not self._granted and self._running():
                 self._moved.wait(LOOK)
-            self._granted, self._deadline = False, None
+            self._granted = False
+            self._deadline = None
 
     def grant(self, time: float, prepare: Callable[[], None]) -> float:
         """Let the loop make the cycle at `time` [s] if it is due; returns, after it, the time of the next one.

@@ -103,7 +103,8 @@ class SubscribingClock(RosClock):
 
     def __init__(self, running: Callable[[], bool]):
         super().__init__(running)
-        self._passed, self._newest = 0.0, None
+        self._passed = 0.0
+        self._newest = None
         self._moved = threading.Condition()
         set_ros_time(genpy.Time())
         rospy.Subscriber("/clock", ClockMessage, self._receive, queue_size=1, tcp_nodelay=True)

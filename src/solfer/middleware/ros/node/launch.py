@@ -46,9 +46,12 @@ class Launch:
     """
 
     def __init__(self, arguments: Sequence[str], log: Path, port: int):
-        self._arguments, self._log, self._port = list(arguments), log, port
+        self._arguments = list(arguments)
+        self._log = log
+        self._port = port
         self._process: subprocess.Popen | None = None
-        self.patience, self._asked = 10.0, 0.0
+        self.patience = 10.0
+        self._asked = 0.0
         self.uri = f"http://localhost:{port}"
 
     def __enter__(self) -> "Launch":

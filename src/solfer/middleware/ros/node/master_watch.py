@@ -51,10 +51,16 @@ class MasterWatch:
         period: float = PERIOD,
         patience: float = PATIENCE,
     ):
-        self._ask, self._known, self._lost = number, known, lost
-        self._period, self._patience, self.loss = period, patience, ""
-        self._number, self._registered = number(), False
-        self._failures, self._since = 0, 0.0
+        self._ask = number
+        self._known = known
+        self._lost = lost
+        self._period = period
+        self._patience = patience
+        self.loss = ""
+        self._number = number()
+        self._registered = False
+        self._failures = 0
+        self._since = 0.0
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()

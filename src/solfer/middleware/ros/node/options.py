@@ -27,9 +27,11 @@ def setting(argv: Sequence[str], name: str, default: Any, kind: Callable[[str], 
     Raises:
         ConfigError: The text is not a value of that kind.
     """
-    where, value = f"{name}:=", argument(argv, name)
+    where = f"{name}:="
+    value = argument(argv, name)
     if value is None:
-        where, value = f"parameter {rospy.resolve_name('~' + name)}", rospy.get_param(f"~{name}", None)
+        where = f"parameter {rospy.resolve_name('~' + name)}"
+        value = rospy.get_param(f"~{name}", None)
     if value is None or value == "":
         return default
     try:

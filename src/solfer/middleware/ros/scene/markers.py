@@ -35,9 +35,13 @@ SIDES = 24
 AXES = 0.1
 """Length of the axes of a reference [m]."""
 
-MEASURED, PROJECTED = (0.1, 0.4, 0.9, 1.0), (0.9, 0.2, 0.2, 1.0)
-EDGES, INNER = (0.1, 0.7, 0.2, 1.0), (0.9, 0.7, 0.1, 1.0)
-FORCE, CONE, PATH = (0.9, 0.3, 0.1, 1.0), (0.9, 0.6, 0.1, 0.25), (0.6, 0.2, 0.8, 1.0)
+MEASURED = (0.1, 0.4, 0.9, 1.0)
+PROJECTED = (0.9, 0.2, 0.2, 1.0)
+EDGES = (0.1, 0.7, 0.2, 1.0)
+INNER = (0.9, 0.7, 0.1, 1.0)
+FORCE = (0.9, 0.3, 0.1, 1.0)
+CONE = (0.9, 0.6, 0.1, 0.25)
+PATH = (0.6, 0.2, 0.8, 1.0)
 GOES = (0.5, 0.5, 0.5, 0.7)
 OF_AXES = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.8, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
 
@@ -73,7 +77,8 @@ class SceneMarkers:
         stamp = genpy.Time(*present())
         for link, pose in state.desired.items():
             made = TransformStamped(child_frame_id=prefixed(self._prefix, f"{DESIRED}/{link}"))
-            made.header.frame_id, made.header.stamp = state.frame, stamp
+            made.header.frame_id = state.frame
+            made.header.stamp = stamp
             placed = pose_of(pose)
             made.transform.translation = Vector3(*pose.position.tolist())
             made.transform.rotation = placed.orientation
@@ -152,7 +157,8 @@ def _cone(number: int, force: ContactForce, friction: float) -> Marker:
 def _frame(number: int, reference: ShownReference) -> Marker:
     """Make the axes of a reference; of a position they are those of the frame that it is in."""
     made = _marker("references", number, Marker.LINE_LIST, (0.01, 0.0, 0.0), MEASURED)
-    position, rotation = reference.reference.position, reference.reference.rotation
+    position = reference.reference.position
+    rotation = reference.reference.rotation
     for axis, color in zip(rotation.T, OF_AXES, strict=True):
         made.points += [_point(position), _point(position + AXES * axis)]
         made.colors += [ColorRGBA(*color)] * 2

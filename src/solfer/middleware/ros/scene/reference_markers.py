@@ -40,7 +40,8 @@ class ReferenceMarkers:
     """
 
     def __init__(self, dragged: DraggedReferences, prefix: str = ""):
-        self._dragged, self._prefix = dragged, prefix
+        self._dragged = dragged
+        self._prefix = prefix
         self._server = InteractiveMarkerServer("~references")
         self._received = deque[InteractiveMarkerFeedback](maxlen=1000)  # rospy calls from threads of its own
         self._shown: dict[str, ShownReference] = {}
@@ -75,7 +76,8 @@ class ReferenceMarkers:
         if feedback.event_type == feedback.MOUSE_UP:
             self._dragged.release(shown, feedback.client_id)
         elif feedback.event_type == feedback.POSE_UPDATE:
-            place, turn = feedback.pose.position, feedback.pose.orientation
+            place = feedback.pose.position
+            turn = feedback.pose.orientation
             position = np.array((place.x, place.y, place.z))
             try:
                 pose = ScenePose(position, rotation_from_quaternion((turn.x, turn.y, turn.z, turn.w)))

@@ -108,8 +108,10 @@ def write_header(memory: mmap.mmap, kind: bytes, layout: bytes, generation: int)
     """Write the header of a new segment of this process."""
     words = memoryview(memory)[: KIND.start].cast("q")
     words[Word.MAGIC], words[Word.VERSION], words[Word.LAYOUT] = MAGIC, VERSION, hash_of(layout)
-    words[Word.PID], words[Word.GENERATION] = os.getpid(), generation
-    words[Word.SIZE], words[Word.TEXT] = len(memory), len(layout)
+    words[Word.PID] = os.getpid()
+    words[Word.GENERATION] = generation
+    words[Word.SIZE] = len(memory)
+    words[Word.TEXT] = len(layout)
     memory[8 * Word.BOOT : 8 * Word.BOOT + 16] = boot()
     memory[KIND] = kind.ljust(32, b"\0")
     memory[HEADER : HEADER + len(layout)] = layout

@@ -10,7 +10,8 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory import files
 
 LONGEST = 32  # [B], the number of a process
-TRIES, PAUSE = 5, 0.01  # [1], [s]: a process that only checks whether a lock is held has it for some microseconds
+TRIES = 5
+PAUSE = 0.01  # [1], [s]: a process that only checks whether a lock is held has it for some microseconds
 
 _HELD: "weakref.WeakSet[Lock]" = weakref.WeakSet()
 

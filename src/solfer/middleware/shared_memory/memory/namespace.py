@@ -12,7 +12,8 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory import files
 
 SHARED_MEMORY = Path("/dev/shm")
-BELLS, BELLS_SIZE = "bells", 4096
+BELLS = "bells"
+BELLS_SIZE = 4096
 ANY = 0
 """Place of the bell that rings with every other one."""
 
@@ -42,7 +43,8 @@ class Namespace:
     def __init__(self, name: str = "solfer", root: Path = SHARED_MEMORY, make: bool = True):
         if not re.fullmatch(r"[\w.-]+", name):
             raise MiddlewareError(f"invalid namespace name '{name}'", expected="letters, digits, _ . -")
-        self.name, self.folder = name, root / f"{files.PREFIX}{name}"
+        self.name = name
+        self.folder = root / f"{files.PREFIX}{name}"
         try:
             opened = files.open_namespace(self.folder, make)
         except FileNotFoundError as error:
@@ -150,7 +152,9 @@ class Bell:
     """
 
     def __init__(self, words: memoryview, place: int):
-        self.words, self.place, self.received = words, place, -1
+        self.words = words
+        self.place = place
+        self.received = -1
 
     def rung(self) -> bool:
         """Return whether it rang since `acknowledge`, or ever if that was not called yet."""

@@ -26,7 +26,9 @@ class Presence:
     """
 
     def __init__(self, namespace: Namespace, segments: Sequence[Segment] = ()):
-        self._namespace, self._segments, self.loss = namespace, tuple(segments), ""
+        self._namespace = namespace
+        self._segments = tuple(segments)
+        self.loss = ""
         self._due = time.monotonic() + PERIOD
 
     def look(self) -> None:

@@ -21,7 +21,8 @@ class Ring(Slots):
 
     def __init__(self, memory: memoryview, width: int, count: int, refuse: bool = False):
         super().__init__(memory, width, count)
-        self.lost, self._refuse = 0, refuse
+        self.lost = 0
+        self._refuse = refuse
         if refuse:
             self.sequence = self.words[TAKEN]
 

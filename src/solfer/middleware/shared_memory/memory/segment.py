@@ -49,13 +49,16 @@ class Segment:
 
     def __init__(self, path: Path, mapped: _Mapped, lock: Lock | None = None):
         memory, self._identity = mapped
-        self.path, self._memory, self._lock = path, memory, lock
+        self.path = path
+        self._memory = memory
+        self._lock = lock
         view = memoryview(memory)
         self._words = view[: KIND.start].cast("q")
         start = HEADER + padded(self._words[Word.TEXT])
         self.layout = bytes(view[HEADER : HEADER + self._words[Word.TEXT]])
         self.data = view[start:]
-        self.pid, self.generation = self._words[Word.PID], self._words[Word.GENERATION]
+        self.pid = self._words[Word.PID]
+        self.generation = self._words[Word.GENERATION]
 
     @classmethod
     def create(cls, path: Path, kind: str, layout: bytes, size: int) -> "Segment":
@@ -125,7 +128,8 @@ class Segment:
             raise MiddlewareError(
                 f"shared memory cannot be made: {error.strerror}", where=str(self.path), expected="room in /dev/shm"
             ) from error
-        lock, self._lock = self._lock, None
+        lock = self._lock
+        self._lock = None
         return Segment(self.path, mapped, lock)
 
     @property

@@ -23,7 +23,8 @@ REQUEST_SIZE, REPLY_SIZE = 16384, 131072
 NUMBER, FRONT = 0, 1
 """Column of a call's number, in front of its text."""
 
-DONE, FAILED = "done", "failed"
+DONE = "done"
+FAILED = "failed"
 
 
 def interface_of(interface: str, request: type, reply: type) -> bytes:

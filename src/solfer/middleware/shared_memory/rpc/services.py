@@ -18,7 +18,9 @@ from solfer.transport.middleware import Submit
 
 logger = logging.getLogger(__name__)
 
-SERVICES, OFFER, CALLS = "services", "offer", "calls"
+SERVICES = "services"
+OFFER = "offer"
+CALLS = "calls"
 KIND = "service"
 
 
@@ -67,8 +69,13 @@ class ServiceServer:
         now: Callable[[], float],
         worker: ThreadPoolExecutor,
     ):
-        self.name, self._owner, self._service, self._submit = f"{owner}/{service.name}", owner, service, submit
-        self._namespace, self._now, self._worker = namespace, now, worker
+        self.name = f"{owner}/{service.name}"
+        self._owner = owner
+        self._service = service
+        self._submit = submit
+        self._namespace = namespace
+        self._now = now
+        self._worker = worker
         self._interface = interface_of(service.interface, service.request, service.reply)
         self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), KIND, self._interface, 0)
         self._channels: dict[str, RpcChannel] = {}
@@ -135,7 +142,8 @@ class ServiceServer:
             call.preparation = None
         if call.answer is not None and call.answer.done():
             return self._reply(call, self._result(call.answer)) or call.channel.segment.retired
-        now, ended = self._now(), call.channel.segment.retired
+        now = self._now()
+        ended = call.channel.segment.retired
         if now <= min(call.latest, call.awaited) and not ended:
             return False
         for work in (call.preparation, call.answer):

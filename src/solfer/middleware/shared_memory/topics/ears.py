@@ -6,7 +6,8 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment
 
-KIND, EARS = "ear", "ears"
+KIND = "ear"
+EARS = "ears"
 
 
 class Ears:
@@ -18,7 +19,8 @@ class Ears:
     """
 
     def __init__(self, namespace: Namespace, name: str):
-        self._namespace, self._name = namespace, name
+        self._namespace = namespace
+        self._name = name
         self._segments: dict[str, Segment | None] = {}
 
     def listen(self, topic: str, message: str, declared: bool = False) -> None:

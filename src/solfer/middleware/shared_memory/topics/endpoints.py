@@ -47,7 +47,10 @@ class XbotReader(Reader):
     """
 
     def __init__(self, namespace: Namespace, topic: str, message: str, now: Callable[[], float], kept: int = 0):
-        self.topic, self.carries, self._now, self._kept = topic, message, now, kept
+        self.topic = topic
+        self.carries = message
+        self._now = now
+        self._kept = kept
         self._sender_segments = SenderSegments(namespace, topic, message, Ring if kept else Slot)
         self._bell = self._sender_segments.bell
         self.publishers: list[SenderSegment] = []
@@ -65,7 +68,8 @@ class XbotReader(Reader):
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
-        news, bell = None, self._bell
+        news = None
+        bell = self._bell
         quiet = bell.words[bell.place] == bell.received
         for sender_segment in self.publishers if quiet else self.update():
             if sender_segment.end.read() is NEW:
@@ -74,7 +78,8 @@ class XbotReader(Reader):
                     news = sender_segment
         if news is None or news.arrival < self.arrival:  # sent before what is known already
             return NONE if self.message is None else OLD
-        self.message, self.arrival = news.record.decode(), news.arrival
+        self.message = news.record.decode()
+        self.arrival = news.arrival
         return NEW
 
     def update(self) -> Sequence[SenderSegment]:
@@ -96,7 +101,8 @@ class XbotReader(Reader):
         if publisher.end.read() is not NEW:
             return NONE if self.message is None else OLD
         record = publisher.record
-        self.message, sent = record.decode(), record.sent
+        self.message = record.decode()
+        sent = record.sent
         self.arrival = publisher.arrival = sent
         return NEW
 
@@ -115,7 +121,8 @@ class XbotReader(Reader):
             self._sources = self.publishers
             return None
         oldest.ahead = False
-        self.message, self.arrival = oldest.record.decode(), oldest.record.sent
+        self.message = oldest.record.decode()
+        self.arrival = oldest.record.sent
         oldest.arrival = self.arrival
         return oldest
 
@@ -213,7 +220,9 @@ class XbotMail:
     """
 
     def __init__(self, queues: Sequence[XbotQueue], bell: Bell):
-        self._queues, self._words, self._rung = tuple(queues), bell.words, bell.place
+        self._queues = tuple(queues)
+        self._words = bell.words
+        self._rung = bell.place
         self._heard, self._ends = -1, tuple[Slot | Ring, ...]()
 
     def __call__(self) -> bool:
@@ -228,7 +237,8 @@ class XbotMail:
             if queue:
                 return True
         # nothing has rung for these queues since they were emptied
-        self._heard, self._ends = number, tuple(end for queue in self._queues for end in queue.ends)
+        self._heard = number
+        self._ends = tuple(end for queue in self._queues for end in queue.ends)
         return False
 
 
@@ -252,7 +262,9 @@ class XbotWriter(Writer):
     ):
         self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
         self.carries = message
-        self._sender, self._now, self._throttle = sender, now, Throttle(logger)
+        self._sender = sender
+        self._now = now
+        self._throttle = Throttle(logger)
         require_message(namespace, topic, message)
         path = namespace.place(PIPES, topic, file_of(sender, number))
         self._segment = Segment.create(path, KIND, header(message, sender, None), 0)

@@ -40,7 +40,9 @@ class NumbersLayout:
     """
 
     def __init__(self, texts: dict[str, Any], shapes: dict[str, tuple[int, ...] | None], tuples: tuple[str, ...]):
-        self.texts, self.shapes, self.tuples = texts, shapes, tuples
+        self.texts = texts
+        self.shapes = shapes
+        self.tuples = tuples
         self.width = FRONT + sum(int(np.prod(shape)) for shape in shapes.values() if shape is not None)
         self._texts = tuple(texts.items())
         self._arrays = tuple((name, shape) for name, shape in shapes.items() if name not in tuples)

@@ -17,7 +17,8 @@ from solfer.transport.messages import type_of
 
 logger = logging.getLogger(__name__)
 
-KIND, PIPES = "pipe", "pipes"
+KIND = "pipe"
+PIPES = "pipes"
 DEPTH = 64
 """Messages that a sender keeps for readers of every one."""
 
@@ -60,7 +61,8 @@ class SenderSegment(Publisher):
         published = json.loads(segment.layout)
         layout = kind_of(message).read(published["content"])
         super().__init__(published["sender"])
-        self.segment, self.ahead = segment, False
+        self.segment = segment
+        self.ahead = False
         self.end = end(segment.data, layout.width, DEPTH)
         self.record: WireRecord = layout.bind(type_of(message), self.end.values, self.name)
 
@@ -85,7 +87,10 @@ class SenderSegments:
     """
 
     def __init__(self, namespace: Namespace, topic: str, message: str, end: type[Slot] | type[Ring]):
-        self._namespace, self._topic, self._message, self._end = namespace, topic, message, end
+        self._namespace = namespace
+        self._topic = topic
+        self._message = message
+        self._end = end
         self.current: list[SenderSegment] = []
         self.refused, self._throttle, self.bell = 0, Throttle(logger), namespace.bell(PIPES, topic)
         self.changed = self.bell.rung

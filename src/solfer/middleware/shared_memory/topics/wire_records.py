@@ -130,7 +130,9 @@ class TextWireRecord(WireRecord):
 
     def __init__(self, message_type: type, values: np.ndarray, sender: str):
         super().__init__(values)
-        self._text, self._type, self._sender = Text(values[FRONT:]), message_type, sender
+        self._text = Text(values[FRONT:])
+        self._type = message_type
+        self._sender = sender
         self._fields = [field.name for field in dataclasses.fields(message_type) if field.name not in OWN]
         self.message = message_type(*(() for _ in self._fields), sender=sender)
 

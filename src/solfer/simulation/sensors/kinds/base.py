@@ -14,7 +14,9 @@ class BaseSensor(SingleSensor):
         base: The base.
     """
 
-    name, topic, message = "base", "floating_base", "nav_msgs/Odometry"
+    name = "base"
+    topic = "floating_base"
+    message = "nav_msgs/Odometry"
     what = "pose and twist of a floating base"
     truth = True
 
@@ -29,7 +31,8 @@ class BaseSensor(SingleSensor):
 
     def measure(self) -> BodyMessage:
         """Take one sample; the message is the same object each time."""
-        base, message = self._base, self._message
+        base = self._base
+        message = self._message
         message.stamp = self.state.time
         message.position[:], message.orientation[:] = base.position, base.orientation
         message.linear[:], message.angular[:] = base.linear, base.angular

@@ -30,7 +30,8 @@ class ContactSensors(Sensor):
         topics: For each contact that of the wrench in the axes of the world, then that in the axes of its link.
     """
 
-    name, message = "contacts", "geometry_msgs/WrenchStamped"
+    name = "contacts"
+    message = "geometry_msgs/WrenchStamped"
     what = "wrenches of the contacts"
 
     def __init__(self, state: SimulationState, records: Sequence[ContactRecord]):
@@ -59,20 +60,26 @@ class ContactSensors(Sensor):
 
     def messages(self) -> Sequence[WrenchMessage]:
         """See `Sensor.messages`."""
-        time, points, before = self.state.time, self.state.contact_points(), self.state.before
+        time = self.state.time
+        points = self.state.contact_points()
+        before = self.state.before
         published: list[WrenchMessage] = []
         for link, owner, world, local in zip(self._links, self._owners, self._world, self._local, strict=True):
             world.stamp = local.stamp = time
             x, y, z = before.position(link).tolist()
-            force, torque = np.zeros(3), np.zeros(3)
+            force = np.zeros(3)
+            torque = np.zeros(3)
             for point in points:
                 if point.link == owner:
                     (px, py, pz), (fx, fy, fz) = point.position, point.force
-                    rx, ry, rz = px - x, py - y, pz - z
+                    rx = px - x
+                    ry = py - y
+                    rz = pz - z
                     force += fx, fy, fz
                     torque += ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
             rotation = before.rotation(link)
-            world.force[:], world.torque[:] = force, torque
+            world.force[:] = force
+            world.torque[:] = torque
             local.force[:], local.torque[:] = force @ rotation, torque @ rotation
             published += (world, local)
         return published

@@ -102,7 +102,8 @@ class Imu(SingleSensor):
         UnknownName: The robot has no such link.
     """
 
-    name, message = "imu", "sensor_msgs/Imu"
+    name = "imu"
+    message = "sensor_msgs/Imu"
     what = "inertial measurement unit"
     tags = {"imu": (ImuRecord | None, Field(default=None, description="inertial measurement unit"))}
 
@@ -111,15 +112,18 @@ class Imu(SingleSensor):
         self._link = record.link
         state.now.require(record.link, record.where("link"))
         record = record.effective()
-        place, turn = record.offset_position, record.offset_orientation
+        place = record.offset_position
+        turn = record.offset_orientation
         self._place = np.zeros(3) if place is None else place.vector()
         self._turn = np.eye(3) if turn is None else turn.matrix()
         self._deviations = record.noise
-        self._angular_bias, self._acceleration_bias = np.array(record.bias.angular), np.array(record.bias.acceleration)
+        self._angular_bias = np.array(record.bias.angular)
+        self._acceleration_bias = np.array(record.bias.acceleration)
         self._gyroscope = _drift(seed, "gyroscope", record.gyroscope)
         self._accelerometer = _drift(seed, "accelerometer", record.accelerometer)
         self._attitude = None if record.attitude is None else AttitudeFilter(**dict(record.attitude))
-        self._period, self._time = period, -1.0
+        self._period = period
+        self._time = -1.0
         self._message = ImuMessage(record.link)
 
     @classmethod
@@ -137,9 +141,12 @@ class Imu(SingleSensor):
 
     def measure(self) -> ImuMessage:
         """Take one sample; the message is the same object each time."""
-        now, before = self.state.now, self._velocity(self.state.before)[:3]
-        velocity, rotation = self._velocity(now), now.rotation(self._link) @ self._turn
-        message, deviations = self._message, self._deviations
+        now = self.state.now
+        before = self._velocity(self.state.before)[:3]
+        velocity = self._velocity(now)
+        rotation = now.rotation(self._link) @ self._turn
+        message = self._message
+        deviations = self._deviations
         message.stamp = self.state.time
         message.angular[:] = velocity[3:] @ rotation + self._angular_bias
         acceleration = (velocity[:3] - before) / STEP - now.gravity
@@ -154,7 +161,9 @@ class Imu(SingleSensor):
 
     def _err(self, passed: float) -> None:
         """Add the errors of gyroscopes and accelerometers; no time passes in a pause, in which biases stay."""
-        message, white, period = self._message, self._deviations, passed or self._period
+        message = self._message
+        white = self._deviations
+        period = passed or self._period
         for drift, values in ((self._gyroscope, message.angular), (self._accelerometer, message.acceleration)):
             drift.wander(passed)
             drift.add(values, period)

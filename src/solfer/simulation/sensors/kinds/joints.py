@@ -41,7 +41,9 @@ class JointSensors(SingleSensor):
         seed: Seed of their noise.
     """
 
-    name, topic, message = "joints", "joint_states", "sensor_msgs/JointState"
+    name = "joints"
+    topic = "joint_states"
+    message = "sensor_msgs/JointState"
     what = "joint states"
     tags = {
         "joint_noise": (
@@ -67,7 +69,8 @@ class JointSensors(SingleSensor):
 
     def measure(self) -> JointMessage:
         """Take one sample; the message is the same object each time."""
-        message, deviations = self._message, self._deviations
+        message = self._message
+        deviations = self._deviations
         message.stamp = self.state.time
         message.position[:], message.velocity[:], message.effort[:] = self._truth
         self.noise.add(message.position, deviations.position)

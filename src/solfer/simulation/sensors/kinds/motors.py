@@ -22,13 +22,16 @@ class MotorSensors(SingleSensor):
         motors: What its motors do.
     """
 
-    name, topic, message = "motors", "motor_states", "sensor_msgs/JointState"
+    name = "motors"
+    topic = "motor_states"
+    message = "sensor_msgs/JointState"
     what = "motor side of the joints"
 
     def __init__(self, state: SimulationState, motors: MotorSide):
         super().__init__(state)
         self._message: Any = JointMessage.empty(state.joints, JOINT_MESSAGES[self.message])
-        now, before = state.now, state.before
+        now = state.now
+        before = state.before
         self._links = tuple(state.of_joints(numbers) for numbers in (now.q, now.v, now.torque, before.torque))
         self._motors = tuple(
             state.of_joints(numbers)
