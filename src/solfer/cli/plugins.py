@@ -34,7 +34,7 @@ def report_of(options: argparse.Namespace) -> CheckReport:
     if options.file is None:
         raise ConfigError(f"{options.kind} are those of a main configuration", expected="FILE on the command line")
     names = None if options.name is None else (options.name,)
-    report = checked(options.file, names, options.system, options.search_paths)
+    report = checked(options.file, names, options.system, search_paths=options.search_paths)
     if names or not report.modules:
         raise_all(report.errors)
     if report.errors:
@@ -135,7 +135,7 @@ def network_of(file: str, names: Sequence[str], system: str | None = None, searc
         SolferError: One of the configurations is wrong.
         SolferErrors: Several mistakes.
     """
-    report = checked(file, names, system, search_paths)
+    report = checked(file, names, system, search_paths=search_paths)
     raise_all(report.errors)
     configurations = list(configurations_of(report))
     groups = {name: robot_groups(each.configurations) for name, each in report.shared.items()}
@@ -145,4 +145,4 @@ def network_of(file: str, names: Sequence[str], system: str | None = None, searc
         for name, each in groups.items()
     }
     declarations = [known_declarations(each) for each in configurations]
-    return connect(configurations, [component_of(each) for each in configurations], shared, declarations)
+    return connect(configurations, [component_of(each) for each in configurations], shared, declared=declarations)

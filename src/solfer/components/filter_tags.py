@@ -31,7 +31,7 @@ class FilterTags(Record):
         Raises:
             ConfigError: The cut-off is not below half of the rate.
         """
-        return LowPass(size, self.hertz, self.damping, rate, self.where("cut_off_frequency"))
+        return LowPass(size, self.hertz, self.damping, rate=rate, where=self.where("cut_off_frequency"))
 
 
 def live_filter(

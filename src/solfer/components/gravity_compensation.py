@@ -148,7 +148,7 @@ class GravityCompensation(Component):
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/lift`."""
-        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),)
+        return (Service("lift", "solfer/LiftContacts", LiftContacts, reply=LiftReply, handler=self.lift),)
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer the gains, and the time `fade`, which counts from the next contact on."""

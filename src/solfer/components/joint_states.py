@@ -60,7 +60,7 @@ class JointStates(Component):
         chain = np.intersect1d(self._group("chain"), robot.actuated)
         self._wheels = np.intersect1d(self._group("wheels"), chain)
         self._joints = np.setdiff1d(chain, self._wheels)
-        self._goals = JointGoals(robot, self._joints, self._wheels, self.tags.chain)
+        self._goals = JointGoals(robot, self._joints, self._wheels, chain=self.tags.chain)
         self._limit = robot.upper_limits.velocity[self._joints]
         self._turns = robot.turns[self._joints]
         self._ramp = Ramp(len(self._joints))
@@ -69,7 +69,7 @@ class JointStates(Component):
         self._ramped = np.zeros(len(self._joints))
         self._ramp_velocity = np.zeros(len(self._joints))
         self._by_ramp = np.ones(len(self._joints), dtype=bool)
-        self._follower = TrajectoryFollower(robot, self._joints, self._position, self._velocity)
+        self._follower = TrajectoryFollower(robot, self._joints, self._position, velocity=self._velocity)
         self._wheel_velocity = np.zeros(len(self._wheels))
         self._wheel_goal = np.zeros(len(self._wheels))
         self._step = np.zeros(len(self._wheels))
@@ -139,8 +139,8 @@ class JointStates(Component):
     def services(self) -> tuple[Service, ...]:
         """Offer the services `<name>/trajectory`, and `<name>/joint_state_cmnd` with the original program's fields."""
         return (
-            Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, self.trajectory),
-            Service("joint_state_cmnd", "solfer/JointStateCmnd", JointStateCmnd, CmndReply, self.command),
+            Service("trajectory", "solfer/MoveJoints", MoveJoints, reply=Reply, handler=self.trajectory),
+            Service("joint_state_cmnd", "solfer/JointStateCmnd", JointStateCmnd, reply=CmndReply, handler=self.command),
         )
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
@@ -154,7 +154,7 @@ class JointStates(Component):
 
     def topics(self) -> tuple[TopicIn, ...]:
         """Receive trajectories on `<name>/joint_trajectory`."""
-        return (TopicIn("joint_trajectory", TRAJECTORY, JointTrajectory, self.follow),)
+        return (TopicIn("joint_trajectory", TRAJECTORY, JointTrajectory, handler=self.follow),)
 
     def actions(self) -> tuple[Action, ...]:
         """Offer the action `<name>/follow_joint_trajectory`."""
@@ -163,12 +163,12 @@ class JointStates(Component):
                 "follow_joint_trajectory",
                 FOLLOW,
                 FollowGoal,
-                FollowFeedback,
-                FollowResult,
-                self.begin,
-                self._follower.outcome,
-                self._follower.report,
-                self.cancel,
+                feedback=FollowFeedback,
+                result=FollowResult,
+                begin=self.begin,
+                outcome=self._follower.outcome,
+                report=self._follower.report,
+                cancel=self.cancel,
             ),
         )
 

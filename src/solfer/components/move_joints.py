@@ -170,10 +170,14 @@ class JointGoals:
             raise ComponentError(f"joint '{twice}' is given twice", expected="each joint once")
         for index, joint in enumerate(joints):
             if joint in self._place:
-                goal[self._place[joint]] = _value(joint, index, "position", request.positions, request.velocities)
+                goal[self._place[joint]] = _value(
+                    joint, index, "position", values=request.positions, others=request.velocities
+                )
             elif joint in self._wheel_place:
                 place = self._wheel_place[joint]
-                wheel_goal[place] = _value(joint, index, "velocity", request.velocities, request.positions)
+                wheel_goal[place] = _value(
+                    joint, index, "velocity", values=request.velocities, others=request.positions
+                )
             else:
                 raise UnknownName("joint", joint, (*self._place, *self._wheel_place))
 

@@ -82,7 +82,7 @@ def tell(
     """
     middleware = show.middleware
     recorder = MotionRecorder(show.robot)
-    storyteller = story.StoryTeller(middleware, recorder, Progress(), asked)
+    storyteller = story.StoryTeller(middleware, recorder, Progress(), plugins=asked)
     storyteller.wait_for_robot(60.0, show.check)
     if not middleware.running():
         return INTERRUPTED
@@ -94,7 +94,7 @@ def tell(
         if not middleware.running():
             return INTERRUPTED
     storyteller.rest("stands", 1.0)
-    return conclude(show, robot, recorder, plugin)
+    return conclude(show, robot, recorder, plugin=plugin)
 
 
 def steps_of(robot: Robot, recorder: MotionRecorder) -> list[story.StoryStep]:
@@ -116,8 +116,12 @@ def conclude(show: story.Show, robot: Robot, recorder: MotionRecorder, plugin: s
     tracking = show.output / "demo_tracking.png"
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
         renderer.save(posture(robot, recorder), picture)
-    report.plot(recorder, DRAWN, tuple(forward), tracking)
-    print(report.format_table(report.table(recorder, parts(robot), show.middleware.reports(), plugin, SIMULATOR)))
+    report.plot(recorder, DRAWN, tuple(forward), path=tracking)
+    print(
+        report.format_table(
+            report.table(recorder, parts(robot), show.middleware.reports(), plugin=plugin, simulator=SIMULATOR)
+        )
+    )
     print(f"pictures: {picture}, {tracking}")
     return 0
 

@@ -107,8 +107,8 @@ class Driving:
             check: Raises if the system has ended.
         """
         middleware = self._middleware
-        course = ScenarioCourse(middleware, self._player, "locomotion", "odometry/odom", positions=True)
-        navigation = Navigation(middleware, course, "navigation", RATE)
+        course = ScenarioCourse(middleware, self._player, "locomotion", odometry="odometry/odom", positions=True)
+        navigation = Navigation(middleware, course, "navigation", rate=RATE)
         waving = Waving(middleware, "hands", hands_of(self.robot))
         begin = middleware.now()
         whole = course.left
@@ -190,4 +190,4 @@ def wait_for_robot(
     robot.state.position[:] = posture(robot, recorder)
     robot.update()
     legs = Robot.load(middleware.parameter("/robot_lower_body"))
-    return Driving(middleware, recorder, robot, legs, located(COURSE, "."))
+    return Driving(middleware, recorder, robot, legs=legs, course=located(COURSE, "."))

@@ -64,8 +64,8 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
     recording = read(file)
     world = read_world(find_world(WORLD))
     seen = driving_report.see(robot, found.legs, found.recorder)
-    rows = driving_report.table(robot, found.recorder, seen, recording, found.reports)
-    if warning := driving_report.warning(found.reports, seen, found.taken, found.waited):
+    rows = driving_report.table(robot, found.recorder, seen, recording=recording, reports=found.reports)
+    if warning := driving_report.warning(found.reports, seen, found.taken, waited=found.waited):
         print(warning)
     print(report.format_table(rows))
     narrowest = int(np.argmin(seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]))
@@ -77,6 +77,13 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
     if films:
         path = output / "demo.gif"
         progress = Progress()
-        film(robot, seen.time, seen.position, world, path, lambda done, count: progress("draws the film", done, count))
+        film(
+            robot,
+            seen.time,
+            seen.position,
+            world=world,
+            path=path,
+            progress=lambda done, count: progress("draws the film", done, count),
+        )
         print(f"film: {path}")
     return MISSED if warning or any(driving_report.OUTSIDE in figure for _, figure in rows) else 0

@@ -41,14 +41,14 @@ class Scheme:
 def drive(show: story.Show) -> int:
     """Fig. 5: drive along the course while both hands wave."""
     recorder = DrivingRecorder(show.middleware)
-    begin = driving.wait_for_robot(show.middleware, recorder, show.started, show.check)
+    begin = driving.wait_for_robot(show.middleware, recorder, show.started, check=show.check)
     if begin is None:
         return centauro.INTERRUPTED
     code = begin.run(centauro.Progress(), show.check)
     found = review.DrivingFindings(
-        begin.robot, begin.legs, recorder, show.middleware.reports(), begin.taken, show.waits
+        begin.robot, begin.legs, recorder, reports=show.middleware.reports(), taken=begin.taken, waited=show.waits
     )
-    show.review = lambda file, films: review.tell(found, file, show.output, films)
+    show.review = lambda file, films: review.tell(found, file, show.output, films=films)
     return code
 
 
@@ -58,12 +58,12 @@ def wave(show: story.Show) -> int:
     def waving(robot: Robot) -> Callable[[float], None]:
         return Waving(show.middleware, "manipulation", hands_of(robot)).send
 
-    return watch(show, "manipulation", "both hands wave", WAVES, waving)
+    return watch(show, "manipulation", "both hands wave", duration=WAVES, actor=waving)
 
 
 def squat(show: story.Show) -> int:
     """Squat on torques: nothing is asked of the robot, its configuration generates the reference."""
-    return watch(show, "squat", "it squats", SQUATS, lambda _: lambda _: None)
+    return watch(show, "squat", "it squats", duration=SQUATS, actor=lambda _: lambda _: None)
 
 
 def watch(
@@ -80,7 +80,7 @@ def watch(
     middleware = show.middleware
     recorder = MotionRecorder(show.robot)
     progress = centauro.Progress()
-    teller = story.StoryTeller(middleware, recorder, progress, ())
+    teller = story.StoryTeller(middleware, recorder, progress, plugins=())
     teller.wait_for_robot(60.0, show.check)
     if not middleware.running():
         return centauro.INTERRUPTED
@@ -98,7 +98,7 @@ def watch(
         show.check()
         recorder.collect()
         middleware.sleep_until(middleware.now() + 0.02)
-    return centauro.conclude(show, robot, recorder, plugin) if middleware.running() else centauro.INTERRUPTED
+    return centauro.conclude(show, robot, recorder, plugin=plugin) if middleware.running() else centauro.INTERRUPTED
 
 
 def carry(show: story.Show) -> int:
@@ -107,21 +107,21 @@ def carry(show: story.Show) -> int:
         story.StoryStep("legs up", {ONE: MoveJoints(state=centauro.HIGH, speed=0.5)}),
         story.StoryStep("legs down", {ONE: MoveJoints(state=centauro.LOW, speed=0.5)}),
     ]
-    return centauro.tell(show, lambda *_: steps, "gravity_compensation", (ONE,))
+    return centauro.tell(show, lambda *_: steps, "gravity_compensation", asked=(ONE,))
 
 
 def joints(plugin: str) -> Callable[[story.Show], int]:
     """Fig. 4: upper and lower body move at once; `plugin` merges what is wanted."""
-    return lambda show: centauro.tell(show, centauro.steps_of, plugin, (story.UPPER, story.LOWER))
+    return lambda show: centauro.tell(show, centauro.steps_of, plugin, asked=(story.UPPER, story.LOWER))
 
 
 SCHEMES = {
     "fig2": Scheme("Fig. 2, manipulation of the upper body", "figure_2.launch", wave),
     "fig3": Scheme("Fig. 3, a robot that is carried by torques", "figure_3.launch", carry),
     "fig4": Scheme("Fig. 4, shared control", "figure_4.launch", joints("shared_compensation")),
-    "fig5": Scheme("Fig. 5, the full control scheme", "figure_5.launch", drive, {"world": "gate"}),
+    "fig5": Scheme("Fig. 5, the full control scheme", "figure_5.launch", drive, arguments={"world": "gate"}),
     "squat": Scheme("Inverse dynamics, squats on torques", "inverse_dynamics.launch", squat),
 }
 """The schemes, by their names on the command line."""
 
-JOINTS = Scheme("Fig. 4 without torques", "figure_4.launch", joints("whole_body"), {"merging": "whole_body"})
+JOINTS = Scheme("Fig. 4 without torques", "figure_4.launch", joints("whole_body"), arguments={"merging": "whole_body"})

@@ -50,12 +50,15 @@ def build_lower_level(
         raise ModelError("no joint has a drive", expected="at least one joint among the actuators")
     return LowerLevel(
         kinematics,
-        [_controller(name, item, kinematics, driven, groups, gains, posture) for name, item in records.items()],
+        [
+            _controller(name, item, kinematics, driven=driven, groups=groups, gains=gains, posture=posture)
+            for name, item in records.items()
+        ],
         record,
-        robot,
-        passive,
-        actuators,
-        posture,
+        robot=robot,
+        passive=passive,
+        actuators=actuators,
+        posture=posture,
     )
 
 
@@ -68,8 +71,8 @@ def _controller(
     gains: Mapping[str, GainRecord] | None,
     posture: np.ndarray | None,
 ) -> LowerLevelController:
-    members = _members(record.group, record.where("group"), driven, groups)
-    left_out = _members(record.except_, record.where("except"), driven, groups) if record.except_ else set()
+    members = _members(record.group, record.where("group"), driven, groups=groups)
+    left_out = _members(record.except_, record.where("except"), driven, groups=groups) if record.except_ else set()
     joints = [joint for joint in driven if joint in members and joint not in left_out]
     if not joints:
         raise ModelError(
@@ -93,8 +96,8 @@ def _controller(
         name,
         limits,
         [gains[joint].stiffness for joint in joints],
-        [gains[joint].damping for joint in joints],
-        record.timeout,
+        damping=[gains[joint].damping for joint in joints],
+        timeout=record.timeout,
     )
 
 

@@ -70,7 +70,7 @@ class LowerLevel:
     ):
         self._passive = tuple(passive)
         self.controllers = {controller.name: controller for controller in controllers}
-        self.drives = Drives(kinematics, controllers, passive, actuators, posture)
+        self.drives = Drives(kinematics, controllers, passive, actuators=actuators, posture=posture)
         record = record or LowerLevelRecord()
         self.robot, self._silence, self.folders = robot, record.silence, Folders()
         self.ration = record.ration
@@ -284,7 +284,7 @@ class LowerLevel:
         modes = tuple(given)
         if not self.claims.renew(owner, target.name, names, modes):
             self.claims.claim_by_command(owner, names, ClaimedJoints(target.name, indices, modes))
-            self._warn_distance(target, owner, indices, given)
+            self._warn_distance(target, owner, indices, given=given)
         target.apply(indices, given)
 
     def _without_drive(self, message: JointMessage, error: CommandRefused) -> CommandRefused:

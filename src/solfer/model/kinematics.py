@@ -220,8 +220,8 @@ class Kinematics:
             frame.parentJoint,
             frame.placement.rotation.copy(),
             frame.placement.translation.copy(),
-            columns,
-            self._moved(columns),
+            columns=columns,
+            moved=self._moved(columns),
         )
 
     @property

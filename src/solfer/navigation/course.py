@@ -131,7 +131,7 @@ class MeasuredPose:
         if isinstance(located, str):
             return located
         self._predict(x, y, heading)
-        self._correct(x, y, heading, located)
+        self._correct(x, y, heading, located=located)
         return ""
 
     def _measure_rest(self, place: tuple[float, float, float]) -> None:

@@ -81,7 +81,7 @@ class Navigation:
         self._begin = self._went = middleware.now()
         self._is_received = False
         self._lacked = 0.0
-        pause = Service("pause", SWITCH_ONE, Flag, Accepted, self._pause)
+        pause = Service("pause", SWITCH_ONE, Flag, reply=Accepted, handler=self._pause)
         middleware.serve(name, (pause,), self._inbox.submit)
 
     def run(self) -> int:

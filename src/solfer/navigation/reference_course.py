@@ -139,7 +139,7 @@ class ReferenceCourse(Course):
         states: str = "joint_states",
     ):
         self._references: list[_TaskReference | _JointReference] = [
-            _TaskReference(middleware, target, name, each, quantity)
+            _TaskReference(middleware, target, name, record=each, quantity=quantity)
             for quantity, named in (
                 ("position", record.positions),
                 ("orientation", record.orientations),
@@ -148,7 +148,7 @@ class ReferenceCourse(Course):
             for name, each in named.items()
         ]
         if record.joints is not None:
-            self._references.append(_JointReference(middleware, joints, states, record.joints))
+            self._references.append(_JointReference(middleware, joints, states, record=record.joints))
         self.writers = tuple(each.writer for each in self._references)
         self.count = len(self._references)
         self._time = 0.0

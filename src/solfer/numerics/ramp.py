@@ -81,10 +81,10 @@ class Ramp:
             velocity.fill(0.0)
             return
         share = max(time, 0.0) / self.duration
-        _evaluate(self._leap, self._motion, share, position)
+        _evaluate(self._leap, self._motion, share, out=position)
         position *= share
         position += self._start
-        _evaluate(self._start_velocity, self._speed, share, velocity)
+        _evaluate(self._start_velocity, self._speed, share, out=velocity)
 
     def _shortest(self, distance: np.ndarray, limits: np.ndarray) -> float:
         """Find the least common duration [s].

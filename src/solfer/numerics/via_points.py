@@ -51,9 +51,11 @@ class ViaPoints:
         if velocities is None:
             self._coefficients[:, 1] = mean
         elif accelerations is None:
-            self._set_cubic(step, mean, velocities[:-1], velocities[1:])
+            self._set_cubic(step, mean, velocities[:-1], v1=velocities[1:])
         else:
-            self._set_quintic(step, mean, velocities[:-1], velocities[1:], accelerations[:-1], accelerations[1:])
+            self._set_quintic(
+                step, mean, velocities[:-1], v1=velocities[1:], a0=accelerations[:-1], a1=accelerations[1:]
+            )
 
     def _set_cubic(self, step: np.ndarray, mean: np.ndarray, v0: np.ndarray, v1: np.ndarray) -> None:
         c = self._coefficients

@@ -67,7 +67,7 @@ class PipeContext:
         where = wanted.where("frequency")
 
         def make(size: int) -> LowPass:
-            return LowPass(size, wanted.frequency, wanted.damping, self.rate, where)
+            return LowPass(size, wanted.frequency, wanted.damping, rate=self.rate, where=where)
 
         make(0)  # raises for a wrong filter here, even if none is made later
         return make

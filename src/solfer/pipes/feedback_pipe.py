@@ -275,7 +275,7 @@ class StateFeedbackPipe(FeedbackPipe):
         self.values = np.zeros((len(fields), len(dofs)))
         self._passed = np.zeros((len(fields), len(dofs)))
         self.state_fields = tuple(
-            StateField(field, dofs, values, passed, low_pass(len(dofs)) if low_pass else None)
+            StateField(field, dofs, values, passed=passed, low_pass=low_pass(len(dofs)) if low_pass else None)
             for field, values, passed in zip(fields, self.values, self._passed, strict=True)
         )
         self._dofs, self._all = dofs, np.arange(len(dofs))

@@ -33,7 +33,7 @@ class PipeKind:
     def of(cls, space: str, home: str) -> "PipeKind":
         """Collect what belongs to a kind from its home."""
         factory = import_module(f"solfer.pipes.{home}.factory")
-        return cls(space, RECORDS[space], factory.feedback, factory.controller)
+        return cls(space, RECORDS[space], factory.feedback, controller=factory.controller)
 
 
 KINDS = {space: PipeKind.of(space, home) for space, home in HOMES.items()}

@@ -86,8 +86,8 @@ class FeedbackTimeout:
             feedback,
             record.timeout or max(TIMEOUT, PERIODS / rate),
             record.strikes,
-            record.timeout_action,
-            record.where("source"),
+            action=record.timeout_action,
+            where=record.where("source"),
         )
 
     def read(self, now: float, way: float = 0.0) -> bool:

@@ -87,8 +87,8 @@ class JointClaim:
             claimant(middleware.name, plugin),
             tuple(name for name, _ in pairs),
             tuple(field for _, field in pairs),
-            tuple(joints),
-            tuple(map(_bare, follows)),
+            joints=tuple(joints),
+            follows=tuple(map(_bare, follows)),
         )
         self._topics = frozenset(f"{TOPIC}{_bare(topic)}" for topic in publishes)
         self._answer: Future[Any] | None = None

@@ -118,10 +118,12 @@ class Plugin:
         self._feedback_timeouts = FeedbackTimeouts(watches)
         self._now = middleware.now
         self._claim = claim
-        self._conditions = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
+        self._conditions = StartConditions(
+            self.name, self._feedback_timeouts, middleware, claim=claim, period=1.0 / rate, stall=stall
+        )
         self.timing = CycleTiming()
         self.robot_time = RobotTime(self.feedbacks, 1.0 / rate)
-        self.overload = Overload(self.name, self.feedbacks, 1.0 / rate, limits or OverloadRecord())
+        self.overload = Overload(self.name, self.feedbacks, 1.0 / rate, limits=limits or OverloadRecord())
         # made before the first cycle: importing its modules takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
         self._lacks = ""

@@ -116,7 +116,7 @@ class PluginLog:
                 log.add(each.field, each.values, names, _units(robot, names, each.field), kind=kind)
         elif isinstance(pipe, ContactFeedbackPipe):
             for name, wrench in pipe.wrenches.items():
-                _add_wrench(log, name, wrench, pipe.frame)
+                _add_wrench(log, name, wrench, frame=pipe.frame)
         elif feedback.name in inputs:
             _add_point(log, "value", inputs[feedback.name])
         log.add("age", age, ("age",), "s")
@@ -133,16 +133,18 @@ class PluginLog:
                 log.add(f"{name}/{field}", values, sent.names, _units(robot, sent.names, field), kind=kind)
         elif isinstance(sent, BodyMessage):
             parts = (sent.position, sent.orientation, sent.linear, sent.angular)
-            self._add_copies(log, name, "nav_msgs/Odometry", parts, sent.frame, sent.child)
+            self._add_copies(log, name, "nav_msgs/Odometry", parts=parts, frame=sent.frame, child=sent.child)
         elif isinstance(sent, WrenchMessage):
-            self._add_copies(log, name, "geometry_msgs/WrenchStamped", (sent.force, sent.torque), sent.frame)
+            self._add_copies(
+                log, name, "geometry_msgs/WrenchStamped", parts=(sent.force, sent.torque), frame=sent.frame
+            )
         elif isinstance(sent, PointsMessage) and pipe.quantity == "wrench" and sent.names:
             for contact, wrench in zip(sent.names, sent.values, strict=True):
-                _add_wrench(log, f"{name}/{contact}", wrench, sent.frame)
+                _add_wrench(log, f"{name}/{contact}", wrench, frame=sent.frame)
         elif isinstance(sent, PointsMessage):
             log.add(name, sent.values, _of_each(sent.names, sent.values), frame=sent.frame)
         elif isinstance(sent, VectorMessage) and port is not None:
-            _add_point(log, name, port, sent.frame)
+            _add_point(log, name, port, frame=sent.frame)
 
     def _add_copies(
         self, log: Logger, name: str, kind: str, parts: Sequence[np.ndarray], frame: str, child: str = ""

@@ -128,7 +128,7 @@ class CycleTrace:
                 robot.change(plugin.name)
                 self._add(WRITES, "", robot)
 
-        return [observed(component, method, after, before) for method in ("init", "update", "send")]
+        return [observed(component, method, after, before=before) for method in ("init", "update", "send")]
 
     def _begin(self, plugin: Plugin, first: bool) -> None:
         self._plugin = plugin.name
@@ -141,13 +141,13 @@ class CycleTrace:
             self._add(READS, pipe.name, robot)
 
     def _compute(self, robot: _TracedRobot, quantity: str) -> None:
-        self._add(COMPUTES, quantity, robot, robot.causes(quantity))
+        self._add(COMPUTES, quantity, robot, because=robot.causes(quantity))
 
     def _publish(self, robot: _TracedRobot, pipe: CommandPipe, _: None, __: float) -> None:
         self._add(PUBLISHES, pipe.name, robot)
 
     def _add(self, does: str, what: str, robot: _TracedRobot, because: tuple[str, ...] = ()) -> None:
-        self.events.append(TraceEvent(self.cycle, self._plugin, does, what, robot.plugins, because))
+        self.events.append(TraceEvent(self.cycle, self._plugin, does, what=what, robot=robot.plugins, because=because))
 
 
 def cycles(text: str) -> int:

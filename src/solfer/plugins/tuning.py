@@ -156,8 +156,8 @@ class Tuning:
             SET_PARAMETERS,
             SETTING,
             SetParameters,
-            Accepted,
-            self._carry_out,
+            reply=Accepted,
+            handler=self._carry_out,
             prepare=self._prepare,
             quick=True,
         )
@@ -168,8 +168,8 @@ class Tuning:
             GET_PARAMETERS,
             GETTING,
             GetParameters,
-            ParametersReply,
-            lambda reply: reply,
+            reply=ParametersReply,
+            handler=lambda reply: reply,
             prepare=self._describe,
             quick=True,
         )
@@ -259,7 +259,7 @@ class Tuning:
             goals[knob.motion] = numbers, bool(np.isfinite(numbers).all())
         if len(lines) > MOST:
             raise ComponentError(f"{len(lines)} parameters change at once", expected=f"at most {MOST} in a request")
-        return _Change(before, after, tuple(goals.items()), tuple(writes), tuple(lines))
+        return _Change(before, after, tuple(goals.items()), writes=tuple(writes), lines=tuple(lines))
 
     def _explained(self, error: SolferError) -> SolferError:
         """Add the range of the parameter that an error is about."""

@@ -117,7 +117,7 @@ class GroundFrame(_LevelFrame):
     crosses = False
 
     def __init__(self, pose: Point, height: float = 0.0, axis: ArrayLike = (1.0, 0.0, 0.0), normal: ArrayLike = UP):
-        super().__init__(pose, axis, normal, height)
+        super().__init__(pose, axis, normal, height=height)
 
     def set_height(self, height: float) -> None:
         """Set the height of the ground along the normal [m]; a NotFinite if it is not a finite number."""
@@ -143,7 +143,7 @@ class WheelFrame(_LevelFrame):
     crosses = True
 
     def __init__(self, pose: Point, axle: ArrayLike = UP, normal: ArrayLike = UP):
-        super().__init__(pose, axle, normal, 0.0)
+        super().__init__(pose, axle, normal, height=0.0)
 
 
 class LookAt(CompiledPoint):

@@ -200,7 +200,7 @@ class _Memory:
 
     def __init__(self) -> None:
         self.layout = Layout(is_shared=True)
-        self.provide(0, 0, 0, None)
+        self.provide(0, 0, 0, robot=None)
 
     def provide(self, size: int, rows: int, cols: int, robot: RobotView | None) -> None:
         """Make other arrays for points of `size` numbers and `rows` rows together, and for as many later ones."""

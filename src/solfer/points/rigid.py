@@ -95,9 +95,9 @@ class RigidPoint(LinkPoint):
     kind: ClassVar[Space]
 
     def __init__(self, link: str, robot: RobotView):
-        super().__init__(self.kind, link, robot, 7)
-        self._position = PositionOffset(robot, link, self._attachment, self._numbers[:3])
-        self._orientation = OrientationOffset(robot, link, self._attachment, self._numbers[3:])
+        super().__init__(self.kind, link, robot, count=7)
+        self._position = PositionOffset(robot, link, self._attachment, numbers=self._numbers[:3])
+        self._orientation = OrientationOffset(robot, link, self._attachment, numbers=self._numbers[3:])
 
     def share_place(self, other: LinkPoint) -> None:
         """See `LinkPoint.share_place`."""

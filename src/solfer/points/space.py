@@ -60,11 +60,11 @@ class Space:
 
 def vector(size: int) -> Space:
     """Return the space of `size` numbers that are added one by one."""
-    return Space("vector", size, size, minus)
+    return Space("vector", size, size, minus=minus)
 
 
-ORIENTATION = Space("orientation", 4, 3, orientation_minus)
+ORIENTATION = Space("orientation", 4, 3, minus=orientation_minus)
 """Unit quaternions (x, y, z, w); Jacobians map to angular velocities in world axes."""
 
-POSE = Space("pose", 7, 6, pose_minus)
+POSE = Space("pose", 7, 6, minus=pose_minus)
 """Positions [m], then unit quaternions (x, y, z, w); Jacobians map to linear, then angular velocities."""

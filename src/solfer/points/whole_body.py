@@ -91,7 +91,7 @@ class Posture(CompiledPoint):
 
     def __init__(self, robot: RobotView, dofs: Sequence[str | int] | None = None):
         names = robot.kinematics.dofs
-        self.dofs = chosen("DoF", dofs, len(names), names, f"posture of '{robot.name}'", PointError)
+        self.dofs = chosen("DoF", dofs, len(names), names=names, where=f"posture of '{robot.name}'", error=PointError)
         super().__init__(len(self.dofs), robot)
         followers = robot.kinematics.tree.followers
         self._leaders = np.unique(followers.leaders[np.isin(followers.dofs, self.dofs)])

@@ -32,7 +32,7 @@ class EmergencyStopLatch:
     """
 
     def __init__(self, folder: Path):
-        self.segment = latched(folder / FILE, KIND, LAYOUT, 8 * WORDS + 2 * TEXT)
+        self.segment = latched(folder / FILE, KIND, LAYOUT, size=8 * WORDS + 2 * TEXT)
         self._words = self.segment.data[: 8 * WORDS].cast("q")
         self._text = self.segment.data[8 * WORDS : 8 * WORDS + TEXT]
         self._answer = self.segment.data[8 * WORDS + TEXT : 8 * WORDS + 2 * TEXT]

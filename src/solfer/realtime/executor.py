@@ -106,8 +106,8 @@ class Executor:
             plugins,
             budget,
             rules.blend,
-            nanoseconds,
-            polls,
+            nanoseconds=nanoseconds,
+            polls=polls,
             admit=self._admit,
             interrupted=self._interrupted,
             times=self._durations[len(LoopTime) :],
@@ -181,8 +181,10 @@ class Executor:
         self._middleware.serve(
             EXECUTOR,
             [
-                Service("estop", TRIGGER, NoFields, Answer, answered(lambda _: self.estop.trip("by service"))),
-                Service("estop_clear", TRIGGER, NoFields, Answer, answered(lambda _: self.clear())),
+                Service(
+                    "estop", TRIGGER, NoFields, reply=Answer, handler=answered(lambda _: self.estop.trip("by service"))
+                ),
+                Service("estop_clear", TRIGGER, NoFields, reply=Answer, handler=answered(lambda _: self.clear())),
             ],
             submit,
         )

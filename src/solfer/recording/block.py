@@ -51,7 +51,9 @@ class RecordedTopic:
         for name, columns, units in json.loads(metadata["channels"]):
             if not all(text.isprintable() for text in (name, *columns, *units)):  # they become names of files
                 raise RecordingError("characters that cannot be printed", expected="names of channels and columns")
-            channel = Channel(name, kind, tuple(columns), tuple(units), metadata["frame"], child=metadata["child"])
+            channel = Channel(
+                name, kind, tuple(columns), units=tuple(units), frame=metadata["frame"], child=metadata["child"]
+            )
             check(channel)
             channels.append(channel)
         return tuple(channels)

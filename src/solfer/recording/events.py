@@ -34,7 +34,7 @@ def event_of(message: bytes, time: int) -> Event:
     _, place = _string(message, place)
     _, place = _string(message, _aligned(place) + 4)
     kind, _ = _string(message, place)
-    return Event(1e-9 * time, plugin, kind, text)
+    return Event(1e-9 * time, plugin, kind, text=text)
 
 
 def _aligned(place: int) -> int:

@@ -95,7 +95,7 @@ class Logger:
                 where=where,
                 expected="a contiguous array of float64 or int64, which is filled in place",
             )
-        channel = Channel(f"{self._prefix}/{name}", kind, names, units, frame, child=child)
+        channel = Channel(f"{self._prefix}/{name}", kind, names, units=units, frame=frame, child=child)
         check(channel)
         if any(each.channel.name == channel.name for each in self.sources):
             raise RecordingError("it is declared twice", where=where, expected="a name for each")

@@ -109,9 +109,9 @@ class _Reader:
             channels,
             sorted(self._events, key=lambda event: event.time),
             self._attachments,
-            self._texts.get(METADATA, {}),
-            gaps if finished is None else int(finished.get("lost", gaps)),
-            tuple(self._missing),
+            metadata=self._texts.get(METADATA, {}),
+            lost=gaps if finished is None else int(finished.get("lost", gaps)),
+            missing=tuple(self._missing),
         )
 
     def _records(self) -> Iterator[tuple[int, bytes]]:
@@ -165,7 +165,7 @@ class _Reader:
             return
         data = np.frombuffer(messages, dtype=np.uint8)
         for number, (places, lengths) in _messages_of(messages).items():
-            self._messages(number, data, places, lengths)
+            self._messages(number, data, places, lengths=lengths)
 
     def _messages(self, number: int, data: np.ndarray, places: np.ndarray, lengths: np.ndarray) -> None:
         """Take the messages of a topic, which begin at `places` of a chunk and are so long."""
@@ -253,7 +253,14 @@ def _filled(layout: RecordedTopic, times: np.ndarray, contents: np.ndarray) -> d
     for each in layout.channels:
         end = start + len(each.columns)
         channels[each.name] = Channel(
-            each.name, each.kind, each.columns, each.units, each.frame, times, values[:, start:end], each.child
+            each.name,
+            each.kind,
+            each.columns,
+            units=each.units,
+            frame=each.frame,
+            times=times,
+            values=values[:, start:end],
+            child=each.child,
         )
         start = end
     return channels

@@ -46,7 +46,9 @@ class RowLayout:
         starts = tuple(known[_address(view), view.size] for view in views)
         factors = tuple(source.factor if source.array.dtype == np.int64 else 0.0 for source in sources)
         channels = tuple(source.channel for source in sources)
-        layout = cls(channels, starts, factors, places[-1], dict(attachments), dict(metadata))
+        layout = cls(
+            channels, starts, factors, width=places[-1], attachments=dict(attachments), metadata=dict(metadata)
+        )
         return layout, [view for _, view in pieces]
 
     def text(self) -> str:

@@ -57,12 +57,12 @@ def build_reference(record: ReferenceRecord, quantity: str, joints: Sequence[str
     if record.circle is not None:
         return _circle(record.circle, size, rates)
     if record.line is not None:
-        return _line(record.line, size, rates, record.absolute)
+        return _line(record.line, size, rates, absolute=record.absolute)
     if record.sine is not None:
-        return _sine(record.sine, size, rates, joints)
+        return _sine(record.sine, size, rates, joints=joints)
     columns = tuple(joints) if quantity == POSTURE else _COLUMNS[quantity]
     if record.waypoints is not None:
-        times, values = _waypoints(record, record.waypoints, quantity, columns)
+        times, values = _waypoints(record, record.waypoints, quantity, columns=columns)
     else:
         times, values = _table(record, quantity, columns)
     if record.absolute and times[0] == 0.0:
@@ -71,7 +71,7 @@ def build_reference(record: ReferenceRecord, quantity: str, joints: Sequence[str
             where=record.where(record.kind),
             expected="a first time above 0 s, in which it goes there, or no 'absolute'",
         )
-    return TimedReference(rates, times, values, record.absolute)
+    return TimedReference(rates, times, values, absolute=record.absolute)
 
 
 def joints_of(record: ReferenceRecord) -> list[str]:
@@ -108,7 +108,9 @@ def _circle(record: CircleReferenceRecord, size: int, rates: int) -> Swing:
         first = first - first.dot(normal) * normal
         first /= np.linalg.norm(first)
         second = np.cross(normal, first)
-    return Swing(size, rates, record.radius * first, record.radius * second, period=record.period, turns=record.turns)
+    return Swing(
+        size, rates, record.radius * first, sine=record.radius * second, period=record.period, turns=record.turns
+    )
 
 
 def _line(record: LineReferenceRecord, size: int, rates: int, absolute: bool) -> LineReference:
@@ -135,7 +137,7 @@ def _sine(record: SineReferenceRecord, size: int, rates: int, joints: Sequence[s
     else:
         for name, value in record.amplitude.items():
             amplitude[_index(joints, name, record.where("amplitude", name))] = value
-    return Swing(size, rates, np.zeros(count), amplitude, period=record.period, turns=record.turns)
+    return Swing(size, rates, np.zeros(count), sine=amplitude, period=record.period, turns=record.turns)
 
 
 def _index(joints: Sequence[str], name: str, where: str) -> int:
@@ -183,7 +185,7 @@ def _table(record: ReferenceRecord, quantity: str, columns: Sequence[str]) -> tu
     """Return times and values of a CSV file, shape (k,) and (k, n)."""
     where = record.where("file")
     path = located(record.file or "", record.folder("file"), where)
-    times, numbers, found = read_table(path, columns, where, quantity == POSTURE)
+    times, numbers, found = read_table(path, columns, where, named=quantity == POSTURE)
     if found == list(columns):
         return times, numbers
     values = np.full((len(times), len(columns)), math.nan if record.absolute else 0.0)

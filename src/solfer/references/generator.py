@@ -111,7 +111,7 @@ class Swing(OffsetReference):
         self._cosine = cosine
         self._sine = sine
         self._frequency = math.tau / period
-        super().__init__(size, rates, len(cosine), way + self._fade)
+        super().__init__(size, rates, len(cosine), duration=way + self._fade)
         self._work = np.zeros(len(cosine))
 
     def looks(self) -> np.ndarray:
@@ -168,7 +168,7 @@ class LineReference(OffsetReference):
         back: bool = False,
         absolute: bool = False,
     ):
-        super().__init__(size, rates, len(to), 0.0)
+        super().__init__(size, rates, len(to), duration=0.0)
         self._to = to
         self._is_absolute = absolute
         self._speed = speed

@@ -88,11 +88,17 @@ def differences(replay: Replay) -> ReplayDifferences:
             first = int(np.flatnonzero(both)[(gaps[:, place] > TOLERANCE).argmax()])
             unit = channel.units[channel.columns.index(shared[place])]
             time = float(rows.times[first] - rows.times[0])
-            found.append(ColumnDifference(name, shared[place], unit, first + 1, time, float(gaps[:, place].max())))
+            found.append(
+                ColumnDifference(
+                    name, shared[place], unit, cycle=first + 1, time=time, largest=float(gaps[:, place].max())
+                )
+            )
     found.sort(key=lambda each: (each.cycle, -each.largest))
     alone = int((replay.running != rows.running).sum())
     unmatched = tuple(sorted(recorded.keys() ^ replay.commands.keys()))
-    return ReplayDifferences(int(both.sum()), alone, numbers, tuple(found), unmatched, largest)
+    return ReplayDifferences(
+        int(both.sum()), alone, numbers, different=tuple(found), unmatched=unmatched, largest=largest
+    )
 
 
 def _gaps(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:

@@ -50,12 +50,12 @@ class RecordedFeedbackPipe(FeedbackPipe):
         if isinstance(pipe, StateFeedbackPipe):
             for field in pipe.state_fields:
                 names = [robot.dofs[dof] for dof in field.dofs]
-                self._add(rows, field.values, f"{pipe.name}/{field.field}", names, field.field)
+                self._add(rows, field.values, f"{pipe.name}/{field.field}", columns=names, field=field.field)
         elif isinstance(pipe, ContactFeedbackPipe):
             for name, wrench in pipe.wrenches.items():
-                self._add(rows, wrench, f"{pipe.name}/{name}", ())
+                self._add(rows, wrench, f"{pipe.name}/{name}", columns=())
         elif port is not None:
-            self._add(rows, port.value, f"{pipe.name}/value", ())
+            self._add(rows, port.value, f"{pipe.name}/value", columns=())
         else:
             raise _not_recorded(pipe.name, rows)
         self._arrivals = _arrivals(rows, pipe.name)

@@ -67,7 +67,7 @@ class ReplayGenerator(Generator):
 
     def _feedback(self, record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
         pipe = super()._feedback(record, context)
-        return RecordedFeedbackPipe(pipe, self.rows, context.robot, context.inputs.get(record.name))
+        return RecordedFeedbackPipe(pipe, self.rows, context.robot, port=context.inputs.get(record.name))
 
     def make_claim(self, robot: Robot, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> RecordedClaim:
         """See `Generator.make_claim`."""

@@ -44,7 +44,7 @@ class ReplayMiddleware(DryMiddleware):
     def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.joint_order`; all DoFs of the Robot that was recorded."""
         channel = self._rows.channel("measured/position")
-        return channel.columns if channel is not None else super().joint_order(topic, message, timeout, where)
+        return channel.columns if channel is not None else super().joint_order(topic, message, timeout, where=where)
 
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`; those that it was sent."""

@@ -88,7 +88,14 @@ class Replay:
             if name in turns:
                 self._turn(known, numbers, turns[name])
             self.commands[name] = Channel(
-                known.name, known.kind, known.columns, known.units, known.frame, rows.times, numbers, known.child
+                known.name,
+                known.kind,
+                known.columns,
+                units=known.units,
+                frame=known.frame,
+                times=rows.times,
+                values=numbers,
+                child=known.child,
             )
 
     def doubts(self) -> Iterator[str]:
@@ -172,4 +179,4 @@ def make(configuration: Configuration, generator: type[Generator], files: RobotF
     if rows.has_time:
         life = rows.recording[f"{rows.plugin}/{LIFE}"]
         plugin.robot_time = RecordedTime(plugin, life.column("passed"), life.column("lost"))
-    return Replay(plugin, made.claim, middleware, rows)
+    return Replay(plugin, made.claim, middleware, rows=rows)

@@ -110,14 +110,18 @@ class _Builder:
         semantics = actuators = None
         is_known = is_robot_read(self._configuration)
         if sources.srdf is not None:
-            semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
+            semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others=others))
         if self._configuration.robot.actuators.read and is_known:
-            actuators = self._try(lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
+            actuators = self._try(
+                lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others=others)
+            )
         contacts: tuple[ContactRecord, ...] = ()
         if self._configuration.robot.contacts.read and is_known:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))
             contacts = own_contacts(records or (), description, others)
-        return Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts, others)
+        return Robot(
+            kinematics, semantics, actuators, name=self._configuration.robot.name, contacts=contacts, others=others
+        )
 
     def _raise(self) -> None:
         if not self._goes_on:
@@ -140,16 +144,16 @@ class _Builder:
         where = self._configuration.mappings[name].where("urdf")
         dofs = self._try(lambda: _dofs(model.text, model.where), where)
         if dofs is not None:
-            self._add(robot, name, dofs, where)
+            self._add(robot, name, dofs, where=where)
 
     def _add_topic_maps(self, robot: Robot) -> None:
         """Add maps in the order of a message; a map in use waits for the first one."""
         for name, record in self._configuration.mappings.items():
             if record.loading == "topic" and self._used(name):
-                self._add_topic(robot, name, record, record.where("source"))
+                self._add_topic(robot, name, record, where=record.where("source"))
         default = self._default_feedback()
         if default is not None and FEEDBACK not in self._configuration.mappings:
-            self._add_topic(robot, FEEDBACK, default, default.where("source"))
+            self._add_topic(robot, FEEDBACK, default, where=default.where("source"))
 
     def _default_feedback(self) -> FeedbackRecord | None:
         """Return the first feedback of measured joints, if it is required at the start or a pipe uses its order."""
@@ -160,15 +164,15 @@ class _Builder:
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
         if not self._asks:
-            self._add(robot, name, robot.dofs, where)
+            self._add(robot, name, robot.dofs, where=where)
             return
         message = record.travels_as if isinstance(record, FeedbackRecord) else record.message
         order = self._wait(partial(self._joint_order, record, message or "sensor_msgs/JointState", where))
         pipe = record if isinstance(record, FeedbackRecord) else self._user(name)
         if order is not None and pipe is not None and pipe.calibration is not None:
-            order = self._try(lambda: received_joints(pipe, self._calibration(pipe), robot, order))
+            order = self._try(lambda: received_joints(pipe, self._calibration(pipe), robot, order=order))
         if order is not None:
-            self._add(robot, name, self._with_base(robot, name, order), where)
+            self._add(robot, name, self._with_base(robot, name, order), where=where)
 
     def _with_base(self, robot: Robot, name: str, order: tuple[str, ...]) -> tuple[str, ...]:
         """Add the floating base's DoFs to an order that a robot tells, where a pipe carries them in it.
@@ -210,17 +214,17 @@ class _Builder:
                 own = controller_map(record.leads_to)
                 named = record.dofs.mapping if record.dofs.mapping in LOWER_LEVEL_MAPS else own
                 if own not in robot.maps:
-                    self._add(robot, own, self._with_base(robot, named, order), record.where())
+                    self._add(robot, own, self._with_base(robot, named, order), where=record.where())
                 joints |= dict.fromkeys(order)
         if joints and LOWER_LEVEL not in self._configuration.mappings:
-            self._add(robot, LOWER_LEVEL, self._with_base(robot, LOWER_LEVEL, tuple(joints)), "")
+            self._add(robot, LOWER_LEVEL, self._with_base(robot, LOWER_LEVEL, tuple(joints)), where="")
 
     def _add_middleware_map(self, robot: Robot) -> None:
         """Add the map of the middleware's order, if it has one, which is that of the lower level."""
         name = MIDDLEWARES[self._configuration.middleware].map
         order = next((robot.maps[each].external for each in (FEEDBACK, LOWER_LEVEL) if each in robot.maps), None)
         if name is not None and name not in self._configuration.mappings and order is not None:
-            self._add(robot, name, self._with_base(robot, name, order), "")
+            self._add(robot, name, self._with_base(robot, name, order), where="")
 
     def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
         order = self._outside.controller_joints(record.leads_to, timeout, record.where())

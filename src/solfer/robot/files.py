@@ -47,7 +47,7 @@ def read_parts(
         joints = {joint for other in elsewhere for joint in other.joints}
         table = Actuators.from_file(actuators, name, kinematics.dofs, joints)
     records = () if contacts is None else own_contacts(read_contacts(contacts, name), description, elsewhere)
-    return Parts(kinematics, semantics, table, name, records, elsewhere)
+    return Parts(kinematics, semantics, table, name=name, contacts=records, others=elsewhere)
 
 
 def own_contacts(

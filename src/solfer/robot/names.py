@@ -49,7 +49,7 @@ class RobotNames:
         """Collect the names of a Robot, and the joints of `others`."""
         joints = {*robot.dofs, *robot.description.joints, *(joint for other in others for joint in other.joints)}
         moved = _moved(robot.description)
-        return cls(robot.selectors, robot.description.links, joints, robot.semantics.states, moved)
+        return cls(robot.selectors, robot.description.links, joints, state=robot.semantics.states, moved=moved)
 
     @classmethod
     def of_files(cls, urdf: Path, srdf: Path | None, others: Collection[Path] = ()) -> "RobotNames":
@@ -66,9 +66,9 @@ class RobotNames:
             joints = {**joints, **model.joints}
         moved = _moved(first)
         if srdf is None:
-            return cls(None, tuple(links), tuple(joints), None, moved)
+            return cls(None, tuple(links), tuple(joints), state=None, moved=moved)
         semantics = Semantics.from_file(srdf, first, rest)
-        return cls((ALL, *semantics.groups), tuple(links), tuple(joints), tuple(semantics.states), moved)
+        return cls((ALL, *semantics.groups), tuple(links), tuple(joints), state=tuple(semantics.states), moved=moved)
 
 
 def controller_map(controller: str) -> str:
@@ -96,7 +96,7 @@ def check_names(
     maps = tuple(_maps(configuration))
     for item in [record.dofs for record in records] if dofs is None else dofs:
         if item is not None:
-            _check_dofs(item, names, maps, problems)
+            _check_dofs(item, names, maps, problems=problems)
     for record in records:
         check_tags(record, names, problems)
     _check_order(configuration.feedbacks, names, problems)
@@ -110,14 +110,14 @@ def check_names(
 def check_tags(tags: Record, names: RobotNames, problems: Problems) -> None:
     """Note each name in the tags of a component, or of a pipe, that the robot does not have."""
     for place, key, kind, name in names_in(tags):
-        _check(place, key, kind, name, getattr(names, kind), problems)
+        _check(place, key, kind, name=name, known=getattr(names, kind), problems=problems)
 
 
 def check_calibrations(calibrations: Iterable[CalibrationRecord], names: RobotNames, problems: Problems) -> None:
     """Note each joint of a calibration that the robot does not have."""
     for calibration in calibrations:
         for joint, record in calibration.joints.items():
-            _check(record, None, "joint", joint, names.joint, problems)
+            _check(record, None, "joint", name=joint, known=names.joint, problems=problems)
 
 
 def _moved(description: Description) -> set[str]:
@@ -181,12 +181,12 @@ def _maps(configuration: Configuration) -> Iterator[str]:
 
 
 def _check_dofs(dofs: DofsRecord, names: RobotNames, maps: Collection[str], problems: Problems) -> None:
-    _check(dofs, "chain", "group", dofs.chain, names.group, problems)
-    _check(dofs, "mapping", "map", dofs.mapping, maps, problems)
+    _check(dofs, "chain", "group", name=dofs.chain, known=names.group, problems=problems)
+    _check(dofs, "mapping", "map", name=dofs.mapping, known=maps, problems=problems)
     if dofs.type == "body":
-        _check(dofs, "name", "link", dofs.name or "", names.link, problems)
+        _check(dofs, "name", "link", name=dofs.name or "", known=names.link, problems=problems)
     else:
-        _check(dofs, "type", "type of DoFs", dofs.type, (*_SELECTIONS, *maps), problems)
+        _check(dofs, "type", "type of DoFs", name=dofs.type, known=(*_SELECTIONS, *maps), problems=problems)
 
 
 def _check(

@@ -76,7 +76,7 @@ def _angles(record: Record) -> Iterator[tuple[Mark, float]]:
     for field, info in type(record).model_fields.items():
         if field in record.model_fields_set:
             is_angle = "[rad]" in (info.description or "") or "[rad, m]" in (info.description or "")
-            yield from _inside(record, (info.alias or field,), record.__dict__[field], is_angle)
+            yield from _inside(record, (info.alias or field,), record.__dict__[field], is_angle=is_angle)
 
 
 def _inside(record: Record, path: tuple[Key, ...], value: Any, is_angle: bool) -> Iterator[tuple[Mark, float]]:
@@ -84,7 +84,7 @@ def _inside(record: Record, path: tuple[Key, ...], value: Any, is_angle: bool) -
         yield from _angles(value)
     elif isinstance(value, dict | tuple):
         for key, item in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _inside(record, (*path, key), item, is_angle)
+            yield from _inside(record, (*path, key), item, is_angle=is_angle)
     elif is_angle and isinstance(value, float) and abs(value) > TURN:
         mark = record.place(*path)
         if mark is not None:

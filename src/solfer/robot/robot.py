@@ -160,8 +160,15 @@ class Robot:
             ConfigError: The actuators or contacts do not fit.
             SolferErrors: Several of these.
         """
-        parts = read_parts(urdf, srdf, floating_base, actuators, name, others, contacts)
-        return cls(parts.kinematics, parts.semantics, parts.actuators, parts.name, parts.contacts, parts.others)
+        parts = read_parts(urdf, srdf, floating_base, actuators=actuators, name=name, others=others, contacts=contacts)
+        return cls(
+            parts.kinematics,
+            parts.semantics,
+            parts.actuators,
+            name=parts.name,
+            contacts=parts.contacts,
+            others=parts.others,
+        )
 
     def companion(self) -> "Robot":
         """Return the same Robot for another component, with a desired State of its own.

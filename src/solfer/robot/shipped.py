@@ -190,7 +190,17 @@ def _read_bundle(path: Path) -> RobotFiles:
     measured = tuple(_measured(node, actuators is not None))
     base = node.get("floating_base")
     floating = base.value if base is not None and isinstance(base.value, bool) else None
-    return RobotFiles(urdf, srdf, (), actuators, contacts, tuple(parts), tuple(controllers), measured, floating)
+    return RobotFiles(
+        urdf,
+        srdf,
+        (),
+        actuators=actuators,
+        contacts=contacts,
+        parts=tuple(parts),
+        controllers=tuple(controllers),
+        measured=measured,
+        floating_base=floating,
+    )
 
 
 def _measured(node: YamlNode, has_motors: bool) -> Iterator[str]:

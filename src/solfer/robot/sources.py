@@ -114,7 +114,7 @@ def read_actuators(
     if location is not None:
         require_robot(configuration, location)
         return Actuators.from_file(location, robot, dofs, elsewhere)
-    return Actuators.from_record(_part(source, outside, robot, "actuators", ActuatorsRecord), dofs, elsewhere)
+    return Actuators.from_record(_part(source, outside, robot, what="actuators", kind=ActuatorsRecord), dofs, elsewhere)
 
 
 def read_contacts(configuration: Configuration, outside: Outside) -> tuple[ContactRecord, ...]:
@@ -129,7 +129,7 @@ def read_contacts(configuration: Configuration, outside: Outside) -> tuple[Conta
     if location is not None:
         require_robot(configuration, location)
         return contacts_of_file(location, robot)
-    return tuple(_part(source, outside, robot, "contacts", ContactsRecord).contacts.values())
+    return tuple(_part(source, outside, robot, what="contacts", kind=ContactsRecord).contacts.values())
 
 
 def _part(source: TextRecord, outside: Outside, robot: str, what: str, kind: type[RecordT]) -> RecordT:

@@ -137,14 +137,21 @@ def _check_step(step: Step, record: ScenarioRecord, problems: Problems) -> None:
             rows |= {"base": record.base_ref}
             rows |= {"cs": record.cs_ref or ()} if step.cs is not None else {}
         for key, table in rows.items():
-            _check_index(step, (key,), getattr(step, key), table, f"'{_TABLES[key]}'", problems)
+            _check_index(step, (key,), getattr(step, key), table=table, name=f"'{_TABLES[key]}'", problems=problems)
     elif isinstance(step, LegRecord):
-        _check_index(step, ("leg",), step.leg, record.x_cp, "'x cp'", problems)
+        _check_index(step, ("leg",), step.leg, table=record.x_cp, name="'x cp'", problems=problems)
     elif isinstance(step, SpeedRecord):
         for index, (row, column, value) in enumerate(step.motions):
             path = ("motions", index, 1)
             of = "the base" if row == _BASE_ROW else "'x cp'"
-            _check_index(step, path, column, record.base_now if row == _BASE_ROW else record.x_cp, of, problems)
+            _check_index(
+                step,
+                path,
+                column,
+                table=record.base_now if row == _BASE_ROW else record.x_cp,
+                name=of,
+                problems=problems,
+            )
             if row != _BASE_ROW and not 0.0 < value <= 1.0:
                 mark = step.place("motions", index, 2)
                 assert mark is not None

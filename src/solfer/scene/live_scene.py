@@ -82,15 +82,15 @@ class LiveScene:
             self._frame,
             measured,
             self._desired_poses(),
-            center,
-            np.array((*center[:2], ground)),
-            polygon,
-            inner,
-            forces,
-            self._friction,
-            tuple(self._references(measured)),
-            self._base_path(),
-            self._estimated(),
+            center=center,
+            projection=np.array((*center[:2], ground)),
+            polygon=polygon,
+            inner=inner,
+            forces=forces,
+            friction=self._friction,
+            references=tuple(self._references(measured)),
+            path=self._base_path(),
+            estimated_path=self._estimated(),
         )
 
     def _read_base(self) -> bool:
@@ -139,7 +139,7 @@ class LiveScene:
                 force = estimates.values[estimates.names.index(name), :3].copy()
             else:
                 continue
-            yield ContactForce(name, contact.value.copy(), force, bool(force[2] >= TOUCH))
+            yield ContactForce(name, contact.value.copy(), force, touches=bool(force[2] >= TOUCH))
 
     def _polygon(self, forces: tuple[ContactForce, ...]) -> tuple[np.ndarray, np.ndarray]:
         nothing = np.zeros((0, 3))

@@ -19,7 +19,7 @@ def hull(points: np.ndarray) -> list[int]:
     for way in (order, order[::-1]):
         start = len(half)
         for index in way:
-            while len(half) - start >= 2 and _turn(points, half[-2], half[-1], index) <= 0.0:
+            while len(half) - start >= 2 and _turn(points, half[-2], half[-1], third=index) <= 0.0:
                 half.pop()
             half.append(index)
         del half[-1:]

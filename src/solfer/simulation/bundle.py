@@ -128,12 +128,12 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         kinematics,
         record.controllers,
         {name: group.joints for name, group in groups.items()},
-        gains,
-        record.lower_level,
-        record.name,
-        _posture(kinematics, states, start),
-        kinematics.followers.names if actuators is None else actuators.passive,
-        actuators,
+        gains=gains,
+        record=record.lower_level,
+        robot=record.name,
+        posture=_posture(kinematics, states, start),
+        passive=kinematics.followers.names if actuators is None else actuators.passive,
+        actuators=actuators,
     )
     _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
@@ -141,12 +141,12 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         description,
         kinematics,
         lower_level,
-        states,
-        start,
-        _friction(record.friction, links),
-        load_equipment(record.name, record.sensors, record.contacts),
-        links,
-        () if actuators is None else actuators.names,
+        states=states,
+        start=start,
+        friction=_friction(record.friction, links),
+        equipment=load_equipment(record.name, record.sensors, record.contacts),
+        groups=links,
+        lossless=() if actuators is None else actuators.names,
     )
 
 
@@ -166,7 +166,7 @@ def _actuators(record: BundleRecord, kinematics: Kinematics, whole: Description 
         return None
     joints = kinematics.dofs[0 if kinematics.base is None else 6 :]
     whole = whole or Description.from_file(record.urdf.location)
-    return Actuators.from_file(record.actuators.location, record.name, joints, whole.joints)
+    return Actuators.from_file(record.actuators.location, record.name, joints, elsewhere=whole.joints)
 
 
 def _file(path: str | Path) -> FileRecord:

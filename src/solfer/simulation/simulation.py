@@ -95,11 +95,11 @@ class Simulation:
             body.joints,
             body.owner,
             base if body.floating else None,
-            Moment(self.kinematics.twin(), self.q, self.v, self.torque),
-            Moment(self.kinematics.twin(), self.q_before, self.v_before, self.torque_before),
-            self._contacts.points,
-            lambda: self.time,
-            None if motors is None else MotorSide(*map(read_only, motors.motor_side)),
+            now=Moment(self.kinematics.twin(), self.q, self.v, torque=self.torque),
+            before=Moment(self.kinematics.twin(), self.q_before, self.v_before, torque=self.torque_before),
+            contact_points=self._contacts.points,
+            clock=lambda: self.time,
+            motors=None if motors is None else MotorSide(*map(read_only, motors.motor_side)),
         )
 
     @classmethod
@@ -255,7 +255,7 @@ class Simulation:
             self._engine.forget_contacts()
             self.world.reset()
             if self.floating:
-                put(self.body, self.world, posture, placement)
+                put(self.body, self.world, posture, placement=placement)
             else:
                 fix(self.body, self.world, posture)
         except SimulationError:

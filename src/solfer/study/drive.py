@@ -84,7 +84,7 @@ def carry_out_all(
     progress = StudyProgress(folder, len(folder.runs), log)
     left = sum(not folder.is_done(run) for run in folder.runs)
     if left:
-        started = engine_of(engine, folder.path, min(workers, left), False, options)
+        started = engine_of(engine, folder.path, min(workers, left), follow=False, options=options)
         try:
             _wait(folder, started, progress)
         finally:

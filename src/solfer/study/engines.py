@@ -221,7 +221,9 @@ def _failed(what: str) -> StudyError:
 def engine_of(name: str, folder: Path, count: int, follow: bool, options: dict[str, Any]) -> WorkerEngine:
     """Start workers by the name of an engine."""
     if name == "dask":
-        return DaskEngine(folder, count, follow, str(options.get("scheduler", "")))
+        return DaskEngine(folder, count, follow, scheduler=str(options.get("scheduler", "")))
     if name == "slurm":
-        return SlurmEngine(folder, count, follow, {key: value for key, value in options.items() if key != "scheduler"})
+        return SlurmEngine(
+            folder, count, follow, options={key: value for key, value in options.items() if key != "scheduler"}
+        )
     return LocalEngine(folder, count, follow)

@@ -163,7 +163,7 @@ class Study:
         changes = None if over is None else over.plain()
         files = [_file_hash(str(path)) for path in _files(record)]
         key = _hash(json.dumps([settings, changes, seed, files], sort_keys=True), self._unchanged)
-        return PlannedRun(index, seed, dict(variations), key, _hash(key, code_hash())[:16])
+        return PlannedRun(index, seed, dict(variations), key=key, id=_hash(key, code_hash())[:16])
 
     def check_values(self) -> None:
         """Check each value by itself, and the ends of what is drawn, before anything runs.

@@ -139,7 +139,7 @@ def _maps(rows: Sequence[Row], names: Sequence[str], measures: Sequence[str]) ->
     found = []
     for measure in ("failed", *measures):
         values = _of_good(rows, measure)
-        found += [_picture(_map(rows, first, second, measure, values)) for first, second in pairs[:MAPS]]
+        found += [_picture(_map(rows, first, second, measure=measure, values=values)) for first, second in pairs[:MAPS]]
     return found
 
 
@@ -160,7 +160,7 @@ def write_map(folder: StudyFolder, first: str, second: str, measure: str, out: P
         raise UnknownName("measure", measure, measures, where="--map")
     rows = list(folder.rows())
     check_suffix(out)
-    save([(measure, _map(rows, first, second, measure, _of_good(rows, measure)))], out)
+    save([(measure, _map(rows, first, second, measure=measure, values=_of_good(rows, measure)))], out)
 
 
 def _of_good(rows: Sequence[Row], measure: str) -> np.ndarray:

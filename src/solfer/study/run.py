@@ -53,7 +53,7 @@ def run(
     """
     tree = {"configuration": os.fspath(configuration), "plugins": plugins, "duration": duration, **tags}
     record, over = record_of(tree, changes or {})
-    return carry_out(record, seed, over, {}, recording)
+    return carry_out(record, seed, over, variations={}, recording=recording)
 
 
 def carry_out(

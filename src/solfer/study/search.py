@@ -47,12 +47,12 @@ def search(
     )
     waiting: dict[str, int] = {run.id: run.index for run in folder.runs if not _is_reported(study, run.index)}
     progress = StudyProgress(folder, record.trials, log)
-    started = engine_of(engine, folder.path, workers, True, options)
+    started = engine_of(engine, folder.path, workers, follow=True, options=options)
     try:
         while True:
             for run in [each for each in folder.runs if each.id in waiting]:
                 if (result := folder.result(run)) is not None:
-                    _report(study, waiting.pop(run.id), record, result)
+                    _report(study, waiting.pop(run.id), record, result=result)
             while len(waiting) < workers and len(folder.runs) < record.trials:
                 run = _asked(study, folder, record)
                 waiting[run.id] = run.index

@@ -99,7 +99,7 @@ class SimulatedRun:
         bundle = bundle_of(record.simulation, self._seed)
         parameters = robot_parameters(bundle)
         self.bus = Bus(parameters, faults_of(record.simulation, self._seed))
-        self.simulation = simulation_of(record.simulation, bundle, parameters["/robot_description"], self._gui)
+        self.simulation = simulation_of(record.simulation, bundle, parameters["/robot_description"], gui=self._gui)
         self._stack.callback(self.simulation.close)
         self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
         self.bus.every(STEP, self._server.cycle)
@@ -252,7 +252,7 @@ class SimulatedRun:
         self._sample()
         course = self._course()
         if course is not None:
-            self._navigation = Navigation(self._mover, course, self._mover.name, 1.0 / PERIOD)
+            self._navigation = Navigation(self._mover, course, self._mover.name, rate=1.0 / PERIOD)
             self.bus.every(PERIOD, self._navigate)
 
     def _waiting(self) -> Plugin | None:
@@ -264,10 +264,12 @@ class SimulatedRun:
         self._mover = MemoryMiddleware(self.bus, "navigation")
         if motion.scenario is not None:
             player = Player(read_scenario(str(motion.scenario.location)), PERIOD)
-            return ScenarioCourse(self._mover, player, motion.target, motion.odometry, positions=motion.positions)
+            return ScenarioCourse(
+                self._mover, player, motion.target, odometry=motion.odometry, positions=motion.positions
+            )
         if motion.references is not None:
             references = read_references(str(motion.references.location))
-            return ReferenceCourse(self._mover, references, motion.target, "joint_states", "joint_states")
+            return ReferenceCourse(self._mover, references, motion.target, joints="joint_states", states="joint_states")
         return None
 
     def _navigate(self) -> None:

@@ -151,7 +151,7 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
         gc.freeze()
         record, changes = study.study.settings(run.variations)
         write_whole(folder / CONFIGURATION, _texts(run, record, changes))
-        study.finish(run, _result(study, run, record, changes))
+        study.finish(run, _result(study, run, record, changes=changes))
         code = 0
     except (SolferError, SolferErrors) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -173,7 +173,9 @@ def _result(study: StudyFolder, run: PlannedRun, record: StudyRecord, changes: Y
     folder = study.of(run)
     recording = folder / RECORDING if study.is_recorded else None
     try:
-        return carry_out(record, run.seed, changes, run.variations, recording=recording, columns=folder / COLUMNS)
+        return carry_out(
+            record, run.seed, changes, variations=run.variations, recording=recording, columns=folder / COLUMNS
+        )
     except (MissingDependency, StudyError):
         raise  # the machine's, and not the run's
     except (SolferError, SolferErrors) as error:

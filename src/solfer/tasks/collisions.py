@@ -36,7 +36,7 @@ class CollisionLimit(Constraint):
             raise TaskError(f"a least distance of {nearest:g} m", expected="a number that is not negative")
         count = len(distances.distance)
         kinematics = robot.kinematics
-        super().__init__("collisions", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
+        super().__init__("collisions", np.zeros((count, kinematics.size)), -np.inf, upper=np.inf, weight=weight)
         self.distances = distances
         self._kinematics = kinematics
         self.nearest = nearest

@@ -120,7 +120,7 @@ class TorqueLimits(Constraint):
                 f"no DoF of '{model.robot.name}' has a torque limit", expected="at least one DoF with a finite limit"
             )
         count = len(self._dofs)
-        super().__init__("torques", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
+        super().__init__("torques", np.zeros((count, kinematics.size)), -np.inf, upper=np.inf, weight=weight)
         self.force = np.zeros(kinematics.size)
         self._model = model
         self._period = period
@@ -174,7 +174,7 @@ class WorkspaceLimit(Constraint):
             raise TaskError(
                 f"a distance from {nearest:g} to {farthest:g} m", where=f"constraint '{name}'", expected="0 <= r <= R"
             )
-        super().__init__(name, np.zeros((1, point.cols)), -np.inf, np.inf, weight)
+        super().__init__(name, np.zeros((1, point.cols)), -np.inf, upper=np.inf, weight=weight)
         self._points = Handler(updated_in_order(point))
         self._point = point
         self._least = nearest**2
@@ -211,5 +211,9 @@ def joint_bounds(robot: RobotView, horizon: float) -> VelocityBounds:
     """Make bounds from the position and velocity limits of the robot's joints; `horizon` [s] as in `VelocityBounds`."""
     kinematics = robot.kinematics
     return VelocityBounds(
-        kinematics.dofs, kinematics.lower_position, kinematics.upper_position, kinematics.velocity_limit, horizon
+        kinematics.dofs,
+        kinematics.lower_position,
+        kinematics.upper_position,
+        speed=kinematics.velocity_limit,
+        horizon=horizon,
     )

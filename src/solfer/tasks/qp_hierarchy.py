@@ -99,14 +99,23 @@ class QpHierarchy:
         none = np.zeros(0)
         self._velocity_bounds = (none, none) if bounds is None else (bounds.lower, bounds.upper)
         self._levels = [
-            QpLevel(self.stack, index, bounds, self._inequalities, forbidden if index else weights, basis)
+            QpLevel(
+                self.stack,
+                index,
+                bounds,
+                inequalities=self._inequalities,
+                weights=forbidden if index else weights,
+                basis=basis,
+            )
             for index in range(len(self.stack.levels))
         ]
         self._relaxed_level: QpLevel | None = None
         if self.policy is Policy.RELAX and self._inequalities.rows:
             gives_way = np.isinf(weights) & _named(self._inequalities.names, relax)
             weights = np.where(gives_way, RELAXATION, weights)
-            self._relaxed_level = QpLevel(self.stack, 0, bounds, self._inequalities, weights, basis)
+            self._relaxed_level = QpLevel(
+                self.stack, 0, bounds, inequalities=self._inequalities, weights=weights, basis=basis
+            )
         self.velocity = np.zeros(size)
         self.solutions: list[Solution | None] = [None] * len(self._levels)
         self.relaxed: Solution | None = None
@@ -166,7 +175,9 @@ class QpHierarchy:
         for index in range(count):
             x = self._steps[index]
             self._failing.discard(index)
-            self.solutions[index] = Solution(QpStatus.SOLVED, x.copy(), 0, None, float(descent.slopes[index]))
+            self.solutions[index] = Solution(
+                QpStatus.SOLVED, x.copy(), 0, problem=None, residual=float(descent.slopes[index])
+            )
         if count:
             self._store(self._steps[count - 1])
         return count

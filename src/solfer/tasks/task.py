@@ -78,10 +78,10 @@ class Task:
             self.error = minus(self.reference, point)
         except SolferError as error:
             raise error.at(self.where) from error.__cause__
-        self.selected = chosen("row", rows, point.rows, (), self.where, TaskError)
+        self.selected = chosen("row", rows, point.rows, names=(), where=self.where, error=TaskError)
         self.mask = np.zeros(point.cols)
         names = point.robot.kinematics.dofs
-        self.mask[chosen("DoF", dofs, point.cols, names, self.where, TaskError)] = 1.0
+        self.mask[chosen("DoF", dofs, point.cols, names=names, where=self.where, error=TaskError)] = 1.0
         self.numbers = np.zeros((self.rows, COLUMNS))
         self.gain = gain
         self.velocity = velocity

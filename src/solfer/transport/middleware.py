@@ -237,7 +237,9 @@ class Middleware(abc.ABC):
             MiddlewareError: There is no such controller, or it did not answer within `timeout` [s].
         """
         try:
-            reply = self.call(f"{controller}/get_joint_names", JOINT_NAMES, NoFields(), JointNames, timeout)
+            reply = self.call(
+                f"{controller}/get_joint_names", JOINT_NAMES, NoFields(), reply=JointNames, timeout=timeout
+            )
         except MiddlewareError as error:
             raise MiddlewareError(
                 f"lower-level controller '{controller}' does not name its joints: {error.what}",
@@ -260,7 +262,9 @@ class Middleware(abc.ABC):
             MiddlewareError: There is no such controller, it has no gains, or it did not answer within `timeout` [s].
         """
         try:
-            reply = self.call(f"{controller}/get_gains", CONTROLLER_GAINS, NoFields(), ControllerGains, timeout)
+            reply = self.call(
+                f"{controller}/get_gains", CONTROLLER_GAINS, NoFields(), reply=ControllerGains, timeout=timeout
+            )
         except MiddlewareError as error:
             raise MiddlewareError(
                 f"lower-level controller '{controller}' does not tell its gains: {error.what}",

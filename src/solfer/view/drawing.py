@@ -45,7 +45,7 @@ class SceneDrawing:
         visuals = visuals_of(description)
         api.add_grid("/ground", width=20.0, height=20.0, cell_size=0.5, section_size=1.0)
         self._measured = _Links(api, "/measured", visuals)
-        self._desired = _Links(api, "/desired", visuals, DESIRED, TRANSLUCENT)
+        self._desired = _Links(api, "/desired", visuals, color=DESIRED, opacity=TRANSLUCENT)
         self._center = api.add_icosphere("/center/mass", 0.04, CENTER)
         self._projection = api.add_icosphere("/center/projection", 0.025, PROJECTION)
         self._polygon = _Line(api, "/support/polygon", EDGES)

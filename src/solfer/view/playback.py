@@ -114,14 +114,14 @@ class Playback:
         for channel in self._truths[:1]:
             row = self._row(channel)
             if np.isfinite(row[:7]).all():
-                self._base.write(BodyMessage(channel.frame, link, row[:3].copy(), row[3:7].copy()))
+                self._base.write(BodyMessage(channel.frame, link, row[:3].copy(), orientation=row[3:7].copy()))
         for channel in self._estimates[:1]:
             row = self._row(channel)
-            self._odometry.write(BodyMessage(channel.frame, channel.child, row[:3].copy(), row[3:7].copy()))
+            self._odometry.write(BodyMessage(channel.frame, channel.child, row[:3].copy(), orientation=row[3:7].copy()))
         if not self._truths and not self._estimates:
             numbers = np.array([known.get(name, 0.0) for name in self._chart])
             position, orientation = chart.to_pose(numbers)
-            self._base.write(BodyMessage("world", link, np.array(position), np.array(orientation)))
+            self._base.write(BodyMessage("world", link, np.array(position), orientation=np.array(orientation)))
 
 
 def robot_of_recording(recording: Recording) -> Robot:

@@ -56,7 +56,9 @@ class PluginTabs:
         """Show what is reported."""
         for name, report in reports.items():
             if name not in self._tabs:
-                self._tabs[name] = _PluginTab(self._gui, self._group, name, self._requests, self._control)
+                self._tabs[name] = _PluginTab(
+                    self._gui, self._group, name, requests=self._requests, control=self._control
+                )
             self._tabs[name].show(report)
 
 

@@ -114,7 +114,7 @@ def on_recording(file: Path, name: str, configuration: Path, system: str | None)
     Raises:
         SolferError: The recording or the configuration cannot be used, or the plugin did not run long enough.
     """
-    with opened(file, name, configuration, "", system, idle) as replay:
+    with opened(file, name, configuration, plugin="", system=system, changed=idle) as replay:
         return measured(replay.plugin, _enough(replay.rows), lambda meter: _replayed(replay, meter))
 
 
@@ -132,7 +132,7 @@ def on_simulation(configuration: Configuration, given: RobotFiles | None) -> Cyc
     configuration = idle(configuration)
     with closing(StandingRobot(configuration, given, where)) as robot:
         with closing(generate(configuration, robot.middleware, generator_of(configuration))) as plugin:
-            return measured(plugin, CYCLES, lambda meter: _simulated(robot, plugin, meter, where))
+            return measured(plugin, CYCLES, lambda meter: _simulated(robot, plugin, meter, where=where))
 
 
 def _simulated(robot: StandingRobot, plugin: Plugin, meter: CycleMeter, where: str) -> None:

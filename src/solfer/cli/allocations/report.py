@@ -40,7 +40,7 @@ def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
 
 def _measured(options: argparse.Namespace, configuration: Configuration) -> CycleMeter:
     if options.recording is not None:
-        return on_recording(options.recording, configuration.name, Path(options.file), options.system)
+        return on_recording(options.recording, configuration.name, Path(options.file), system=options.system)
     return on_simulation(configuration, given_robot(options))
 
 

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     from solfer.cli.diagram import dot_text, draw, plain_text
     from solfer.cli.plugins import network_of
 
-    network = network_of(options.file, options.names, options.system, options.search_paths)
+    network = network_of(options.file, options.names, options.system, search_paths=options.search_paths)
     if options.output is not None:
         draw(dot_text(network), options.output)
     if options.text or options.output is None:

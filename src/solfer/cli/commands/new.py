@@ -54,7 +54,7 @@ def _write_component(name: str, folder: Path, options: argparse.Namespace) -> No
     skeleton = ComponentSkeleton(name, folder)
     skeleton.write()
     print(f"{folder} is a catkin package now, with the component {skeleton.target}.\n")
-    _print_steps(name, folder, skeleton.package, "tries it on a simulated CENTAURO in one process")
+    _print_steps(name, folder, skeleton.package, test="tries it on a simulated CENTAURO in one process")
     print("      with layer:=RT in real time")
 
 
@@ -63,10 +63,12 @@ def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
     from solfer.cli.skeletons.robot import RobotSkeleton
 
     urdf = options.urdf if options.source is None else find_in_collection(options.source)
-    skeleton = RobotSkeleton(name, folder, urdf, options.srdf, options.floating_base)
+    skeleton = RobotSkeleton(name, folder, urdf, srdf=options.srdf, floating_base=options.floating_base)
     skeleton.write()
     print(f"{folder} is a catkin package now, with the robot {name} of {skeleton.dofs} DoFs.\n")
-    _print_steps(name, folder, skeleton.package, "simulates the robot, and moves one of its joints, in one process")
+    _print_steps(
+        name, folder, skeleton.package, test="simulates the robot, and moves one of its joints, in one process"
+    )
 
 
 def _print_steps(name: str, folder: Path, package: str, test: str) -> None:

@@ -30,7 +30,7 @@ def connect(
     arrows = [arrow for each in configurations for arrow in _received(each, configurations, boxes)]
     arrows += list(_declared(boxes))
     arrows += [arrow for each in configurations for arrow in _sent(each, arrows)]
-    return Network(configurations[0].system, boxes, tuple(arrows), shared or {})
+    return Network(configurations[0].system, boxes, tuple(arrows), shared=shared or {})
 
 
 def _box(configuration: Configuration, component: str, declared: tuple[Declared, ...]) -> PluginBox:
@@ -39,7 +39,16 @@ def _box(configuration: Configuration, component: str, declared: tuple[Declared,
     model = urdf.parameter or (urdf.file or "").rsplit("/", 1)[-1]
     robot = configuration.robot.configuration
     idle = module.mode == "idle"
-    return PluginBox(module.name, component, robot, model, module.layer, configuration.rate, idle, declared)
+    return PluginBox(
+        module.name,
+        component,
+        robot,
+        model=model,
+        layer=module.layer,
+        rate=configuration.rate,
+        idle=idle,
+        declared=declared,
+    )
 
 
 def _received(
@@ -63,7 +72,7 @@ def _declared(boxes: Sequence[PluginBox]) -> Iterator[Arrow]:
                 if one.kind == "topic out" and topic in box.declares("topic in"):
                     tail = End(Kind.PLUGIN, sender.name)
                     head = End(Kind.PLUGIN, box.name)
-                    yield Arrow(tail, head, topic, one.interface, topic=topic)
+                    yield Arrow(tail, head, topic, content=one.interface, topic=topic)
 
 
 def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
@@ -74,7 +83,7 @@ def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
     for pipe in sender.controllers:
         topic = topic_of(pipe)
         if pipe.lower_level:
-            yield _arrow(tail, LOWER_LEVEL, pipe, idle)
+            yield _arrow(tail, LOWER_LEVEL, pipe, idle=idle)
         elif topic not in known:
             yield _arrow(tail, End(Kind.TOPIC, topic or pipe.name), pipe)
 
@@ -85,4 +94,6 @@ def _outside(pipe: FeedbackRecord) -> End:
 
 
 def _arrow(tail: End, head: End, pipe: AnyPipeRecord, idle: bool = False) -> Arrow:
-    return Arrow(tail, head, pipe.name, content(pipe), pipe.refers_to, topic_of(pipe), idle)
+    return Arrow(
+        tail, head, pipe.name, content=content(pipe), reference=pipe.refers_to, topic=topic_of(pipe), idle=idle
+    )

@@ -89,7 +89,7 @@ def save(options: argparse.Namespace, caller: Caller) -> None:
     module = plugin.rpartition("/")[2]
     try:
         before = file.read_text(encoding="utf-8") if file.exists() else ""
-        text, count = saved(before, str(file), module, values)
+        text, count = saved(before, str(file), module, values=values)
         temporary = file.with_name(f".{file.name}.{os.getpid()}")
         temporary.write_text(text, encoding="utf-8")
         temporary.replace(file)

@@ -65,7 +65,7 @@ def _chosen(options: argparse.Namespace) -> Recording:
     recording = read(options.file)
     _warn(recording)
     start, end = span(recording)
-    part = between(select(recording, options.columns, str(options.file)), options.begin, options.end, start)
+    part = between(select(recording, options.columns, str(options.file)), options.begin, options.end, start=start)
     if not any(len(channel.times) for channel in part.channels.values()):
         raise RecordingError(
             "no row is left",

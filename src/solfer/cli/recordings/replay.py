@@ -72,7 +72,7 @@ def opened(
         main = configuration or _attached(rows, Path(folder))
         loaded = changed(load(main, name, system=system))
         with importable_beside(str(main)):
-            yield make(loaded, generator_of(loaded), _files(loaded, rows, Path(folder)), rows)
+            yield make(loaded, generator_of(loaded), _files(loaded, rows, Path(folder)), rows=rows)
 
 
 def warnings_of(recording: Recording) -> Iterator[str]:
@@ -152,7 +152,7 @@ def _plugin(recording: Recording, name: str) -> str:
 
 def _attached(rows: RecordedRows, folder: Path) -> Path:
     """Return the recorded configuration as a file."""
-    return _written(rows, "configuration.yaml", folder, "-c FILE")
+    return _written(rows, "configuration.yaml", folder, expected="-c FILE")
 
 
 def _files(configuration: Configuration, rows: RecordedRows, folder: Path) -> RobotFiles:
@@ -160,9 +160,9 @@ def _files(configuration: Configuration, rows: RecordedRows, folder: Path) -> Ro
     found = robot_files(configuration)
     if found is not None:
         return found
-    files = RobotFiles(_written(rows, "robot.urdf", folder, "a configuration with the file of its robot"))
+    files = RobotFiles(_written(rows, "robot.urdf", folder, expected="a configuration with the file of its robot"))
     srdf = f"{rows.plugin}/robot.srdf" in rows.recording.attachments
-    return replace(files, srdf=_written(rows, "robot.srdf", folder, "")) if srdf else files
+    return replace(files, srdf=_written(rows, "robot.srdf", folder, expected="")) if srdf else files
 
 
 def _written(rows: RecordedRows, name: str, folder: Path, expected: str) -> Path:

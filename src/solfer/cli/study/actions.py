@@ -30,7 +30,7 @@ def carry_out(options: argparse.Namespace) -> int:
         raise StudyError("no folder", where="--out", expected="--out DIR")
     study = read_study(options.file)
     plan = _plan(study, options)
-    folder = StudyFolder.create(options.out, study, plan, options.record, options.force)
+    folder = StudyFolder.create(options.out, study, plan, record=options.record, force=options.force)
     work = search if study.record.search is not None else carry_out_all
     workers = options.workers or len(os.sched_getaffinity(0))
     files = work(folder, options.engine, workers, _engine_options(options), _log)
@@ -65,7 +65,9 @@ def rerun(options: argparse.Namespace) -> int:
     record, changes = folder.study.settings(chosen.variations)
     recording = folder.of(chosen) / RECORDING if options.record else None
     begin = time.monotonic()
-    result = carry_out_one(record, chosen.seed, changes, chosen.variations, recording=recording, gui=options.gui)
+    result = carry_out_one(
+        record, chosen.seed, changes, variations=chosen.variations, recording=recording, gui=options.gui
+    )
     for line in aligned([(name, f"{value:.9g}") for name, value in result.measures.items()]):
         print(line)
     print(f"{'failed: ' + result.failure if result.failure else 'done'}, in {time.monotonic() - begin:.1f} s")
@@ -85,7 +87,7 @@ def report(path: Path | None, drawn: Sequence[str] | None) -> int:
         print(write_report(folder))
         return 0
     first, second, measure, out = drawn
-    write_map(folder, first, second, measure, Path(out))
+    write_map(folder, first, second, measure=measure, out=Path(out))
     print(out)
     return 0
 

@@ -82,9 +82,11 @@ class ReferenceFollower(Component, abc.ABC):
     def services(self) -> tuple[Service, ...]:
         """Offer `reference`, `get_reference`, and `ub_reference` as the original has it."""
         return (
-            Service("reference", "solfer/SetReference", SetReference, Accepted, self.set_reference),
-            Service("get_reference", "solfer/GetReference", GetReference, ReferenceReply, self.get_reference),
-            Service("ub_reference", "solfer/MovePoint", MovePoint, Accepted, self.move_point),
+            Service("reference", "solfer/SetReference", SetReference, reply=Accepted, handler=self.set_reference),
+            Service(
+                "get_reference", "solfer/GetReference", GetReference, reply=ReferenceReply, handler=self.get_reference
+            ),
+            Service("ub_reference", "solfer/MovePoint", MovePoint, reply=Accepted, handler=self.move_point),
         )
 
     def topics(self) -> tuple[Any, ...]:
@@ -93,7 +95,9 @@ class ReferenceFollower(Component, abc.ABC):
             TopicIn(f"{target.name}/reference", *MESSAGES[target.quantity], self._listener(target), stream=target.name)
             for target in self._list
         )
-        published = TopicOut("references", "solfer/TaskReferences", TaskReferences, self._references_now_and_then)
+        published = TopicOut(
+            "references", "solfer/TaskReferences", TaskReferences, collect=self._references_now_and_then
+        )
         return (*received, published)
 
     def actions(self) -> tuple[Action, ...]:
@@ -190,9 +194,9 @@ class ReferenceFollower(Component, abc.ABC):
                 if task.point in FOLLOWING:
                     generator = self._generator(name, task, reference)
                     frame = task.relative or WORLD
-                    self.targets[name] = Target(name, stack.tasks[name], reference, frame, generator)
+                    self.targets[name] = Target(name, stack.tasks[name], reference, frame=frame, generator=generator)
                 elif task.point == "posture" and isinstance(task.reference, ReferenceRecord):
-                    postures.append(GeneratedPosture(stack.tasks[name], reference, task, speeds))
+                    postures.append(GeneratedPosture(stack.tasks[name], reference, task, limits=speeds))
             except SolferError as error:
                 errors.append(error)
         raise_all(errors)

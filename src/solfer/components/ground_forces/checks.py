@@ -52,7 +52,7 @@ class ContactChecks:
             entries.append(Entry(name, text))
             wrong += [f"'{name}' {complaint}"] if complaint else []
         summary = "; ".join(wrong) or "all contacts push within the friction of the ground"
-        status = Status(int(bool(wrong)), f"{owner}: contacts", summary, owner, tuple(entries))
+        status = Status(int(bool(wrong)), f"{owner}: contacts", summary, hardware_id=owner, values=tuple(entries))
         return Statuses(status=(status,))
 
     def _judge(self, normal: float, tangential: float) -> tuple[str, str]:

@@ -117,10 +117,10 @@ class GroundForces(Component):
         interface = "geometry_msgs/WrenchStamped"
         return (
             *(
-                TopicOut(each, interface, StampedWrench, functools.partial(self._wrench_now_and_then, contact))
+                TopicOut(each, interface, StampedWrench, collect=functools.partial(self._wrench_now_and_then, contact))
                 for each, contact in zip(self._names, self._contacts, strict=True)
             ),
-            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then),
+            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._report_now_and_then),
         )
 
     def start_log(self, logger: Any) -> None:
@@ -149,7 +149,7 @@ class GroundForces(Component):
         robot.dynamics.subscribe(BIAS)
         if tags.method == "projection":
             return ProjectedLaw(self._contacts, self._torque)
-        return WeightedLaw(robot, self._contacts, self._torque, tags)
+        return WeightedLaw(robot, self._contacts, self._torque, tags=tags)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:

@@ -84,7 +84,7 @@ class WeightedLaw:
         self.offsets = None
         self._largest = 0.0
         if tags.offsets is not None:
-            self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, self._floating)
+            self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, base=self._floating)
             self._largest = tags.offsets.largest_push
 
     def start(self, period: float) -> None:

@@ -26,7 +26,7 @@ class Touch:
     """
 
     def __init__(self, count: int, above: float, below: float, delay: float, speed: float = 0.0):
-        self.set(above, below, delay, speed)
+        self.set(above, below, delay, speed=speed)
         self.touching, self._changing, self._above, self.lifted = np.zeros((4, count), dtype=bool)
         self._waited, self._away, self._sure = np.zeros((3, count))
 

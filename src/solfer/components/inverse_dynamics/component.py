@@ -141,7 +141,7 @@ class InverseDynamics(ReferenceFollower):
         horizon = max(limits.horizon, PERIODS * self.period)
         self._bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
         self.problem = WholeBodyProblem(
-            robot, self.ground, self._bounds, len(self._desired), self._torque_limits(self.tags)
+            robot, self.ground, self._bounds, rows=len(self._desired), torque_limits=self._torque_limits(self.tags)
         )
         self._between = max(2, round(rate / REPORTED))
         self._connect()
@@ -248,12 +248,14 @@ class InverseDynamics(ReferenceFollower):
         """Offer the service `<name>/lift` beside those of references."""
         return (
             *super().services(),
-            Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),
+            Service("lift", "solfer/LiftContacts", LiftContacts, reply=LiftReply, handler=self.lift),
         )
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive references; publish forces of contacts and active constraints on `/diagnostics`."""
-        diagnostics = TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then)
+        diagnostics = TopicOut(
+            "/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._report_now_and_then
+        )
         return (*super().topics(), diagnostics)
 
     def lift(self, request: LiftContacts) -> LiftReply:
@@ -317,7 +319,7 @@ class InverseDynamics(ReferenceFollower):
 
     def _take_gains(self, name: str, numbers: np.ndarray) -> None:
         """Write what `_gains_of` has returned."""
-        self._take_numbers(self._configured, name, "gain", numbers[0])
+        self._take_numbers(self._configured, name, "gain", numbers=numbers[0])
         first = 0
         for task in self._configured.members(name):
             self._velocity_gains[self._rows[task.name]] = numbers[1, first : first + task.rows]
@@ -468,7 +470,11 @@ class InverseDynamics(ReferenceFollower):
         entries.append(Entry("active constraints", self._active()))
         summary = f"it holds: {self._reason}" if self.is_holding else "tasks are followed"
         return Statuses(
-            status=(Status(int(self.is_holding), f"{self.name}: tasks", summary, self.name, tuple(entries)),)
+            status=(
+                Status(
+                    int(self.is_holding), f"{self.name}: tasks", summary, hardware_id=self.name, values=tuple(entries)
+                ),
+            )
         )
 
 

@@ -84,7 +84,7 @@ class InverseKinematics(ReferenceFollower):
             if tags.stack.limits.collisions is not None:
                 found.append(LiveParameter((*limits, "collisions", "distance"), self._stack.keep_apart, _distance))
         else:
-            found += live_tunings(tags, tags.stack_record(), self._stack, self._take_tuning)
+            found += live_tunings(tags, tags.stack_record(), self._stack, write=self._take_tuning)
         if tags.deflection is not None:
             found += [LiveParameter(("deflection", key), self._take_deflection) for key in ("time_constant", "most")]
         return tuple(found)
@@ -174,7 +174,7 @@ class InverseKinematics(ReferenceFollower):
 
     def _make_deflection(self, record: DeflectionRecord) -> Deflection:
         base = 0 if self.model.kinematics.base is None else 6
-        return Deflection(self.model.size, base, record.time_constant, record.most)
+        return Deflection(self.model.size, base, record.time_constant, most=record.most)
 
     def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
         """See `ReferenceFollower._take_number`: levels have the damping while tasks are far from their references."""
@@ -202,7 +202,7 @@ class InverseKinematics(ReferenceFollower):
 
     def _obstacles(self, task: Task) -> str:
         """See `ReferenceFollower._obstacles`."""
-        return obstacles(task, self._inner.command, self._bounds, self._moved)
+        return obstacles(task, self._inner.command, self._bounds, moved=self._moved)
 
     def _hold_what_stays_away(self) -> None:
         """Let tasks that have come to rest away from their references stay there, until a reference moves.

@@ -68,7 +68,7 @@ class Odometry(Component):
     def __init__(self, robot: Robot, tags: OdometryTags | None = None, name: str = "odometry"):
         super().__init__(robot, tags or OdometryTags(), name)
         self.modify = True
-        self._wheels = wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, self.tags.where("chain"))
+        self._wheels = wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, where=self.tags.where("chain"))
         self.streams = Streams(robot, self.tags.imu_delay)
         self._base = MeasuredBase(robot)
         self._chart = robot.kinematics.base or BaseChart()
@@ -147,18 +147,20 @@ class Odometry(Component):
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/set_base`."""
-        return (Service("set_base", "solfer/SetBase", SetBase, Accepted, self.set_base),)
+        return (Service("set_base", "solfer/SetBase", SetBase, reply=Accepted, handler=self.set_base),)
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive `<name>/set_pose`; publish `<name>/pose` with its covariance, diagnostics and, by a tag, tf."""
         interface = "geometry_msgs/PoseWithCovarianceStamped"
         known = isinstance(self.law, FilteredOdometry)
-        made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, self.set_pose)]
+        made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, handler=self.set_pose)]
         if known:
-            made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._state_now_and_then))
-            made.append(TopicOut("pose", interface, StampedUncertainPose, self._pose_now_and_then))
+            made.append(
+                TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._state_now_and_then)
+            )
+            made.append(TopicOut("pose", interface, StampedUncertainPose, collect=self._pose_now_and_then))
         if self.tags.transform:
-            made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, self._place))
+            made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, collect=self._place))
         return tuple(made)
 
     def parameters(self) -> tuple[Parameter, ...]:
@@ -194,7 +196,7 @@ class Odometry(Component):
 
     def _place(self) -> object:
         quaternion = quaternion_from_rotation(self._rotation)
-        return transform(FRAME, self._child, self._position, quaternion)
+        return transform(FRAME, self._child, self._position, quaternion=quaternion)
 
     def wheel_states(self) -> Statuses:
         """Return what each wheel does, with the probability that it rolls."""
@@ -209,7 +211,9 @@ class Odometry(Component):
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
         summary = "a wheel slips" if slips else "all wheels that touch roll"
-        return Statuses(status=(Status(int(slips), f"{self.name}: wheels", summary, self.name, tuple(entries)),))
+        return Statuses(
+            status=(Status(int(slips), f"{self.name}: wheels", summary, hardware_id=self.name, values=tuple(entries)),)
+        )
 
     def set_pose(self, message: StampedUncertainPose) -> None:
         """Put the base at a pose on the ground: position and heading count, with their variances.
@@ -237,7 +241,7 @@ class Odometry(Component):
     def uncertain_pose(self) -> object:
         """Return the pose of the base's origin, in the frame `odom`, and its covariance, as they were sent last."""
         quaternion = quaternion_from_rotation(self._rotation)
-        return stamped_pose(FRAME, self._position, quaternion, self._covariance)
+        return stamped_pose(FRAME, self._position, quaternion, covariance=self._covariance)
 
     def set_base(self, request: SetBase) -> Accepted:
         """Put the base somewhere else on the ground, from the next cycle on.

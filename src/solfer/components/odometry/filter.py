@@ -96,10 +96,10 @@ class FilteredOdometry:
             count,
             tags.acceleration,
             tags.gyro_noise,
-            tags.gyro_bias,
-            tags.gyro_walk,
-            tags.radius_share,
-            math.radians(tags.tilt_deviation),
+            bias=tags.gyro_bias,
+            walk=tags.gyro_walk,
+            radius=tags.radius_share,
+            tilt=math.radians(tags.tilt_deviation),
         )
         self.consensus = WheelConsensus(count, tags.slip_time)
         self._map = HeightMap(np.array(wheels.radii))

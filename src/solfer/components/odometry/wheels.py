@@ -54,7 +54,7 @@ class Wheels:
             self.names = tuple(
                 link for link in robot.links(group) if len(robot.kinematics.attachment(link).columns) > 6
             )
-            made = [RollingContact(link, robot, 0.0, radius) for link in self.names]
+            made = [RollingContact(link, robot, 0.0, tube=radius) for link in self.names]
         if not made:
             raise ComponentError(
                 f"'{robot.name}' has {len(made)} wheels in '{group}' that touch the ground",

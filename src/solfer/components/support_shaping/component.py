@@ -105,7 +105,13 @@ class SupportShaping(WheeledMotion):
         gains = (tags.margin_gain, tags.workspace_gain)
         holds = tags.infeasible == "hold"
         self.governor = SupportGovernor(
-            margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
+            margins,
+            workspaces,
+            gains,
+            horizon=tags.horizon,
+            recovery=tags.recovery,
+            speed=tags.vertex_speed,
+            holds=holds,
         )
         self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
         self.program = self._make_program() if tags.is_original else None
@@ -132,7 +138,7 @@ class SupportShaping(WheeledMotion):
             for wheel in self._wheels
         ]
         wheels = tuple(wheel.end_frame for wheel in self._wheels)
-        program = JointProgram(robot, tags, wheels, axles, radii, self.moved)
+        program = JointProgram(robot, tags, wheels, axles=axles, radii=radii, moved=self.moved)
         self._world = WorldVertices(len(wheels), robot.size)
         self._before_camber = np.zeros((len(wheels), robot.size))
         self._before_steering = np.zeros((len(wheels), robot.size))
@@ -312,7 +318,7 @@ class SupportShaping(WheeledMotion):
         """Receive what `wheeled_motion` does, and publish `<name>/support_margins`."""
         return (
             *super().topics(),
-            TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, self._margins_now_and_then),
+            TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, collect=self._margins_now_and_then),
         )
 
     def _published_pace(self) -> float:
@@ -333,10 +339,10 @@ class SupportShaping(WheeledMotion):
             self._names,
             self._limits,
             tuple(governor.reserves.tolist()),
-            tuple(names[governor.active].tolist()),
-            tuple(names[governor.infeasible].tolist()),
-            governor.share,
-            tuple(self._reaction.tolist()),
+            active=tuple(names[governor.active].tolist()),
+            infeasible=tuple(names[governor.infeasible].tolist()),
+            share=governor.share,
+            reaction=tuple(self._reaction.tolist()),
         )
 
     def start_log(self, logger: Any) -> None:

@@ -110,7 +110,7 @@ class JointProgram:
             ring, tube = self._radii[index]
             turning = center.jacobian[3:]
             self._turning[3 * index : 3 * index + 3] = turning
-            rolling = rolling_map(axis, turning @ velocity, ring, tube, self._period)
+            rolling = rolling_map(axis, turning @ velocity, ring, tube=tube, period=self._period)
             np.dot(rolling[:2], turning, out=self._rolling[2 * index : 2 * index + 2])
             slope = float(axis[2])
             lowest = (np.array((0.0, 0.0, 1.0)) - slope * axis) / np.sqrt(1.0 - slope**2)

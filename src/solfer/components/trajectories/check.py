@@ -135,7 +135,7 @@ class TrajectoryCheck:
                 f"joint '{trajectory.joint_names[index]}' moves at {velocities[-1, index]:.6g} rad/s at the last point",
                 expected="joints that come to rest: no velocity there",
             )
-        motion = ViaPoints(np.append(elapsed, times[left]), positions, velocities, accelerations)
+        motion = ViaPoints(np.append(elapsed, times[left]), positions, velocities, accelerations=accelerations)
         self._require_limits(motion, places, start)
         return motion, elapsed
 
@@ -206,10 +206,10 @@ class TrajectoryCheck:
         lowest, highest, fastest = motion.extremes()
         lower = np.minimum(self._lower[places], start)
         upper = np.maximum(self._upper[places], start)
-        self._require(places, lowest, lambda value, index: value >= lower[index] - _SLACK, "position", "rad")
-        self._require(places, highest, lambda value, index: value <= upper[index] + _SLACK, "position", "rad")
+        self._require(places, lowest, lambda value, index: value >= lower[index] - _SLACK, what="position", unit="rad")
+        self._require(places, highest, lambda value, index: value <= upper[index] + _SLACK, what="position", unit="rad")
         limits = self._speed[places] * (1.0 + _SLACK)
-        self._require(places, fastest, lambda value, index: value <= limits[index], "speed", "rad/s")
+        self._require(places, fastest, lambda value, index: value <= limits[index], what="speed", unit="rad/s")
 
     def _require(
         self, places: np.ndarray, values: np.ndarray, within: Callable[[float, int], bool], what: str, unit: str

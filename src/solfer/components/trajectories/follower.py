@@ -58,7 +58,7 @@ class TrajectoryFollower:
         lower = robot.lower_limits.position[joints]
         upper = robot.upper_limits.position[joints]
         self._turns = robot.turns[joints]
-        self._check = TrajectoryCheck(names, lower, upper, robot.upper_limits.velocity[joints], self._turns)
+        self._check = TrajectoryCheck(names, lower, upper, speed=robot.upper_limits.velocity[joints], turns=self._turns)
         self.moving = False
         self.places = np.zeros(0, dtype=int)
         self._motion: ViaPoints | None = None
@@ -149,7 +149,7 @@ class TrajectoryFollower:
             self._names,
             _point(desired, speed, time),
             _point(self._actual, self._turning, time),
-            _point(away, speed - self._turning, time),
+            error=_point(away, speed - self._turning, time),
         )
 
     def _size(self, places: np.ndarray) -> None:

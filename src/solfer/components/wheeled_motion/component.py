@@ -102,7 +102,7 @@ class WheeledMotion(Component):
         self._wheels = find_wheels(robot, tags)
         links = [wheel.end_frame for wheel in self._wheels]
         self._pose = SpatialPoint(robot.kinematics.base_link, robot)
-        self._points = make_points(robot, tags, self._wheels, self._pose)
+        self._points = make_points(robot, tags, self._wheels, pose=self._pose)
         self._offsets: RollingOffsets = self._points[POINTS[VERTICES]]  # type: ignore[assignment]
         record = tags.stack_record()
         self.moved = moved_by(robot, tags)
@@ -131,7 +131,9 @@ class WheeledMotion(Component):
         self._is_paced = tags.is_paced
         self._is_original = tags.is_original
         self._is_first = True
-        self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
+        self.drive = Drive(
+            tags.base_speed, tags.turn_speed, tags.acceleration, turn_acceleration=tags.turn_acceleration
+        )
         self.targets = Targets(
             len(links),
             (tags.base_speed, tags.turn_speed, tags.vertex_speed),
@@ -148,12 +150,12 @@ class WheeledMotion(Component):
             [wheel.name for wheel in self._wheels],
             holding,
             self._offsets,
-            self.references,
-            self._polygon,
-            self._base_velocity,
-            self._measured_forces,
-            tags.lift_margin,
-            robot.is_whole,
+            references=self.references,
+            polygon=self._polygon,
+            base_velocity=self._base_velocity,
+            forces=self._measured_forces,
+            margin=tags.lift_margin,
+            is_whole=robot.is_whole,
         )
         self._throttle = Throttle(log)
         self._behind = 0.0
@@ -172,25 +174,27 @@ class WheeledMotion(Component):
             tags.steering_record(),
             self.period,
             len(self._wheels),
-            tags.rests,
-            tags.gain_across if self._straight is None else 0.0,
+            rests=tags.rests,
+            across=tags.gain_across if self._straight is None else 0.0,
         )
         self.steering_angles = self._steering.measured
         speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
-        self._pace = PathPace(speeds, tags.acceleration, self.references, self._steering, self._offsets)
+        self._pace = PathPace(
+            speeds, tags.acceleration, self.references, steering=self._steering, offsets=self._offsets
+        )
         self._publisher = PacePublisher(self._published_pace, self.period)
         rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
-        self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
+        self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid=rigid)
         self._bounds = joint_bounds(self.model, self.period)
         self._guard = MotionGuard(
             self._polygon,
             self.references.lifted,
             [wheel.end_frame for wheel in self._wheels],
-            self._rows,
-            self._rates,
-            self._legs,
-            self._turning,
-            self._descent.velocity,
+            rows=self._rows,
+            rates=self._rates,
+            legs=self._legs,
+            turning=self._turning,
+            velocity=self._descent.velocity,
         )
         self._name_parts()
 
@@ -286,7 +290,7 @@ class WheeledMotion(Component):
                 for name in tags.steerings
                 for key in SteeringRecord.model_fields
             ),
-            *live_tunings(tags, tags.stack_record(), self._configured, self._take_tuning),
+            *live_tunings(tags, tags.stack_record(), self._configured, write=self._take_tuning),
         )
 
     def _limits_of(self, tags: DrivingTags) -> list[float]:
@@ -414,29 +418,40 @@ class WheeledMotion(Component):
         On `pace` it publishes with which share of these velocities the motion goes on: none while it does not work.
         """
         return (
-            TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive, stream="velocities"),
+            TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, handler=self.drive.receive, stream="velocities"),
             TopicIn(
                 "wheels_state",
                 "solfer/WheelsState",
                 WheelsState,
-                lambda message: self.drive.receive_state(message, self.references),
+                handler=lambda message: self.drive.receive_state(message, self.references),
                 stream="velocities",
             ),
             TopicIn(
                 "wheels_support",
                 "solfer/WheelsSupport",
                 WheelsSupport,
-                self.targets.receive,
+                handler=self.targets.receive,
                 stream="places",
             ),
-            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._publisher.collect(), rest=MotionPace(0.0)),
+            TopicOut(
+                "pace", "std_msgs/Float64", MotionPace, collect=lambda: self._publisher.collect(), rest=MotionPace(0.0)
+            ),
         )
 
     def services(self) -> tuple[Service, ...]:
         """Offer the services `<name>/lift` and `<name>/get_reference`."""
         return (
-            Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift, TIMEOUT),
-            Service("get_reference", "solfer/GetReference", GetReference, ReferenceReply, self.get_reference),
+            Service(
+                "lift",
+                "solfer/LiftContacts",
+                LiftContacts,
+                reply=LiftReply,
+                handler=self._lifting.lift,
+                timeout=TIMEOUT,
+            ),
+            Service(
+                "get_reference", "solfer/GetReference", GetReference, reply=ReferenceReply, handler=self.get_reference
+            ),
         )
 
     def get_reference(self, request: GetReference) -> ReferenceReply:

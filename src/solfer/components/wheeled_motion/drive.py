@@ -66,7 +66,7 @@ class Drive:
     """
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
-        self.limit(speed, turn_speed, acceleration, turn_acceleration)
+        self.limit(speed, turn_speed, acceleration, turn_acceleration=turn_acceleration)
         self._state = np.zeros(7)
         self.start()
 
@@ -98,7 +98,7 @@ class Drive:
             NotFinite: A number is NaN or infinite.
             ComponentError: It is far beyond what the base may do.
         """
-        self._want((message.linear.x, message.linear.y, 0.0), message.angular.z, "cmd_vel", False)
+        self._want((message.linear.x, message.linear.y, 0.0), message.angular.z, "cmd_vel", in_world=False)
 
     def receive_state(self, message: WheelsState, references: References) -> None:
         """Take over a velocity in the world, and angles of the wheels; nothing changes if a part of it is wrong.
@@ -110,7 +110,7 @@ class Drive:
         """
         for what, angles in (("cs", message.cs), ("cm", message.cm)):
             check(what, angles, len(references.camber))
-        self._want((message.x, message.y, message.z), message.rz, "wheels_state", True)
+        self._want((message.x, message.y, message.z), message.rz, "wheels_state", in_world=True)
         if message.cs:
             references.camber[:] = message.cs
         if message.cm:

@@ -57,8 +57,8 @@ def make_points(
     carriers = [carrier_of(robot, link) for link in links]
     carried = np.array([_carried_axle(robot, tags, *each) for each in zip(carriers, links, axles, strict=True)])
     return {
-        POINTS[BASE]: BasePose(robot, pose, CenterOfMass(robot), tags.base == "center_of_mass"),
-        POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose, tags.is_original),
+        POINTS[BASE]: BasePose(robot, pose, CenterOfMass(robot), is_tracked=tags.base == "center_of_mass"),
+        POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose=pose, is_late=tags.is_original),
         POINTS[CAMBER]: Camber(robot, links, axles),
         POINTS[CASTER]: Caster(robot, carriers, carried),
     }
@@ -83,7 +83,7 @@ def steered_by(robot: Robot, tags: DrivingTags, wheel: ContactRecord) -> int:
     carrier = carrier_of(robot, wheel.end_frame)
     joint = robot.description.links[carrier].parent
     if joint in robot.dofs:
-        axle = _carried_axle(robot, tags, carrier, wheel.end_frame, _axle(tags, wheel))
+        axle = _carried_axle(robot, tags, carrier, link=wheel.end_frame, axle=_axle(tags, wheel))
         if abs(float(axle.dot(robot.description.joints[joint].axis))) < PARALLEL:
             return robot.dof(joint)
     raise ComponentError(

@@ -69,4 +69,4 @@ class ContactControllerRecord(ContactTags, ControllerRecord):
     """Wrenches of its Robot's contacts that a plugin publishes."""
 
 
-RECORDS = KindRecords(ContactFeedbackRecord, ContactControllerRecord, ContactTags, "Contacts")
+RECORDS = KindRecords(ContactFeedbackRecord, ContactControllerRecord, ContactTags, title="Contacts")

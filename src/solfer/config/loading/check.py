@@ -76,14 +76,16 @@ def check(
     """
     report = CheckReport()
     try:
-        layers = Layers(file, report.problems, system, search_paths, middleware)
+        layers = Layers(file, report.problems, system, folders=search_paths, middleware=middleware)
     except SolferError as error:
         report.problems.put(Mark(os.fspath(file), 1, 1), error)
         return report
     report.modules = layers.names if modules is None else tuple(dict.fromkeys(modules))
     used: Used = set()
     for name in report.modules:
-        _check_module(report, layers, os.fspath(file), name, default=default, used=used, layer=layer, shared=shared)
+        _check_module(
+            report, layers, os.fspath(file), name=name, default=default, used=used, layer=layer, shared=shared
+        )
     if modules is None:
         for tree in layers.variants(report.problems):
             check_rest(tree, used, report.problems)
@@ -108,7 +110,7 @@ def _check_module(
         report.problems.put(layers.main.nearest(("modules", name)).head, error)
         return
     if is_shared(name, node):
-        group = read_shared(layers, file, name, default, found)
+        group = read_shared(layers, file, name, default=default, problems=found)
         if group is not None:
             report.shared[name] = group
     else:

@@ -73,7 +73,7 @@ class Configuration:
 
     def effective(self) -> Iterator[EffectiveValue]:
         """Yield every value that the module uses, after all merging, with its place."""
-        yield from entries(pruned(self.tree, self.name, self.robot.configuration, self.middleware))
+        yield from entries(pruned(self.tree, self.name, self.robot.configuration, middleware=self.middleware))
 
     def text(self, origins: bool = True) -> str:
         """Write the effective configuration as YAML; with `origins` each line ends with the place of its value."""

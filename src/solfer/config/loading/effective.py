@@ -51,7 +51,7 @@ def pruned(tree: YamlNode, module: str, robot: str, middleware: str) -> YamlNode
         ("feedback", feedback and (feedback.get("list") or feedback.get("layer"))),
         ("controller", tree.get("modules", module, "controller")),
     ):
-        paths += _pipes(tree, section, direction, chosen) if chosen else ()
+        paths += _pipes(tree, section, direction, chosen=chosen) if chosen else ()
     paths += [("calibration",), (section, "source"), (section, "mapping"), ("modules", module)]
     for path in paths:
         _copy(tree, kept, path)

@@ -120,8 +120,8 @@ class Layers:
         if chosen is not None:
             main = _with(main, (*own, "layer"), chosen)
         files = (
-            _chosen("system", main.get("robot", "systems"), main.get("system"), problems),
-            _chosen("layer", main.get("layers"), main.get(*own, "layer"), problems),
+            _chosen("system", main.get("robot", "systems"), main.get("system"), problems=problems),
+            _chosen("layer", main.get("layers"), main.get(*own, "layer"), problems=problems),
             main.get(*own, "secondary_file"),
         )
         tree = self._merged(main, files, problems)

@@ -44,7 +44,7 @@ def load(
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
-    tree = Layers(file, problems, system, search_paths, middleware=middleware, over=over).tree(
+    tree = Layers(file, problems, system, folders=search_paths, middleware=middleware, over=over).tree(
         module, problems, shared, layer
     )
     configuration = Reading(tree, problems).configuration(os.fspath(file), module, class_name)

@@ -75,10 +75,21 @@ class Reading:
         self._warn_of_services(controllers, sources)
         calibrations = read_calibrations(self._tree, (*feedbacks, *controllers), self._problems)
         configuration = Configuration(
-            file, name, middleware, main.system if main else None, head.rate if head else None, module,
-            robot, feedbacks, controllers, mappings, calibrations, sources,
-            tuple(main.modules) if main else (), self._tree,
-        )  # fmt: skip
+            file,
+            name,
+            middleware,
+            system=main.system if main else None,
+            rate=head.rate if head else None,
+            module=module,
+            robot=robot,
+            feedbacks=feedbacks,
+            controllers=controllers,
+            mappings=mappings,
+            calibrations=calibrations,
+            sources=sources,
+            modules=tuple(main.modules) if main else (),
+            tree=self._tree,
+        )
         return Part(configuration, tuple(self._dofs))
 
     def _middleware(self) -> str:
@@ -136,7 +147,7 @@ class Reading:
 
     def _pipes(self, chosen: YamlNode, middleware: str, direction: str) -> tuple[Any, ...]:
         """Return the pipes of a set's name or of a list."""
-        library = Library(self._tree, middleware, direction, self._problems)
+        library = Library(self._tree, middleware, direction, problems=self._problems)
         records = library.of_set(chosen) if isinstance(chosen.value, str) else library.of_list(chosen)
         self.used |= library.used
         self._dofs += library.dofs

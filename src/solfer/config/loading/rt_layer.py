@@ -158,7 +158,13 @@ class RtLayer:
             except SolferError as error:
                 for each in singles([error]):
                     problems.put(entry.mark, each)
-        check_group(found, [each.name for each in self.plugins], "the RT layer", problems, self.executor.rate is None)
+        check_group(
+            found,
+            [each.name for each in self.plugins],
+            "the RT layer",
+            problems=problems,
+            one_rate=self.executor.rate is None,
+        )
         problems.log(_LOG)
         problems.raise_if_any()
         return tuple(self._paced(plugin) for plugin in found)
@@ -203,9 +209,9 @@ def read_layer(file: str | os.PathLike, default: Naming = str) -> RtLayer:
     layers = Layers(known, problems)
     _refuse_ros_alone(layers.main, record, known.path)
     entries: Any = own.node.nearest(("XBotRTPlugins", "plugins")).value
-    plugins = listed(entries, None, layers, default, problems)
-    start = _start(executor, record, plugins, layers.main)
-    return RtLayer(record, str(path), executor, tuple(plugins), start, known, problems)
+    plugins = listed(entries, None, layers, default=default, problems=problems)
+    start = _start(executor, record, plugins, main=layers.main)
+    return RtLayer(record, str(path), executor, plugins=tuple(plugins), start=start, file=known, problems=problems)
 
 
 def _start(

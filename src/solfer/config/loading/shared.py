@@ -125,8 +125,8 @@ def load_shared(
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
-    layers = Layers(file, problems, system, search_paths, over=over)
-    shared = read_shared(layers, os.fspath(file), name, default, problems)
+    layers = Layers(file, problems, system, folders=search_paths, over=over)
+    shared = read_shared(layers, os.fspath(file), name, default=default, problems=problems)
     problems.log(_LOG)
     problems.raise_if_any()
     return shared
@@ -148,11 +148,11 @@ def read_shared(
     record = parse(node, SharedRecord, problems, name=name)
     if record is None:
         return None
-    named = listed(_entries(node, name, problems), node, layers, default, problems)
+    named = listed(_entries(node, name, problems), node, layers, default=default, problems=problems)
     entries = [replace(entry, group=name) for entry in named]
-    plugins = [_plugin(layers, file, entry, problems) for entry in entries]
+    plugins = [_plugin(layers, file, entry, problems=problems) for entry in entries]
     found = tuple(plugin for plugin in plugins if plugin is not None)
-    check_group(found, [entry.name for entry in entries], f"the shared plugin '{name}'", problems)
+    check_group(found, [entry.name for entry in entries], f"the shared plugin '{name}'", problems=problems)
     return None if problems else SharedConfiguration(record, found)
 
 
@@ -169,7 +169,7 @@ def listed(
         default: Returns the configuration of a plugin that is listed without one.
         problems: Receives the mistakes, and what is worth knowing: names that are made unique.
     """
-    found = [each for entry in entries for each in _named(entry, shared, layers, default, problems)]
+    found = [each for entry in entries for each in _named(entry, shared, layers, default=default, problems=problems)]
     return _made_unique(found, problems)
 
 
@@ -186,9 +186,9 @@ def check_group(
         one_rate: Whether their rates count.
     """
     for plugin in plugins:
-        _check_required(plugin, names, group, problems)
+        _check_required(plugin, names, group, problems=problems)
         if one_rate and plugin.configuration.rate != plugins[0].configuration.rate:
-            _note_rates(plugins[0], plugin, group, problems)
+            _note_rates(plugins[0], plugin, group, problems=problems)
 
 
 def _entries(node: YamlNode, name: str, problems: Problems) -> Iterator[YamlNode]:
@@ -212,9 +212,9 @@ def _named(
         kind = "plugin" if name == plugin else f"configuration of the plugin '{plugin}':"
         problems.unknown(entry.mark, kind, name, layers.names)
     elif shared is None and is_shared(name, layers.main.nearest(("modules", name))):
-        yield from _expanded(entry, plugin, name, layers, default, problems)
+        yield from _expanded(entry, plugin, name, layers=layers, default=default, problems=problems)
     else:
-        yield ListedPlugin(plugin, name, name, entry.mark, shared)
+        yield ListedPlugin(plugin, name, name, mark=entry.mark, shared=shared)
 
 
 def _expanded(
@@ -226,7 +226,9 @@ def _expanded(
         problems.add(entry.mark, f"'{name}' lists plugins and is not one itself", f"`shared::{name}`")
     elif parse(node, SharedRecord, problems, name=name) is not None:
         for inner in _entries(node, name, problems):
-            yield from (replace(each, group=name) for each in _named(inner, node, layers, default, problems))
+            yield from (
+                replace(each, group=name) for each in _named(inner, node, layers, default=default, problems=problems)
+            )
 
 
 def _made_unique(plugins: Sequence[ListedPlugin], problems: Problems) -> list[ListedPlugin]:
@@ -296,4 +298,6 @@ def _plugin(layers: Layers, file: str, entry: ListedPlugin, problems: Problems) 
 def loaded(entry: ListedPlugin, configuration: Configuration) -> SharedPlugin:
     """Return the plugin of an entry with its configuration, under its unique name."""
     named = entry.named(configuration)
-    return SharedPlugin(entry.plugin, entry.name, named.module.requires, named, str(entry.mark), entry.group)
+    return SharedPlugin(
+        entry.plugin, entry.name, named.module.requires, configuration=named, where=str(entry.mark), group=entry.group
+    )

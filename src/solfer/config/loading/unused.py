@@ -32,12 +32,12 @@ def check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
         if source is not None:
             parse(source, SourceRecord, problems)
         for direction in (FEEDBACK, CONTROLLER):
-            _check_pipes(tree, middleware, direction, used if is_chosen else None, problems)
+            _check_pipes(tree, middleware, direction, used=used if is_chosen else None, problems=problems)
 
 
 def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
     """Check robot configurations, and the pipes that they and the sets name."""
-    libraries = {kind: Library(tree, middleware, kind, problems) for kind in (FEEDBACK, CONTROLLER)}
+    libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK, CONTROLLER)}
     for direction, library in libraries.items():
         sets = tree.get(f"{direction}s")
         for _, node in sets.items() if sets else ():
@@ -64,5 +64,5 @@ def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | N
     for part in (special,) if used is None else (generic, special):
         for name, node in part.items() if part else ():
             found = Problems(complete=False)
-            Library(tree, middleware, direction, found).pipe(name, node.head)
+            Library(tree, middleware, direction, problems=found).pipe(name, node.head)
             problems.absorb(found, notices=(direction, name) not in (used or ()))

@@ -58,7 +58,7 @@ class LiveField:
         )
         kinds = " or ".join(dict.fromkeys(_kinds(field.annotation)))
         default = None if field.is_required() else field.get_default(call_default_factory=True)
-        return cls(default, kinds, units[0] if units else "", least, most, description)
+        return cls(default, kinds, units[0] if units else "", minimum=least, maximum=most, description=description)
 
 
 def is_live(field: FieldInfo) -> bool:
@@ -166,7 +166,7 @@ class _Requested(Mark):
 
 
 def _node_of(value: Any, path: Path) -> YamlNode:
-    mark = _Requested("", 1, 1, path)
+    mark = _Requested("", 1, 1, path=path)
     inner = value
     if isinstance(value, dict):
         inner = {key: _node_of(each, (*path, key)) for key, each in value.items()}
@@ -183,11 +183,13 @@ def _replaced(node: YamlNode | None, path: Path, new: YamlNode, above: Path = ()
     rest = path[1:]
     below = (*above, key)
     if node is not None and isinstance(node.value, tuple):
-        items = [_replaced(each, rest, new, below) if index == key else each for index, each in enumerate(node.value)]
+        items = [
+            _replaced(each, rest, new, above=below) if index == key else each for index, each in enumerate(node.value)
+        ]
         return YamlNode(tuple(items), node.mark, node.key)
     entries: dict[str, YamlNode] = dict(node.items()) if node is not None else {}
-    entries[str(key)] = _replaced(entries.get(str(key)), rest, new, below)
-    mark = _Requested("", 1, 1, above) if node is None else node.mark
+    entries[str(key)] = _replaced(entries.get(str(key)), rest, new, above=below)
+    mark = _Requested("", 1, 1, path=above) if node is None else node.mark
     return YamlNode(entries, mark, mark if node is None else node.key)
 
 

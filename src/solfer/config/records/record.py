@@ -107,7 +107,7 @@ def parse(
     """
     data = node.plain()
     if isinstance(data, dict):
-        data = _with_new_names(data, node, record, problems)
+        data = _with_new_names(data, node, record, problems=problems)
         known = set(field_names(record)) - set(given)
         for key in given:
             if key in data:
@@ -118,7 +118,7 @@ def parse(
     try:
         parsed = record.model_validate_json(json.dumps(_without_empty(data, record)))
     except ValidationError as error:
-        complain(error, node, record, problems, also, beside)
+        complain(error, node, record, problems=problems, also=also, beside=beside)
         return None
     _attach(parsed, node, problems)
     return parsed

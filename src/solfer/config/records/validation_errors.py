@@ -82,9 +82,15 @@ def complain(
         if any(len(other) > len(path) and other[: len(path)] == path for other in alternatives):
             continue  # the other error concerns the member of a union that fits better
         if items[0]["type"] == "extra_forbidden":
-            _unknown_key(node, path, _model_at(record, items[0]["loc"][:-1]), problems, also if len(path) == 1 else ())
+            _unknown_key(
+                node,
+                path,
+                _model_at(record, items[0]["loc"][:-1]),
+                problems=problems,
+                also=also if len(path) == 1 else (),
+            )
         else:
-            _complain_at(node, path, items, record, problems)
+            _complain_at(node, path, items, record=record, problems=problems)
 
 
 def _like(key: Key, others: list[str]) -> list[str]:

@@ -39,7 +39,7 @@ def _composed(text: str, file: str, later: tuple[Key, ...] | None) -> tuple[Yaml
     """Compose a text, with its mistakes; a check reads the same files for each module."""
     problems = Problems()
     try:
-        return _Composer(text, file, problems, later).document(), problems
+        return _Composer(text, file, problems, later=later).document(), problems
     except yaml.MarkedYAMLError as error:
         raise not_yaml(error, text, file) from error
     except yaml.YAMLError as error:
@@ -130,7 +130,7 @@ class _Composer:
     def _check_blanks(self, event: Any) -> None:
         """Raise the error of a plain text in which a character that looks like a blank hides a key or a value."""
         if not event.value.isascii():
-            odd = odd_blank(self._text, self._file, event.start_mark.line, event.end_mark.line)
+            odd = odd_blank(self._text, self._file, event.start_mark.line, last=event.end_mark.line)
             if odd is not None:
                 raise odd
 
@@ -188,4 +188,4 @@ class _Composer:
 
     def _mark(self, event: Any) -> Mark:
         start = event.start_mark
-        return Mark(self._file, start.line + 1, start.column + 1, tuple(self._path))
+        return Mark(self._file, start.line + 1, start.column + 1, path=tuple(self._path))

@@ -30,13 +30,13 @@ def edited(text: str, file: str, values: Mapping[tuple[Key, ...], Any]) -> str:
     if not text.strip():
         tree: dict[Key, Any] = {}
         for path, value in values.items():
-            _put(tree, path, value, file)
+            _put(tree, path, value, file=file)
         return text + yaml.safe_dump(tree, sort_keys=False, default_flow_style=False, allow_unicode=True)
     problems = Problems()
     expected = compose(text, file, problems).plain()
     for path, value in values.items():
-        text = _with(text, file, path, value)
-        _put(expected, path, value, file)
+        text = _with(text, file, path, value=value)
+        _put(expected, path, value, file=file)
         if compose(text, file, problems).plain() != expected:
             raise _no_place(file, path)
     return text
@@ -75,7 +75,7 @@ def _with(text: str, file: str, path: tuple[Key, ...], value: Any) -> str:
     for depth, key in enumerate(path):
         below = _child(node, key)
         if below is None:
-            begin, end, new = _entry(text, node, path[depth:], value)
+            begin, end, new = _entry(text, node, path[depth:], value=value)
             break
         node = below
     else:

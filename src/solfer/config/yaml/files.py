@@ -56,7 +56,7 @@ def opened(path: str | os.PathLike, where: str = "", later: tuple[Key, ...] | No
     file = os.fspath(path)
     problems = Problems()
     problems.reading(file)
-    return YamlFile(file, compose(read_text(file, where), file, problems, later), problems)
+    return YamlFile(file, compose(read_text(file, where), file, problems, later=later), problems)
 
 
 def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = (), where: str = "") -> YamlNode:

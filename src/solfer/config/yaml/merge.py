@@ -58,7 +58,7 @@ def merge(base: YamlNode, over: YamlNode, problems: Problems, path: Path = ()) -
         return over
     maps = isinstance(base.value, dict), isinstance(over.value, dict)
     if all(maps):
-        return _merge_maps(base, over, problems, path)
+        return _merge_maps(base, over, problems, path=path)
     if any(maps) and not any(_matches(path, pattern) for pattern in _REPLACED):
         problems.add(over.mark, f"{over.kind} cannot replace {base.kind}", f"what {base.mark} has")
         return base
@@ -71,7 +71,7 @@ def _merge_maps(base: YamlNode, over: YamlNode, problems: Problems, path: Path) 
             return over
     entries = dict(base.items())
     for name, value in over.items():
-        entries[name] = merge(entries[name], value, problems, (*path, name)) if name in entries else value
+        entries[name] = merge(entries[name], value, problems, path=(*path, name)) if name in entries else value
     return YamlNode(entries, base.mark, base.key)
 
 

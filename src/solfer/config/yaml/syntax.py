@@ -67,7 +67,7 @@ def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
     if "\t" in written[: len(written) - len(written.lstrip())]:
         return ConfigError("not YAML: a tab in the indentation", where=where, expected="spaces")
     begin = (error.context_mark.line if error.context_mark else line) + 1
-    odd = odd_blank(text, file, min(begin - 1, line), line)
+    odd = odd_blank(text, file, min(begin - 1, line), last=line)
     if odd is not None:
         return odd
     character = written[column : column + 1]

@@ -55,7 +55,7 @@ class CommandCheck:
                 )
             indices = self._match(message.names)
             given = {
-                field: self._numbers(field, values, message.names, indices)
+                field: self._numbers(field, values, message.names, indices=indices)
                 for field in JOINT_FIELDS
                 if (values := getattr(message, field)) is not None
             }
@@ -110,7 +110,7 @@ class CommandCheck:
         inside = (numbers >= low - TOLERANCE) & (numbers <= high + TOLERANCE) & np.isfinite(numbers)
         if not inside.all():
             wrong = inside.argmin()
-            self._refuse(field, names[wrong], float(numbers[wrong]), float(low[wrong]), float(high[wrong]))
+            self._refuse(field, names[wrong], float(numbers[wrong]), low=float(low[wrong]), high=float(high[wrong]))
         return numbers
 
     def _refuse(self, field: str, joint: str, value: float, low: float, high: float) -> None:

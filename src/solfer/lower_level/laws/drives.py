@@ -48,12 +48,12 @@ class Drives:
         _check_joints(kinematics, controllers, passive)
         impedances = [item for item in controllers if isinstance(item, ImpedanceController)]
         motors = [item for item in controllers if isinstance(item, VelocityController)]
-        springs = springs_of(kinematics, actuators, posture, STEP)
+        springs = springs_of(kinematics, actuators, posture, dt=STEP)
         moved = _dofs(impedances)
         held = _dofs(motors)
         swinging = held[springs.two_mass[held]] if springs else held[:0]
         self.torque_dofs, self.speed_dofs = np.concatenate((moved, swinging)), np.setdiff1d(held, swinging)
-        self._law = _law(kinematics, self.torque_dofs, springs, posture)
+        self._law = _law(kinematics, self.torque_dofs, springs, posture=posture)
         self._law.damping[swinging] = HOLDING
         self.torque = self._law.torque
         self.speed = np.zeros(len(self.speed_dofs))
@@ -118,7 +118,7 @@ def _law(
     if springs is None:
         return ImplicitImpedance(kinematics, *limits)
     return TwoMassImpedance(
-        kinematics, limits, springs, neutral_posture(kinematics) if posture is None else posture, STEP
+        kinematics, limits, springs, posture=neutral_posture(kinematics) if posture is None else posture, dt=STEP
     )
 
 

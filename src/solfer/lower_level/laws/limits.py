@@ -45,7 +45,7 @@ class JointLimits:
             tuple(joints),
             dofs,
             kinematics.lower_position[dofs],
-            kinematics.upper_position[dofs],
-            kinematics.velocity_limit[dofs],
-            kinematics.effort_limit[dofs],
+            upper=kinematics.upper_position[dofs],
+            velocity=kinematics.velocity_limit[dofs],
+            effort=kinematics.effort_limit[dofs],
         )

@@ -59,7 +59,7 @@ def springs_of(
     values = np.zeros((4, kinematics.size))
     values[:, dofs] = actuators.stiffness, actuators.damping, actuators.motor_inertia, actuators.motor_damping
     stiffness, damping, rotor, friction = values
-    return Springs(stiffness, damping, rotor, friction, resolved(inertia, stiffness, rotor, dt))
+    return Springs(stiffness, damping, rotor, friction=friction, two_mass=resolved(inertia, stiffness, rotor, dt=dt))
 
 
 def mobility_of(inertia: np.ndarray, rotor: np.ndarray, chosen: np.ndarray) -> np.ndarray:

@@ -110,7 +110,9 @@ class LowerLevelServer:
         now = self._middleware.now()
         if self._lower_level.starts != self._starts:
             self._starts = self._lower_level.starts
-            self._writer.write(RefusalMessage((ALL_OWNERS,), (True,), ("the robot was put into another state",), now))
+            self._writer.write(
+                RefusalMessage((ALL_OWNERS,), (True,), ("the robot was put into another state",), stamp=now)
+            )
         if now - self._published < PERIOD:
             return
         news = self._lower_level.refusals.news()
@@ -122,6 +124,6 @@ class LowerLevelServer:
                 tuple(news),
                 tuple(map(concerns_claim, news.values())),
                 tuple(error.line for error in news.values()),
-                now,
+                stamp=now,
             )
         )

@@ -72,32 +72,36 @@ def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
         return ClaimAnswer(again=again)
 
     return (
-        Service("claim", CLAIM, ClaimRequest, ClaimAnswer, claim),
+        Service("claim", CLAIM, ClaimRequest, reply=ClaimAnswer, handler=claim),
         Service(
-            "release", RELEASE, ReleaseRequest, Answer, answered(lambda request: lower_level.release(request.owner))
+            "release",
+            RELEASE,
+            ReleaseRequest,
+            reply=Answer,
+            handler=answered(lambda request: lower_level.release(request.owner)),
         ),
-        Service("list_controllers", "solfer/ListControllers", NoFields, ControllerList, controllers),
+        Service("list_controllers", "solfer/ListControllers", NoFields, reply=ControllerList, handler=controllers),
         Service(
             "switch",
             SWITCH,
             SwitchRequest,
-            Answer,
-            answered(lambda request: lower_level.switch(request.start, request.stop)),
+            reply=Answer,
+            handler=answered(lambda request: lower_level.switch(request.start, request.stop)),
         ),
         Service(
             "emergency_stop",
             "std_srvs/Trigger",
             NoFields,
-            Answer,
-            answered(lambda _: lower_level.emergency_stop("asked for by service")),
+            reply=Answer,
+            handler=answered(lambda _: lower_level.emergency_stop("asked for by service")),
             urgent=True,
         ),
         Service(
             "reset_emergency_stop",
             "std_srvs/Trigger",
             NoFields,
-            Answer,
-            answered(lambda _: lower_level.reset_emergency_stop()),
+            reply=Answer,
+            handler=answered(lambda _: lower_level.reset_emergency_stop()),
         ),
     )
 
@@ -114,7 +118,7 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
     def names(_request: NoFields) -> JointNames:
         return JointNames(names=controller.joints)
 
-    services = (Service("get_joint_names", JOINT_NAMES, NoFields, JointNames, names),)
+    services = (Service("get_joint_names", JOINT_NAMES, NoFields, reply=JointNames, handler=names),)
     if not isinstance(controller, ImpedanceController):
         return services
 
@@ -122,7 +126,7 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
         controller.feed_forward = request.data
 
     def gains(request: FileRequest) -> Gains:
-        return read_gains(controller, request.file, folders, robot)
+        return read_gains(controller, request.file, folders, robot=robot)
 
     def told(_request: NoFields) -> ControllerGains:
         gains = controller.default_gains
@@ -134,14 +138,14 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
 
     return (
         *services,
-        Service("get_gains", CONTROLLER_GAINS, NoFields, ControllerGains, told),
-        Service("set_ff_torque", SWITCH_FEED_FORWARD, Flag, Answer, answered(set_ff_torque)),
+        Service("get_gains", CONTROLLER_GAINS, NoFields, reply=ControllerGains, handler=told),
+        Service("set_ff_torque", SWITCH_FEED_FORWARD, Flag, reply=Answer, handler=answered(set_ff_torque)),
         Service(
             "load_gains",
             LOAD_GAINS,
             FileRequest,
-            Answer,
-            answered(lambda gains: controller.load_gains(*gains)),
+            reply=Answer,
+            handler=answered(lambda gains: controller.load_gains(*gains)),
             prepare=gains,
         ),
     )

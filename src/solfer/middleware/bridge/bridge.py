@@ -70,8 +70,8 @@ class Bridge:
         self._ways_in: list[OneWayTopic] = []
         self._ways_out: list[OneWayTopic] = []
         self.crossings: dict[str, OneWayTopic] = {}
-        self._open(inwards, outside, inside, self._ways_in)
-        self._open(outwards, inside, outside, self._ways_out)
+        self._open(inwards, outside, inside, ways=self._ways_in)
+        self._open(outwards, inside, outside, ways=self._ways_out)
         self._next_look = self._next_report = -float("inf")
         self._published = 0
         self._reports: dict[str, Any] = {}
@@ -132,8 +132,8 @@ class Bridge:
     def _look(self) -> None:
         """Start forwarding topics and services that are new inside since the last search."""
         try:
-            self._open(self._topics(self.crossings), self._inside, self._outside, self._ways_out)
-            self._open(self._wanted(self.crossings), self._outside, self._inside, self._ways_in)
+            self._open(self._topics(self.crossings), self._inside, self._outside, ways=self._ways_out)
+            self._open(self._wanted(self.crossings), self._outside, self._inside, ways=self._ways_in)
             self.forwarding.offer(self._offers(self.forwarding.names))
         except SolferError as error:
             self._throttle.warning("look", "something is not forwarded: %s", error)

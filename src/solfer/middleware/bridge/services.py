@@ -90,7 +90,12 @@ class ServiceForwarder:
 
         # The caller waits a little longer than the bridge, so that it gets the bridge's refusal, which is more precise.
         return Service(
-            offer.name.rpartition("/")[2], offer.interface, offer.request, offer.reply, ask, timeout=offer.timeout + 0.5
+            offer.name.rpartition("/")[2],
+            offer.interface,
+            offer.request,
+            reply=offer.reply,
+            handler=ask,
+            timeout=offer.timeout + 0.5,
         )
 
     def _submit(self, ask: Callable[[], Any]) -> "Future[Any]":

@@ -268,7 +268,7 @@ class Bus:
         first = self.time if start is None else start
         if cycles and (self.faults.loop.skip or self.faults.loop.stalls):
             work = self._disturbed(work, period)
-        heapq.heappush(self._agenda, _Entry(first, next(self._order), work, period, first))
+        heapq.heappush(self._agenda, _Entry(first, next(self._order), work, period=period, start=first))
 
     def run_until(self, end: float) -> None:
         """Do all work that is due before `end` [s], then set the clock to it."""
@@ -299,7 +299,7 @@ class Bus:
 
     def _make_topic(self, name: str, message_type: str) -> Topic:
         faults = self.faults.of_topic(name)
-        return Topic(name, message_type) if faults is None else FaultyTopic(name, message_type, self, faults)
+        return Topic(name, message_type) if faults is None else FaultyTopic(name, message_type, self, faults=faults)
 
     def _disturbed(self, work: Callable[[], None], period: float) -> Callable[[], None]:
         """Return the `work` of a loop of which cycles are left out, drawn for each loop by itself."""

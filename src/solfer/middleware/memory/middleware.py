@@ -215,7 +215,7 @@ class MemoryMiddleware(Middleware):
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`; time passes until the reply is there."""
-        answer = self.request(name, interface, request, reply, timeout)
+        answer = self.request(name, interface, request, reply=reply, timeout=timeout)
         self._wait(answer.done, timeout)
         if not answer.done():
             raise MiddlewareError(

@@ -31,4 +31,6 @@ class RosCaller:
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`; relative names are those of no namespace."""
-        return replied(call(f"/{name}", interface, request, timeout, lambda: not rospy.is_shutdown()), reply)
+        return replied(
+            call(f"/{name}", interface, request, timeout=timeout, running=lambda: not rospy.is_shutdown()), reply
+        )

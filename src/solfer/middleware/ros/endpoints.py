@@ -214,7 +214,7 @@ class RosReader(Reader):
         size = 1 if codec(message).ros_class._has_header and not kept else max(kept, COUNTED)
         self._backlog: Backlog[tuple[Arrival, RosPublisher]] | None = Backlog(kept) if kept else None
         self._waiting = deque[tuple[Arrival, RosPublisher]]()
-        self.subscription = Subscription(topic, message, size, self._store, now)
+        self.subscription = Subscription(topic, message, size, store=self._store, now=now)
         self._decode = self.subscription.codec.decode
         self.topic = self.subscription.topic
         self.carries = self.subscription.codec.ros_class._type
@@ -312,7 +312,7 @@ class RosQueue(Queue):
     def __init__(self, topic: str, message: str, size: int, largest: int | None = None):
         self._backlog: Backlog[Arrival] = Backlog(size)
         self.waits = self._backlog.waiting
-        self.subscription = Subscription(topic, message, size, self._store, largest=largest)
+        self.subscription = Subscription(topic, message, size, store=self._store, largest=largest)
         self.topic = self.subscription.topic
 
     def _store(self, arrival: Arrival) -> None:

@@ -67,7 +67,9 @@ class RosMiddleware(Middleware):
         self._diagnostics = Diagnostics(node.name)
         self._follower: LockstepClient | None = None
         if isinstance(node.clock, StepClock):
-            self._follower = LockstepClient(node.name, node.clock, self._endpoints, self._open_requests, node.running)
+            self._follower = LockstepClient(
+                node.name, node.clock, self._endpoints, requests=self._open_requests, running=node.running
+            )
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -105,7 +107,7 @@ class RosMiddleware(Middleware):
             ConfigError: The parameter that names the nodes is wrong.
         """
         names = followers()
-        return LockstepServer(names, self.name, self._endpoints, self.running) if names else None
+        return LockstepServer(names, self.name, self._endpoints, running=self.running) if names else None
 
     def running(self) -> bool:
         """See `Middleware.running`."""
@@ -168,11 +170,11 @@ class RosMiddleware(Middleware):
 
     def reader(self, topic: str, message: str, kept: int = 0) -> RosReader:
         """See `Middleware.reader`."""
-        return self._keep(RosReader(topic, message, self.now, kept, in_lockstep=self._follower is not None))
+        return self._keep(RosReader(topic, message, self.now, kept=kept, in_lockstep=self._follower is not None))
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> RosQueue:
         """See `Middleware.queue`."""
-        return self._keep(RosQueue(topic, message, size, largest))
+        return self._keep(RosQueue(topic, message, size, largest=largest))
 
     def require_fields(self, interface: str, message: type) -> None:
         """See `Middleware.require_fields`."""
@@ -202,11 +204,13 @@ class RosMiddleware(Middleware):
             MiddlewareError: No node offers the service, or no answer came in time.
             Ended: The node was asked to end.
         """
-        return replied(call(name, interface, request, timeout, self.running), reply)
+        return replied(call(name, interface, request, timeout=timeout, running=self.running), reply)
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; it is sent also when the node was asked to end."""
-        answer = in_thread(lambda: replied(call(name, interface, request, timeout, lambda: True), reply))
+        answer = in_thread(
+            lambda: replied(call(name, interface, request, timeout=timeout, running=lambda: True), reply)
+        )
         self._requests = [*self._open_requests(), answer]
         return answer
 
@@ -218,7 +222,7 @@ class RosMiddleware(Middleware):
             MiddlewareError: Another node offers a service of that name.
         """
         for service in services:
-            made = RosService(owner, service, submit, self.running)
+            made = RosService(owner, service, submit, running=self.running)
             self._services.append(made)
             if service.name in (GET_PARAMETERS, SET_PARAMETERS):
                 pair = self._tunings.setdefault(owner, {})

@@ -65,7 +65,7 @@ class _Row:
             limit if type_ in ("bool", "str") or not text else type(limit)(float(text.rpartition(" ")[2]))
             for text, limit in zip((minimum, maximum), _RANGES[type_], strict=True)
         )
-        return cls(name, type_, least, most, choices, kind == "text" or bool(choices))
+        return cls(name, type_, least, most=most, choices=choices, is_text=kind == "text" or bool(choices))
 
     def read(self, text: str) -> Any:
         """Read the text of a value."""
@@ -148,7 +148,7 @@ class ReconfigureServer:
         self._setting.done = self._publish
         self._server = rospy.Service(f"{prefix}/set_parameters", Reconfigure, self._set)
         busy = object()
-        bound_requests(self._server.protocol, self._setting.largest, Rate(*FAST), lambda size: busy, busy)
+        bound_requests(self._server.protocol, self._setting.largest, Rate(*FAST), instead=lambda size: busy, busy=busy)
 
     def _set(self, request: Any) -> ReconfigureResponse:
         if isinstance(request, Reconfigure._request_class):

@@ -68,8 +68,8 @@ class RosService:
         self.largest = service.largest
         self.done: Callable[[], None] = lambda: None
         self.name = name = f"{owner}/{service.name}"
-        self._match(service.request, self._interface._request_class, "request", name)
-        self._match(service.reply, self._interface._response_class, "reply", name)
+        self._match(service.request, self._interface._request_class, "request", name=name)
+        self._match(service.reply, self._interface._response_class, "reply", name=name)
         resolved = rospy.resolve_name(name)
         uri = provider(resolved)
         if uri is not None and alive(resolved, uri):
@@ -80,7 +80,7 @@ class RosService:
         self._server = rospy.Service(name, self._interface, self.answer)
         is_slow = service.prepare is not None and not service.quick
         rate = Rate(*SLOW) if is_slow else Rate(*FAST) if service.urgent or service.quick else REQUESTS
-        bound_requests(self._server.protocol, service.largest, rate, self._too_large, _Instead(TOO_MANY))
+        bound_requests(self._server.protocol, service.largest, rate, instead=self._too_large, busy=_Instead(TOO_MANY))
 
     def close(self) -> None:
         """Unregister."""

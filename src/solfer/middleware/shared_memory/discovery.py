@@ -63,7 +63,7 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
     for topic in namespace.present(PIPES):
         if topic.endswith(COMMANDS) or topic in known:
             continue
-        for message in _living(namespace, PIPES, KIND, topic).values():
+        for message in _living(namespace, PIPES, KIND, topic=topic).values():
             found[topic] = PublishedTopic(topic, message)
     return list(found.values())
 
@@ -74,7 +74,7 @@ def declared_topics(namespace: Namespace, known: Container[str] = ()) -> list[Pu
     for topic in namespace.present(EARS):
         if topic in known:
             continue
-        for content in _contents(namespace, EARS, EAR, topic).values():
+        for content in _contents(namespace, EARS, EAR, topic=topic).values():
             if content.get("declared"):
                 found[topic] = PublishedTopic(topic, content["message"])
     return list(found.values())
@@ -103,7 +103,7 @@ class Survey:
 
     def _open(self, folder: str, kind: str) -> Opened:
         namespace = self._namespace
-        return {topic: _opened(namespace, folder, kind, topic) for topic in namespace.present(folder)}
+        return {topic: _opened(namespace, folder, kind, topic=topic) for topic in namespace.present(folder)}
 
 
 def services(namespace: Namespace, known: Container[str] = ()) -> list[AvailableService]:
@@ -118,18 +118,20 @@ def services(namespace: Namespace, known: Container[str] = ()) -> list[Available
         segment = None if name in known else offered(namespace, name)
         if segment is not None:
             interface, request, reply = json.loads(segment.layout)
-            found.append(AvailableService(name, interface, _dataclass("Request", request), _dataclass("Reply", reply)))
+            found.append(
+                AvailableService(name, interface, _dataclass("Request", request), reply=_dataclass("Reply", reply))
+            )
     return found
 
 
 def _living(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, str]:
     """Read the message of each segment of a topic with a living owner, by its name."""
-    return {name: content["message"] for name, content in _contents(namespace, folder, kind, topic).items()}
+    return {name: content["message"] for name, content in _contents(namespace, folder, kind, topic=topic).items()}
 
 
 def _contents(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, dict[str, Any]]:
     """Read the content of each segment of a topic with a living owner, by its name."""
-    return {name: json.loads(segment.layout) for name, segment in _opened(namespace, folder, kind, topic).items()}
+    return {name: json.loads(segment.layout) for name, segment in _opened(namespace, folder, kind, topic=topic).items()}
 
 
 def _beside(node: str, opened: Opened) -> dict[str, str]:

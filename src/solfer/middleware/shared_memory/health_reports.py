@@ -79,7 +79,7 @@ class Reports:
     def _open(self, name: str) -> _Page | None:
         try:
             path = self._namespace.place(REPORTS, name)
-            page = _Page(Segment.create(path, KIND, name.encode(), Slot.size(Text.width(SIZE))))
+            page = _Page(Segment.create(path, KIND, name.encode(), size=Slot.size(Text.width(SIZE))))
         except MiddlewareError as error:
             logger.warning("the health of '%s' is not reported: %s", name, error)
             return None

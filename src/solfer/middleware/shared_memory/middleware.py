@@ -145,15 +145,15 @@ class XbotMiddleware(Middleware):
         if key in self._provided:
             self._provided[key] = self._provided[key].recreate(content, 0)
         else:
-            self._provided[key] = Segment.create(self.namespace.place(PARAMETERS, name), PARAMETER, content, 0)
+            self._provided[key] = Segment.create(self.namespace.place(PARAMETERS, name), PARAMETER, content, size=0)
 
     def reader(self, topic: str, message: str, kept: int = 0) -> XbotReader:
         """See `Middleware.reader`; of a sender no more are kept than `DEPTH`."""
-        return self._keep(XbotReader(self.namespace, topic, message, self._clock.now, kept), message)
+        return self._keep(XbotReader(self.namespace, topic, message, now=self._clock.now, kept=kept), message)
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> XbotQueue:
         """See `Middleware.queue`; memory that is shared bounds its messages itself."""
-        return self._keep(XbotQueue(self.namespace, topic, message, size), message)
+        return self._keep(XbotQueue(self.namespace, topic, message, size=size), message)
 
     def declared_queue(self, topic: str, message: str) -> XbotQueue:
         """See `Middleware.declared_queue`; a bridge forwards what is published outside."""
@@ -171,11 +171,15 @@ class XbotMiddleware(Middleware):
         Raises:
             MiddlewareError: Another node of this name writes there, or the topic carries another message.
         """
-        return self._keep(XbotWriter(self.namespace, topic, message, self.name, self._clock.now, self._number(topic)))
+        return self._keep(
+            XbotWriter(
+                self.namespace, topic, message, sender=self.name, now=self._clock.now, number=self._number(topic)
+            )
+        )
 
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
         """See `Middleware._first_order`."""
-        reader = XbotReader(self.namespace, topic, message, self.now)
+        reader = XbotReader(self.namespace, topic, message, now=self.now)
         end = self.now() + timeout
         while not reader.read():
             if self.now() >= end or not self.running():
@@ -185,7 +189,7 @@ class XbotMiddleware(Middleware):
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`."""
-        answer = self.request(name, interface, request, reply, timeout)
+        answer = self.request(name, interface, request, reply=reply, timeout=timeout)
         while not answer.done():
             if not self.running():
                 raise MiddlewareError(
@@ -206,7 +210,9 @@ class XbotMiddleware(Middleware):
         """
         self._busy = True
         for service in services:
-            self._offers.append(ServiceServer(self.namespace, owner, service, submit, self.now, self._worker))
+            self._offers.append(
+                ServiceServer(self.namespace, owner, service, submit=submit, now=self.now, worker=self._worker)
+            )
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the answer is there at once: all segments of pipes are read."""

@@ -24,7 +24,7 @@ class SimulatedTime:
     """
 
     def __init__(self, folder: Path):
-        self._segment = latched(folder / FILE, KIND, LAYOUT, 16)
+        self._segment = latched(folder / FILE, KIND, LAYOUT, size=16)
         self.words = self._segment.data[:16].cast("q")
 
     @property

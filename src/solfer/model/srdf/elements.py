@@ -64,7 +64,7 @@ class Findings:
 
 def read_groups(robot: Element, models: Models, where: str, findings: Findings) -> dict[str, Group]:
     """Read all groups in the order of the file."""
-    reader = _GroupReader(robot, models, where, findings)
+    reader = _GroupReader(robot, models, where, findings=findings)
     return {name: reader.group(name) for name in reader.elements}
 
 
@@ -89,7 +89,7 @@ def read_states(robot: Element, models: Models, where: str, findings: Findings) 
         values = found[name][group] = {}
         for joint in element.findall("joint"):
             if joint.get("name") not in virtual:
-                _read_value(joint, models, values, place, findings)
+                _read_value(joint, models, values, place=place, findings=findings)
     states: dict[str, dict[str, float]] = {}
     for name, by_group in found.items():
         states[name] = {joint: value for values in reversed(by_group.values()) for joint, value in values.items()}
@@ -201,7 +201,7 @@ class _GroupReader:
             expected = "<joint>, <link>, <chain> or <group>"
             self._findings.left_out.append(ModelError(what, where=self._place(group), expected=expected))
         elif name not in self.elements:
-            self._unknown("group", name, self.elements, group)
+            self._unknown("group", name, self.elements, group=group)
         else:
             nested = self.group(name, (*above, group))
             yield from ((joint, None) for joint in nested.joints)
@@ -228,7 +228,7 @@ class _GroupReader:
             if name in (model.links if kind == "link" else model.joints):
                 return model
         robot = self._models[0]
-        self._unknown(kind, name, robot.links if kind == "link" else robot.joints, group)
+        self._unknown(kind, name, robot.links if kind == "link" else robot.joints, group=group)
         return None
 
     def _fault(self, what: str, group: str, expected: str = "") -> None:

@@ -59,7 +59,7 @@ class Semantics:
         Raises:
             ModelError: The file cannot be read, or see `from_text`.
         """
-        return cls.from_text(read_text(path, "SRDF"), description, str(path), others)
+        return cls.from_text(read_text(path, "SRDF"), description, str(path), others=others)
 
     @classmethod
     def from_text(
@@ -82,13 +82,13 @@ class Semantics:
         text, element = parse_robot(text, where, "SRDF")
         models = (description, *others)
         findings = Findings()
-        groups = read_groups(element, models, where, findings)
-        states = read_states(element, models, where, findings)
+        groups = read_groups(element, models, where, findings=findings)
+        states = read_states(element, models, where, findings=findings)
         own = any(states.values()) or any(group.links or group.joints for group in groups.values())
         raise_all(findings.faults if own else findings.faults + findings.left_out)
         note_unknown_elements(element, where, findings)
         _warn(findings.left_out, where)
-        return cls(groups, states, read_apart(element, description.links), text)
+        return cls(groups, states, read_apart(element, description.links), text=text)
 
     def __repr__(self) -> str:
         return f"Semantics({len(self.groups)} groups, {len(self.states)} states)"

@@ -38,8 +38,8 @@ class Description:
         self.where = where
         if not self.name:
             faults.append(ModelError("the robot has no name", where=where, expected='<robot name="...">'))
-        self.links: dict[str, LinkInfo] = _read_all(element, "link", read_link, where, faults)
-        self.joints: dict[str, JointInfo] = _read_all(element, "joint", read_joint, where, faults)
+        self.links: dict[str, LinkInfo] = _read_all(element, "link", read_link, where=where, faults=faults)
+        self.joints: dict[str, JointInfo] = _read_all(element, "joint", read_joint, where=where, faults=faults)
         if element.find("link") is None:
             faults.append(ModelError("the robot has no link", where=where, expected="at least one <link>"))
         wrong = list(self._wrong_links())
@@ -242,7 +242,7 @@ def _read_all(
     found: dict[str, Any] = {}
     for count, element in enumerate(robot.findall(tag), start=1):
         name = element.get("name")
-        reader = ElementReader(element, where, f"{tag} '{name}'" if name else tag, faults)
+        reader = ElementReader(element, where, f"{tag} '{name}'" if name else tag, faults=faults)
         if not name:
             faults.append(
                 ModelError(f"<{tag}> number {count} has no name", where=reader.where(), expected=f'<{tag} name="...">')

@@ -136,7 +136,7 @@ class ElementReader:
 
     def inside(self, element: Element) -> "ElementReader":
         """Return a reader of a child."""
-        return ElementReader(element, self._file, f"{self._name}: {element.tag}", self.faults)
+        return ElementReader(element, self._file, f"{self._name}: {element.tag}", faults=self.faults)
 
     def fault(self, what: str, expected: str = "", at: Element | None = None) -> None:
         """Note a fault of this element, or of another one inside of it."""
@@ -210,10 +210,10 @@ def read_link(reader: ElementReader) -> LinkInfo:
         element.get("name"),
         mass,
         inside.numbers(origin, "xyz", (0.0,) * 3),
-        tuple(inside.numbers(tensor, entry, None)[0] for entry in _INERTIA),
-        inside.numbers(origin, "rpy", (0.0,) * 3),
-        visuals,
-        collisions,
+        inertia=tuple(inside.numbers(tensor, entry, None)[0] for entry in _INERTIA),
+        inertia_rpy=inside.numbers(origin, "rpy", (0.0,) * 3),
+        visuals=visuals,
+        collisions=collisions,
         where=reader.where(),
     )
 
@@ -270,10 +270,10 @@ def read_joint(reader: ElementReader) -> JointInfo:
         element.get("name"),
         kind,
         parent,
-        child,
-        reader.numbers(origin, "xyz", (0.0,) * 3),
-        reader.numbers(origin, "rpy", (0.0,) * 3),
-        tuple(value / (length or 1.0) for value in axis),
+        child=child,
+        xyz=reader.numbers(origin, "xyz", (0.0,) * 3),
+        rpy=reader.numbers(origin, "rpy", (0.0,) * 3),
+        axis=tuple(value / (length or 1.0) for value in axis),
         mimic=mimic,
         where=reader.where(),
         **limits,

@@ -44,11 +44,11 @@ def scalar_joints(description: Description, floating_base: bool | None = None) -
             element.set("type", "fixed")
         else:
             robot.remove(element)
-            _add_base(robot, description, floating.parent, floating.child, element.find("origin"))
+            _add_base(robot, description, floating.parent, child=floating.child, origin=element.find("origin"))
     elif floating_base:
         world = _free_name("world", description)
         SubElement(robot, "link", name=world)
-        _add_base(robot, description, world, description.root, None)
+        _add_base(robot, description, world, child=description.root, origin=None)
     return ElementTree.tostring(robot, encoding="unicode")
 
 

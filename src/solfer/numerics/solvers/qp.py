@@ -58,12 +58,12 @@ class Problem:
             np.zeros((size, size)),
             np.zeros(size),
             np.zeros((equalities, size)),
-            np.zeros(equalities),
-            np.zeros((inequalities, size)),
-            np.full(inequalities, -np.inf),
-            np.full(inequalities, np.inf),
-            np.full(size, -np.inf),
-            np.full(size, np.inf),
+            equality_vector=np.zeros(equalities),
+            inequality_matrix=np.zeros((inequalities, size)),
+            lower=np.full(inequalities, -np.inf),
+            upper=np.full(inequalities, np.inf),
+            least=np.full(size, -np.inf),
+            largest=np.full(size, np.inf),
         )
 
     def copy(self) -> "Problem":
@@ -144,7 +144,9 @@ class QpSolver:
         x = np.zeros(len(problem.gradient))
         outcome, steps, residual = self._method.solve(problem, x)
         status = _STATUS[outcome]
-        return Solution(status, x, steps, problem if status is QpStatus.SOLVED else problem.copy(), residual)
+        return Solution(
+            status, x, steps, problem=problem if status is QpStatus.SOLVED else problem.copy(), residual=residual
+        )
 
 
 _STATUS = {

@@ -22,7 +22,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
     message = message_of(record, READINGS, "rigid body")
     reading = READINGS[message]
     _check_orientation(record, convention, reading)
-    _check_carried(record, convention, reading, fields)
+    _check_carried(record, convention, reading, fields=fields)
     if record.calibrate and "position" not in fields:
         raise PipeError(
             f"pipe '{record.name}' is calibrated by the pose that it does not carry",
@@ -34,16 +34,16 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
         record.name,
         context.middleware.reader(record.source, message, record.history or 0),
         state,
-        robot.kinematics.base,
-        _mount(record, context, link),
-        reading(_body_name(record, link), convention, turns(record.output_angles)),
-        fields,
-        convention.position.type == "FULL",
-        record.initialize,
-        context.low_pass(record),
-        record.calibrate,
-        record.function != "reference",
-        record.history or 0,
+        chart=robot.kinematics.base,
+        mount=_mount(record, context, link),
+        reading=reading(_body_name(record, link), convention, turns(record.output_angles)),
+        fields=fields,
+        located=convention.position.type == "FULL",
+        required=record.initialize,
+        low_pass=context.low_pass(record),
+        calibrated=record.calibrate,
+        measured=record.function != "reference",
+        history=record.history or 0,
     )
 
 
@@ -78,12 +78,12 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
         record.name,
         context.writer(record.sink, message),
         message,
-        Kinematics(robot.description, robot.kinematics.base is not None),
-        state,
-        link,
-        convention,
-        record.frame_id,
-        (state[POSE_COVARIANCE], state[TWIST_COVARIANCE]) if known else None,
+        kinematics=Kinematics(robot.description, robot.kinematics.base is not None),
+        state=state,
+        link=link,
+        convention=convention,
+        frame=record.frame_id,
+        covariances=(state[POSE_COVARIANCE], state[TWIST_COVARIANCE]) if known else None,
     )
 
 
@@ -143,8 +143,8 @@ def _mount(record: FeedbackRecord, context: PipeContext, link: str) -> SensorMou
             context.robot.description,
             link,
             context.state(record.function or "state"),
-            position.vector() if position else None,
-            rotation.matrix() if rotation else None,
+            position=position.vector() if position else None,
+            rotation=rotation.matrix() if rotation else None,
         )
     except SolferError as error:
         raise error.at(record.where("sensor") if record.reads_sensor else record.dofs.where("name")) from None

@@ -66,7 +66,17 @@ class BodyFeedbackPipe(StateFeedbackPipe):
     ):
         used = slice(0 if located else 3, 6)
         dofs = BASE[used]
-        super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
+        super().__init__(
+            name,
+            reader,
+            state,
+            fields=fields,
+            dofs=dofs,
+            required=required,
+            low_pass=low_pass,
+            measured=measured,
+            history=history,
+        )
         # imported here: its compiler takes a while to load
         from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
 

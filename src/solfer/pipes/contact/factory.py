@@ -16,11 +16,11 @@ def feedback(record: ContactFeedbackRecord, context: PipeContext) -> ContactFeed
         record.name,
         context.middleware.reader(record.source, _message(record)),
         context.robot,
-        contacts,
-        record.interface == "fixed",
-        names,
-        record.initialize,
-        known,
+        contacts=contacts,
+        fixed=record.interface == "fixed",
+        names=names,
+        required=record.initialize,
+        known=known,
     )
 
 
@@ -28,7 +28,9 @@ def controller(record: ContactControllerRecord, context: PipeContext) -> Contact
     """Make a pipe from the wrenches of the Robot's contacts to a topic; see `factory.controller`."""
     contacts, names = _contacts(record, context)
     writer = context.writer(record.sink, _message(record))
-    return ContactCommandPipe(record.name, writer, context.robot, contacts, record.interface == "fixed", names)
+    return ContactCommandPipe(
+        record.name, writer, context.robot, contacts=contacts, fixed=record.interface == "fixed", names=names
+    )
 
 
 def _message(record: ContactFeedbackRecord | ContactControllerRecord) -> str:

@@ -55,12 +55,12 @@ class _Wrenches:
         self._bring_up_to_date()
         if self._turned is not self._published:
             np.matmul(self._published.reshape(2, 3), self._rotation().T, out=self._turned.reshape(2, 3))
-        self._move(self._turned, self.all, -1.0, self._memory, self._members, places)
+        self._move(self._turned, self.all, -1.0, out=self._memory, put=self._members, places=places)
 
     def read(self) -> None:
         """Write the wrenches of all contacts to the message."""
         self._bring_up_to_date()
-        self._move(self._memory, self._members, 1.0, self._turned, self.all, self.all)
+        self._move(self._memory, self._members, 1.0, out=self._turned, put=self.all, places=self.all)
         if self._turned is not self._published:
             np.matmul(self._turned.reshape(2, 3), self._rotation(), out=self._published.reshape(2, 3))
 
@@ -119,9 +119,9 @@ class ContactFeedbackPipe(PointFeedbackPipe):
         known: Collection[str] | None = (),
     ):
         port = Port("wrench", None if names is None else len(contacts))
-        super().__init__(name, reader, port, _frame(contacts, fixed), names, required, known)
+        super().__init__(name, reader, port, frame=_frame(contacts, fixed), names=names, required=required, known=known)
         rows = port.value.reshape(-1, 6)
-        self._robots = _Wrenches(robot, contacts, fixed, rows)
+        self._robots = _Wrenches(robot, contacts, fixed, published=rows)
         self._brought = self._robots.all
         self.frame = _frame(contacts, fixed)
         self.wrenches = dict(zip(names or ("value",), rows, strict=True))
@@ -166,8 +166,8 @@ class ContactCommandPipe(PointCommandPipe):
         names: tuple[str, ...] | None = None,
     ):
         port = Port("wrench", None if names is None else len(contacts))
-        super().__init__(name, writer, port, _frame(contacts, fixed), names)
-        self._robots = _Wrenches(robot, contacts, fixed, port.value.reshape(-1, 6))
+        super().__init__(name, writer, port, frame=_frame(contacts, fixed), names=names)
+        self._robots = _Wrenches(robot, contacts, fixed, published=port.value.reshape(-1, 6))
 
     def collect(self) -> None:
         """See `CommandPipe.collect`."""

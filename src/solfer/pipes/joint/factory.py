@@ -32,23 +32,23 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
             f"feedback '{record.name}' has no function", where=record.where(), expected="function: state | reference"
         )
     fields, message = _carried(record)
-    mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, record.name)
+    mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, pipe=record.name)
     dofs = np.array(mapping.robot_indices)
     return JointFeedbackPipe(
         record.name,
         context.middleware.reader(record.source, message, record.history or 0),
         mapping,
-        _state(record, context, fields),
-        fields,
-        record.initialize,
-        _calibration(record, context, mapping),
-        context.low_pass(record),
-        _known(record, context),
-        record.function != "reference",
-        _start_limits(record, context, mapping, fields),
-        record.history or 0,
-        JointLeaps(context.robot, dofs) if record.function != "reference" else None,
-        _turns(record, context, dofs),
+        state=_state(record, context, fields),
+        fields=fields,
+        required=record.initialize,
+        calibration=_calibration(record, context, mapping),
+        low_pass=context.low_pass(record),
+        known=_known(record, context),
+        measured=record.function != "reference",
+        limits=_start_limits(record, context, mapping, fields=fields),
+        history=record.history or 0,
+        leaps=JointLeaps(context.robot, dofs) if record.function != "reference" else None,
+        turns=_turns(record, context, dofs),
     )
 
 
@@ -56,7 +56,7 @@ def _turns(record: FeedbackRecord, context: PipeContext, dofs: np.ndarray) -> Jo
     """Make what counts the turns of a pipe's continuous joints; None: it has none of them."""
     if not context.robot.turns[dofs].any():
         return None
-    return JointTurns(context.robot, dofs, record.function or "state", record.calibration is not None)
+    return JointTurns(context.robot, dofs, record.function or "state", is_calibrated=record.calibration is not None)
 
 
 def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPipe:
@@ -77,7 +77,7 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         _check_commanded(record, fields)
         if name in LOWER_LEVEL_MAPS:
             name = controller_map(record.leads_to)  # a controller accepts its own joints only
-    mapping = joint_map(record.dofs, name, context.robot, record.name)
+    mapping = joint_map(record.dofs, name, context.robot, pipe=record.name)
     state = _state(record, context, fields)
     standing = _published_gains(record, context, mapping) if record.lower_level else {}
     for gain, published in standing.items():
@@ -86,14 +86,14 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         record.name,
         writer(topic, message),
         mapping,
-        state,
-        fields,
-        _calibration(record, context, mapping),
-        context.low_pass(record),
-        context.component,
-        standing,
-        record.leads_to,
-        (context.robot.turns, context.robot.added_turns),
+        state=state,
+        fields=fields,
+        calibration=_calibration(record, context, mapping),
+        low_pass=context.low_pass(record),
+        component=context.component,
+        standing=standing,
+        controller=record.leads_to,
+        turns=(context.robot.turns, context.robot.added_turns),
     )
 
 
@@ -171,7 +171,7 @@ def _start_limits(
 ) -> StartLimits | None:
     if record.limits is None:
         return None
-    return StartLimits(record.name, record.limits, context.robot, mapping.robot_indices, fields)
+    return StartLimits(record.name, record.limits, context.robot, dofs=mapping.robot_indices, fields=fields)
 
 
 def _known(record: FeedbackRecord, context: PipeContext) -> set[str] | None:

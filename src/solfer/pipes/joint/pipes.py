@@ -69,7 +69,17 @@ class JointFeedbackPipe(StateFeedbackPipe):
     ):
         dofs = np.array(mapping.robot_indices)
         required = required or limits is not None
-        super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
+        super().__init__(
+            name,
+            reader,
+            state,
+            fields=fields,
+            dofs=dofs,
+            required=required,
+            low_pass=low_pass,
+            measured=measured,
+            history=history,
+        )
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import gather
 

@@ -51,7 +51,9 @@ class StartLimits:
             wrong = np.flatnonzero((values < lower - tolerance) | (values > upper + tolerance))
             if len(wrong):
                 worst = wrong[0]
-                raise self._error(field, worst, values[worst], lower[worst], upper[worst], tolerance[worst])
+                raise self._error(
+                    field, worst, values[worst], lower=lower[worst], upper=upper[worst], tolerance=tolerance[worst]
+                )
 
     def _interval(self, robot: Robot, field: str) -> tuple[np.ndarray, np.ndarray]:
         interface = interface_of(field)

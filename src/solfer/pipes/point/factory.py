@@ -12,20 +12,20 @@ from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
 
 def feedback(record: PointFeedbackRecord, context: PipeContext) -> PointFeedbackPipe:
     """Make a pipe from a topic to an input of the component; see `factory.feedback`."""
-    port = _port(record, context, "input", context.inputs)
+    port = _port(record, context, "input", ports=context.inputs)
     reader = context.middleware.reader(record.source, _message(record))
     notation = None if record.convention is None else PointNotation(record.convention, record.output_angles)
     return PointFeedbackPipe(
-        record.name, reader, port, record.frame, record.names, record.initialize, notation=notation
+        record.name, reader, port, frame=record.frame, names=record.names, required=record.initialize, notation=notation
     )
 
 
 def controller(record: PointControllerRecord, context: PipeContext) -> PointCommandPipe:
     """Make a pipe from an output of the component to a topic; see `factory.controller`."""
-    port = _port(record, context, "output", context.outputs)
+    port = _port(record, context, "output", ports=context.outputs)
     writer = context.writer(record.sink, _message(record))
     notation = None if record.convention is None else PointNotation(record.convention)
-    return PointCommandPipe(record.name, writer, port, record.frame, record.names, notation)
+    return PointCommandPipe(record.name, writer, port, frame=record.frame, names=record.names, notation=notation)
 
 
 def _message(record: PointFeedbackRecord | PointControllerRecord) -> str:

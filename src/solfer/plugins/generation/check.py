@@ -79,10 +79,12 @@ def check_file(
     sinks = sinks_of((*(part.configuration for part in report.parts.values()), *listed))
     with importable_beside(os.fspath(file)):
         absent = [
-            part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin, sinks)
+            part
+            for part in report.parts.values()
+            if not _check_module(part, report, registry, robot=robot, plugin=plugin, sinks=sinks)
         ]
         for group in report.shared.values():
-            check_together(group.plugins, report, registry, robot)
+            check_together(group.plugins, report, registry, robot=robot)
     if middleware is None and layer is None:
         note_runners(report, registry.configuration)
     if absent:
@@ -150,10 +152,10 @@ def check_together(
     files = {each.name: _files(each.configuration, found, robot) for each in listed}
     known = {name: each for name, each in files.items() if each is not None}
     if listed and len(known) == len(listed):
-        generators = [_generator_of(each, registry, report.problems, found) for each in listed]
+        generators = [_generator_of(each, registry, report.problems, found=found) for each in listed]
         whole = not report.errors and not found
-        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole, start)
-        _put(errors, listed[0], report.problems, found)
+        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole=whole, start=start)
+        _put(errors, listed[0], report.problems, found=found)
     report.problems.absorb(found)
 
 
@@ -163,7 +165,7 @@ def _generator_of(listed: SharedPlugin, registry: Registry, before: Problems, fo
         return find_generator(listed, registry)
     except SolferError as error:
         if listed.configuration.module.class_ is not None:
-            _put([error], listed, before, found)
+            _put([error], listed, before, found=found)
         return UnknownComponent
 
 
@@ -195,28 +197,28 @@ def _check_module(
     configuration = part.configuration
     found = Problems()
     whole = configuration.name in report.configurations
-    generator = _generator(part, report, registry, plugin, found)
+    generator = _generator(part, report, registry, plugin=plugin, problems=found)
     record = None if generator is None else generator.component.Tags
-    tags = None if record is None else _read_tags(configuration, record, report.problems, found)
+    tags = None if record is None else _read_tags(configuration, record, report.problems, found=found)
     if generator is not None and record is None and generator.known:
         for _, tag in own_tags(part.module).items():
             found.warn(tag.head, "has no effect: the component has no tags of its own")
     files = _files(configuration, found, robot)
     if files is not None:
         names = files.names()
-        check_names(configuration, names, found, tags, part.dofs)
+        check_names(configuration, names, found, tags=tags, dofs=part.dofs)
         check_calibrations(configuration.calibrations.values(), names, found)
         used = {pipe.calibration for pipe in (*configuration.feedbacks, *configuration.controllers)}
         calibrations = [record for name, record in configuration.calibrations.items() if name in used]
         check_plausibility(files, (tags, *calibrations), found)
     check_contacts(configuration, found)
-    check_sources(configuration, files, sinks, found)
+    check_sources(configuration, files, sinks, problems=found)
     if files is None:
         _check_actuators(configuration, found)
     else:
         _check_sinks(configuration, files, found)
-        errors = dry_run(part, generator or UnknownComponent, files, whole and not found)
-        _note(errors, part, report.problems, found)
+        errors = dry_run(part, generator or UnknownComponent, files, whole=whole and not found)
+        _note(errors, part, report.problems, found=found)
     report.problems.absorb(found)
     return generator is not None
 

@@ -30,8 +30,8 @@ def configuration_service(configuration: Configuration) -> Service:
     """Make the service `<plugin>/get_config`. The texts are made here, so that no cycle waits for them."""
     texts = {origins: configuration.text(origins) for origins in (True, False)}
     return Service(
-        "get_config", "solfer/GetConfig", GetConfig, ConfigReply,
-        lambda request: ConfigReply(yaml=texts[bool(request.origins)]),
+        "get_config", "solfer/GetConfig", GetConfig, reply=ConfigReply,
+        handler=lambda request: ConfigReply(yaml=texts[bool(request.origins)]),
     )  # fmt: skip
 
 

@@ -120,20 +120,20 @@ class Generator:
             component,
             robot,
             watches,
-            outputs,
-            self.inbox,
-            configuration.rate,
-            self.middleware,
-            claim,
-            peers,
-            configuration.module.stall,
-            configuration.module.overload,
-            self._jumps(robot, component),
-            self._guard(robot),
-            self.publish,
-            lambda: documents_of(configuration, robot, self.middleware),
-            self.requests,
-            self.tuning,
+            outputs=outputs,
+            inbox=self.inbox,
+            rate=configuration.rate,
+            middleware=self.middleware,
+            claim=claim,
+            peers=peers,
+            stall=configuration.module.stall,
+            limits=configuration.module.overload,
+            jumps=self._jumps(robot, component),
+            guard=self._guard(robot),
+            publish=self.publish,
+            documents=lambda: documents_of(configuration, robot, self.middleware),
+            requests=self.requests,
+            tuning=self.tuning,
         )
 
     def _jumps(self, robot: Robot, component: Component) -> BaseJumps | None:
@@ -151,7 +151,7 @@ class Generator:
         """Build the Robot that the configuration describes."""
         if self._shared is None:
             return build(self.configuration, self.middleware, faults=self.faults)
-        robot = build(self.configuration, self.middleware, self._shared.first, self.faults)
+        robot = build(self.configuration, self.middleware, self._shared.first, faults=self.faults)
         self._shared.join(robot)
         return robot
 
@@ -195,12 +195,12 @@ class Generator:
             robot,
             self.middleware,
             configuration.calibrations,
-            configuration.rate,
-            component.inputs if component else {},
-            component.outputs if component else {},
-            module.silent,
-            module.mode == "idle",
-            module.name,
+            rate=configuration.rate,
+            inputs=component.inputs if component else {},
+            outputs=component.outputs if component else {},
+            silent=module.silent,
+            idle=module.mode == "idle",
+            component=module.name,
         )
         for feedback in self._records(robot):
             if component is None and feedback.content.port:
@@ -222,7 +222,9 @@ class Generator:
                 continue
             gate = None
             if record.lower_level and self._drives(robot, cast(JointCommandPipe, pipe)):
-                gate = CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
+                gate = CommandGate(
+                    module.name, cast(JointCommandPipe, pipe), robot.lower_limits, upper=robot.upper_limits
+                )
             controllers.append((pipe, gate))
         feedbacks = [watch.feedback for watch in watches]
         if whole:
@@ -270,16 +272,16 @@ class Generator:
         blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, *known)
         period = 1.0 / self.configuration.rate
         if module.mode == "idle":
-            return Outputs(controllers, blend, robot, period, idle=True)
+            return Outputs(controllers, blend, robot, period=period, idle=True)
         commanding = [record for record in self.configuration.controllers if record.lower_level]
         requests = tuple(requests_of(commanding, self.configuration.sources.controller))
         return Outputs(
             controllers,
             blend,
             robot,
-            period,
+            period=period,
             requests=StartRequests(module.name, self.middleware, requests),
-            following=JointFollowing(module.name, pipes, robot, measured),
+            following=JointFollowing(module.name, pipes, robot, measured=measured),
         )
 
     def make_claim(self, robot: Robot, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> JointClaim:
@@ -292,9 +294,9 @@ class Generator:
             self.configuration.module.name,
             outputs.commanding,
             self.middleware,
-            follows,
-            publishes,
-            lambda: np.where(measured, robot.state.position, np.nan),
+            follows=follows,
+            publishes=publishes,
+            position=lambda: np.where(measured, robot.state.position, np.nan),
         )
 
     def _measured(self, robot: Robot, interface: str) -> np.ndarray:
@@ -302,7 +304,7 @@ class Generator:
         measured = np.zeros(robot.size, dtype=bool)
         for record in self.configuration.feedbacks:
             if record.measures_joints and getattr(record.interface, interface):
-                measured[joint_map(record.dofs, record.dofs.mapping, robot, record.name).robot_indices] = True
+                measured[joint_map(record.dofs, record.dofs.mapping, robot, pipe=record.name).robot_indices] = True
         return measured
 
     def _records(self, robot: Robot) -> tuple[FeedbackRecord, ...]:
@@ -401,7 +403,7 @@ class Generator:
         """Bind what the component declares to the middleware: services, topics, actions and parameters, live or not."""
         component.clock = self.middleware.stamp_time
         declared = tuple(self.requests.noted(each) for each in self.declarations(component))
-        self.publish = bind(component.name, declared, self.middleware, self.inbox)
+        self.publish = bind(component.name, declared, self.middleware, inbox=self.inbox)
         tuning = self._asked(lambda: Tuning(component, component.live_parameters()), "list its live parameters")
         self.tuning = tuning
         setting = cast(Service, self.requests.noted(tuning.setting()))

@@ -65,10 +65,10 @@ def check_layer(
                 rate=layer.executor.rate,
                 shared=entry.shared,
             )
-            usable += _add(report, found, entry, registry)
-    check_group(usable, names, "the RT layer", report.problems)
+            usable += _add(report, found, entry, registry=registry)
+    check_group(usable, names, "the RT layer", problems=report.problems)
     with importable_beside(os.fspath(layer.file)):
-        check_together(usable, report, registry, robot, layer.start)
+        check_together(usable, report, registry, robot=robot, start=layer.start)
     return report
 
 

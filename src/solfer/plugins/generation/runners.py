@@ -148,7 +148,7 @@ def _layers_of(configuration: Configuration, default: Naming) -> Iterator[str]:
     """Yield the files of RT layers beside a main configuration that list a configuration of it."""
     main = Path(configuration.file)
     for path in sorted(main.parent.glob("*.yaml")):
-        if path.is_file() and is_layer(path) and _lists(path, main, configuration.name, default):
+        if path.is_file() and is_layer(path) and _lists(path, main, configuration.name, default=default):
             yield os.fspath(path)
 
 

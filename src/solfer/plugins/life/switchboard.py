@@ -76,11 +76,11 @@ class Switchboard:
                     "switch",
                     SWITCH,
                     SwitchRequest,
-                    Answer,
-                    answered(self.commit),
+                    reply=Answer,
+                    handler=answered(self.commit),
                     prepare=lambda request: self.plan(request.start, request.stop),
                 ),
-                Service("get_plugin_list", TRIGGER, NoFields, Answer, self._list),
+                Service("get_plugin_list", TRIGGER, NoFields, reply=Answer, handler=self._list),
             ],
             submit,
         )
@@ -89,8 +89,8 @@ class Switchboard:
                 name,
                 [
                     self._switch_one("switch", plugin),
-                    Service("state", TRIGGER, NoFields, Answer, partial(_tell, plugin)),
-                    Service("abort", TRIGGER, NoFields, Answer, answered(partial(_abort, plugin))),
+                    Service("state", TRIGGER, NoFields, reply=Answer, handler=partial(_tell, plugin)),
+                    Service("abort", TRIGGER, NoFields, reply=Answer, handler=answered(partial(_abort, plugin))),
                 ],
                 submit,
             )
@@ -99,7 +99,7 @@ class Switchboard:
         def prepare(request: Flag) -> Switch:
             return self.plan(start=[plugin.name]) if request.data else self.plan(stop=[plugin.name])
 
-        return Service(name, SWITCH_ONE, Flag, Answer, answered(self.commit), prepare=prepare)
+        return Service(name, SWITCH_ONE, Flag, reply=Answer, handler=answered(self.commit), prepare=prepare)
 
     def _list(self, _: NoFields) -> Answer:
         return Answer(message="\n".join(f"{name}: {plugin.told}" for name, plugin in self._plugins.items()))

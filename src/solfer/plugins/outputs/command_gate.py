@@ -44,7 +44,7 @@ class CommandGate:
         self.kinds = (NOT_FINITE, *(field for field, _ in pipe.fields))
         self._counts = memoryview(bytearray(8 * len(self.kinds))).cast("q")
         self._throttle = Throttle(logging.getLogger(__name__))
-        bounds = [_bounds(field, pipe.dofs, lower, upper) for field, _ in pipe.fields]
+        bounds = [_bounds(field, pipe.dofs, lower, upper=upper) for field, _ in pipe.fields]
         self._checks = [
             (field, values, *bound, np.zeros_like(values), np.zeros(len(values), dtype=bool))
             for (field, values), bound in zip(pipe.fields, bounds, strict=True)
@@ -76,7 +76,7 @@ class CommandGate:
             np.maximum(values, lower, out=held)
             np.minimum(held, upper, out=held)
             if held.tobytes() != values.tobytes():
-                self._limit(field, values, held, flags)
+                self._limit(field, values, held, outside=flags)
 
     def _refuse(self, field: str, finite: np.ndarray) -> None:
         self._counts[0] += int(len(finite) - finite.sum())

@@ -143,7 +143,7 @@ class _Limited(_Field):
     """A field that begins within its limits."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
-        super().__init__(name, values, pipe, robot, known)
+        super().__init__(name, values, pipe, robot=robot, known=known)
         dofs = pipe.dofs
         interface = interface_of(name)
         self._lower = robot.lower_limits[interface][dofs]
@@ -158,7 +158,7 @@ class _Positions(_Limited):
     """Positions; one that is not measured begins as it is commanded."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
-        super().__init__(name, values, pipe, robot, known)
+        super().__init__(name, values, pipe, robot=robot, known=known)
         speed = SHARE * robot.upper_limits.velocity[pipe.dofs]
         self._pace = np.divide(PEAK, speed, out=np.zeros(len(speed)), where=speed > 0.0)
 
@@ -177,7 +177,7 @@ class _Efforts(_Limited):
     """Efforts, which take over what springs carry; where nobody commands any, or they are not measured, zero."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
-        super().__init__(name, values, pipe, robot, known)
+        super().__init__(name, values, pipe, robot=robot, known=known)
         self._measured = robot.state[interface_of(name)]
 
     def begin(self, position: np.ndarray) -> None:
@@ -194,7 +194,7 @@ class _Gains(_Field):
     """Stiffness or damping, which begin where the lower level has them without a command."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
-        super().__init__(name, values, pipe, robot, known)
+        super().__init__(name, values, pipe, robot=robot, known=known)
         self._standing = pipe.standing.get(name, self._values)
 
     def begin(self, position: np.ndarray) -> None:

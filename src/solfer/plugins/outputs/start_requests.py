@@ -83,11 +83,11 @@ def requests_of(records: Sequence[ControllerRecord], gains: TextRecord | None) -
     for record in records:
         if record.ff_service is not None:
             what = "switch feed-forward torques on"
-            yield StartRequest(_service(record, record.ff_service), SWITCH_FEED_FORWARD, Flag(True), what)
+            yield StartRequest(_service(record, record.ff_service), SWITCH_FEED_FORWARD, Flag(True), what=what)
         if given is not None and (record.load_service is not None or record.has_springs):
             request = FileRequest(str(given.location))
             what = f"load {given.location}"
-            yield StartRequest(_service(record, record.load_service or LOAD), LOAD_GAINS, request, what)
+            yield StartRequest(_service(record, record.load_service or LOAD), LOAD_GAINS, request, what=what)
 
 
 def _service(record: ControllerRecord, service: str) -> str:

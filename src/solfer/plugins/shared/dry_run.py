@@ -33,7 +33,7 @@ def dry_run_together(
     def outside(configuration: Configuration) -> DryMiddleware:
         return DryMiddleware(known(configuration), files_of(configuration))
 
-    generation = SharedGenerator(listed, generators, outside, known)
+    generation = SharedGenerator(listed, generators, outside, known=known)
     for plugin in generation.attempt(whole, start):
         if plugin is not None:
             plugin.close()

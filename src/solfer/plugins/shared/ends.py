@@ -24,7 +24,7 @@ def publications(configuration: Configuration, resolve: Callable[[str], str]) ->
         if record.sink is not None and not record.lower_level:
             where = record.where("sink")
             message = canonical(record.travels_as, record.where("message"))
-            found.append(SharedTopic(module.name, resolve(record.sink), message, where))
+            found.append(SharedTopic(module.name, resolve(record.sink), message, where=where))
     return found
 
 
@@ -46,7 +46,7 @@ def check_ends(feedbacks: Iterable[tuple[FeedbackPipe, str]], commands: Sequence
             try:
                 _check_end(pipe, channel, senders.get(id(channel)))
             except SolferError as error:
-                errors.append(_located(error, pipe, channel.publication, where))
+                errors.append(_located(error, pipe, channel.publication, where=where))
     raise_all(errors)
 
 

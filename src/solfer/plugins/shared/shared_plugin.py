@@ -180,4 +180,4 @@ def generate_shared(
     plugins = tuple(plugin for plugin in made if plugin is not None)
     for each, plugin in zip(listed, plugins, strict=True):
         log_start(each.configuration, plugin)
-    return Members(plugins, {each.name: each.requires for each in listed}, generation.sharing, generation.spaces)
+    return Members(plugins, {each.name: each.requires for each in listed}, generation.sharing, spaces=generation.spaces)

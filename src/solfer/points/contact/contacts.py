@@ -149,7 +149,7 @@ class RollingContact(SupportVertex, Contact):
         normal: ArrayLike = UP,
         constraint: ArrayLike | None = None,
     ):
-        super().__init__(link, robot, ring, tube, axis, center, normal)
+        super().__init__(link, robot, ring, tube=tube, axis=axis, center=center, normal=normal)
         self._axle = direction(axis, f"axis of wheel '{link}'")
         self._hold(constraint)
 
@@ -224,7 +224,7 @@ class BallContact(RollingContact):
         normal: ArrayLike = UP,
         constraint: ArrayLike | None = None,
     ):
-        super().__init__(link, robot, 0.0, radius, UP, center, normal, constraint)
+        super().__init__(link, robot, 0.0, tube=radius, axis=UP, center=center, normal=normal, constraint=constraint)
 
     def _axes(self) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
         nx, ny, nz = self._numbers[6:9].tolist()
@@ -260,9 +260,11 @@ def make_contact(record: ContactRecord, robot: RobotView) -> PointContact | Roll
     normal = -down if down.any() else UP
     contact: PointContact | RollingContact
     if record.type == "contact_point" and down.any():
-        contact = BallContact(link, robot, float(np.linalg.norm(down)), record.position, normal, constraint)
+        contact = BallContact(
+            link, robot, float(np.linalg.norm(down)), center=record.position, normal=normal, constraint=constraint
+        )
     elif record.type == "contact_point":
-        contact = PointContact(link, robot, record.position, constraint)
+        contact = PointContact(link, robot, record.position, constraint=constraint)
     elif record.minor_axis is None or record.major_axis is None or record.reference_axis is None:
         raise PointError(
             f"wheel '{record.name}' is not described", where=where, expected="minor_axis, major_axis and reference_axis"
@@ -270,7 +272,14 @@ def make_contact(record: ContactRecord, robot: RobotView) -> PointContact | Roll
     else:
         axle = (record.reference_axis.x, record.reference_axis.y, record.reference_axis.z)
         contact = RollingContact(
-            link, robot, record.major_axis, record.minor_axis, axle, record.position, normal, constraint
+            link,
+            robot,
+            record.major_axis,
+            tube=record.minor_axis,
+            axis=axle,
+            center=record.position,
+            normal=normal,
+            constraint=constraint,
         )
     contact.active = record.active
     return contact

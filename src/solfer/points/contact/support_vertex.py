@@ -55,7 +55,7 @@ class SupportVertex(LinkPoint):
         center: ArrayLike = (0.0, 0.0, 0.0),
         normal: ArrayLike = UP,
     ):
-        super().__init__(vector(3), link, robot, 11)
+        super().__init__(vector(3), link, robot, count=11)
         # centre and axis in the frame of the joint, normal, radii
         rotation = self._attachment.rotation
         center = finite(center, 3, f"centre of wheel '{link}'")

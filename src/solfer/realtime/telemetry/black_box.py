@@ -96,7 +96,7 @@ class BlackBox:
             documents = plugin.documents()
             files |= {f"{plugin.name}/{name}": text for name, text in documents.files.items()}
             texts |= documents.texts
-        self._recorder = Recorder(folder, sources, plugins[0].rate, seconds, files, texts)
+        self._recorder = Recorder(folder, sources, plugins[0].rate, seconds=seconds, attachments=files, metadata=texts)
         self._record = self._recorder.record
         self.size = self._recorder.size
 
@@ -125,12 +125,12 @@ class BlackBox:
         ran = self._words[3 + index] == PluginState.RUNNING
         self._words[3 + index] = state
         kind = HOLD if ran and state is PluginState.STARTING else KINDS.get(state, state.name.lower())
-        self._recorder.event(Event(NANOSECOND * time, managed.name, kind, managed.reason))
+        self._recorder.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))
 
     def _note_requests(self, name: str, notes: list[tuple[str, str]], now: float) -> None:
         """Record what was asked of a component, and what else happened to it, in the cycle that ends `now` [s]."""
         for kind, text in notes:
-            self._recorder.event(Event(now, name, kind, text))
+            self._recorder.event(Event(now, name, kind, text=text))
         notes.clear()
 
     def close(self) -> None:

@@ -56,7 +56,7 @@ class Recorder:
         own = Ring.size(layout.width, count)
         self.size = own + Ring.size(EVENT_WIDTH, EVENTS)
         text = json.dumps({"rows": layout.text(), "count": count, "rate": rate}).encode()
-        self._segment = Segment.create(folder / FILE, KIND, text, self.size)
+        self._segment = Segment.create(folder / FILE, KIND, text, size=self.size)
         # touch each page now: else the first round of the ring would do so in the loop
         np.frombuffer(self._segment.data, dtype=np.uint8)[:: mmap.PAGESIZE] = 0
         self._rows, self._events = RowRing(self._segment.data, arrays, count), events_of(self._segment.data, own)

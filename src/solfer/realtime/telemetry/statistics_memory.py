@@ -100,8 +100,8 @@ class RuntimeStatistics:
             MiddlewareError: Another executor owns them, or the memory cannot be made.
         """
         layout = json.dumps({"rate": rate, "plugins": list(plugins), "stages": list(stages)}).encode()
-        segment = Segment.create(folder / STATISTICS, STATISTICS, layout, cls(rate, plugins, stages).size)
-        statistics = cls(rate, plugins, stages, segment.data)
+        segment = Segment.create(folder / STATISTICS, STATISTICS, layout, size=cls(rate, plugins, stages).size)
+        statistics = cls(rate, plugins, stages, memory=segment.data)
         statistics._segment = segment
         return statistics
 

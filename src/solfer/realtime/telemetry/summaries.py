@@ -104,36 +104,37 @@ class StatisticsReader:
         recent = Histograms(now).since(self._earlier)
         self._earlier = now
         cycles, skipped, overruns, unforgiven = (statistics.counts[word] for word in COUNTED)
-        loop = tuple(_stage(statistics, recent, row, name) for row, name in enumerate(LOOP))
+        loop = tuple(_stage(statistics, recent, row, name=name) for row, name in enumerate(LOOP))
         plugins = tuple(_plugin(statistics, recent, index) for index in range(len(statistics.plugins)))
         return LayerSummary(
             statistics.pid,
             statistics.alive,
             statistics.rate,
-            statistics.text(),
-            stop,
-            cycles,
-            skipped,
-            overruns,
-            unforgiven,
-            loop,
-            plugins,
+            scheduling=statistics.text(),
+            emergency_stop=stop,
+            cycles=cycles,
+            skipped=skipped,
+            overruns=overruns,
+            unforgiven=unforgiven,
+            loop=loop,
+            plugins=plugins,
         )
 
 
 def _plugin(statistics: RuntimeStatistics, recent: Histograms, index: int) -> PluginSummary:
     stages = tuple(
-        _stage(statistics, recent, statistics.row(index, place), name) for place, name in enumerate(statistics.stages)
+        _stage(statistics, recent, statistics.row(index, place), name=name)
+        for place, name in enumerate(statistics.stages)
     )
     return PluginSummary(
         statistics.plugins[index],
         statistics.state(index).name,
         statistics.text(index),
-        statistics.life(index, PluginCount.STARTS),
-        statistics.life(index, PluginCount.ABORTS),
-        statistics.life(index, PluginCount.OVER_BUDGET),
-        statistics.computed(index),
-        stages,
+        starts=statistics.life(index, PluginCount.STARTS),
+        aborts=statistics.life(index, PluginCount.ABORTS),
+        over_budget=statistics.life(index, PluginCount.OVER_BUDGET),
+        computed=statistics.computed(index),
+        stages=stages,
     )
 
 
@@ -142,7 +143,7 @@ def _stage(statistics: RuntimeStatistics, recent: Histograms, row: int, name: st
         name,
         statistics.histograms.count(row),
         1e-9 * recent.quantile(row, 0.5),
-        1e-9 * recent.quantile(row, 0.99),
-        1e-9 * statistics.histograms.longest(row),
-        statistics.skips[row],
+        p99=1e-9 * recent.quantile(row, 0.99),
+        longest=1e-9 * statistics.histograms.longest(row),
+        skipped=statistics.skips[row],
     )

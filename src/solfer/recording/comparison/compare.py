@@ -85,7 +85,9 @@ def compare(
     pair = _Pair([one[joint] for joint in joints], [two[joint] for joint in joints], names)
     verdicts = pair.verdicts(joints)
     missing = [*_missing(one, two, names[1]), *_missing(two, one, names[0])]
-    return Comparison((*verdicts, *missing), pair.shift, pair.elapsed, pair.first, pair.second, tuple(joints))
+    return Comparison(
+        (*verdicts, *missing), pair.shift, pair.elapsed, first=pair.first, second=pair.second, joints=tuple(joints)
+    )
 
 
 def _missing(there: Iterable[str], lacking: Container[str], name: str) -> Iterator[JointVerdict]:
@@ -158,7 +160,7 @@ class _Pair:
         """Fit `joint` of the second recording to `other` of the first."""
         noise = float(self.noise[joint])
         density = float(self._density[joint])
-        return fit(self._curves[other], self._times, self.second[joint], free, noise, density)
+        return fit(self._curves[other], self._times, self.second[joint], free=free, noise=noise, density=density)
 
     def _law(self, joint: int) -> tuple[Law, Law]:
         """Fit the law with as few parameters as are needed, and with all that can be judged."""
@@ -182,7 +184,9 @@ class _Pair:
             for other in different[place + 1 :]:
                 if self._resembles(joint, other) and self._resembles(other, joint):
                     for one, two in ((joint, other), (other, joint)):
-                        found[one] = self._made(one, joints[one], (Difference.SWAPPED,), f"swapped with {joints[two]}")
+                        found[one] = self._made(
+                            one, joints[one], (Difference.SWAPPED,), text=f"swapped with {joints[two]}"
+                        )
         return found
 
     def _resembles(self, joint: int, other: int) -> bool:
@@ -193,10 +197,10 @@ class _Pair:
     def _verdict(self, index: int, joint: str) -> JointVerdict:
         if self._still[index]:
             text = f"does not move (range {np.ptp(self.first[index]):.3f} in {self._names[0]})"
-            return self._made(index, joint, (Difference.NOT_MOVED,), text)
+            return self._made(index, joint, (Difference.NOT_MOVED,), text=text)
         if self._alone[index]:
             text = f"moves alone (range {np.ptp(self.second[index]):.3f})"
-            return self._made(index, joint, (Difference.MOVED_ALONE,), text)
+            return self._made(index, joint, (Difference.MOVED_ALONE,), text=text)
         law, whole = self._law(index)
         kinds, text = judged(law, thresholds(law))
         limit = max(SHAPE, CERTAIN * self.noise[index])
@@ -205,7 +209,7 @@ class _Pair:
         if left > limit and not explained:
             kinds = (Difference.OTHER,)
             text = f"by up to {left:.4f}, which no gain, offset or delay explains"
-        return self._made(index, joint, kinds, text, law, whole)
+        return self._made(index, joint, kinds, text=text, law=law, whole=whole)
 
     def _made(
         self, index: int, joint: str, kinds: tuple[Difference, ...], text: str,
@@ -218,10 +222,10 @@ class _Pair:
             begin = max(min(CERTAIN * self.noise[index], 0.5 * largest), 0.1 * largest)
             since = float(self.elapsed[np.argmax(apart >= begin)])
         return JointVerdict(
-            joint, kinds, text, since, largest,
-            None if law is None else law.values,
-            None if whole is None else thresholds(whole),
-            index in self._both,
+            joint, kinds, text, since=since, largest=largest,
+            law=None if law is None else law.values,
+            limits=None if whole is None else thresholds(whole),
+            moves=index in self._both,
         )  # fmt: skip
 
 

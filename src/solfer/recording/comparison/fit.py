@@ -76,7 +76,7 @@ def fit(
     if GAIN in free:
         values[GAIN] = _first_gain(curve(times), second)
     for _ in range(ROUNDS):
-        rows, residual = _linear(curve, slope, times, second, values)
+        rows, residual = _linear(curve, slope, times, second=second, values=values)
         scale = max(noise, 1.4826 * float(np.median(np.abs(residual))))
         weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
         bread = np.linalg.inv((rows[chosen] * weights) @ rows[chosen].T)
@@ -85,11 +85,11 @@ def fit(
         values[DELAY] = np.clip(values[DELAY], -LONGEST_DELAY, LONGEST_DELAY)
         if np.all(np.abs(step) < ENOUGH):
             break
-    rows, residual = _linear(curve, slope, times, second, values)
+    rows, residual = _linear(curve, slope, times, second=second, values=values)
     weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
     limits = np.full(3, np.inf)
     least = NORMAL * density * np.sqrt(np.diag(bread))
-    limits[chosen] = np.maximum(least, _errors(rows[chosen], weights, residual, bread, times))
+    limits[chosen] = np.maximum(least, _errors(rows[chosen], weights, residual, bread=bread, times=times))
     return Law(values, limits, residual)
 
 

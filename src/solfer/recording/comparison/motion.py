@@ -163,4 +163,4 @@ def sampled(motions: Sequence[JointMotion], step: float) -> Samples:
     # samples that lie closer than the measurements share their noise
     density = np.array([each.noise * np.sqrt(max(1.0, each.period / step)) for each in motions])
     noise = np.minimum([each.noise for each in motions], np.linalg.norm(weights) * density)
-    return Samples(start, step, smooth, noise, density)
+    return Samples(start, step, smooth, noise=noise, density=density)

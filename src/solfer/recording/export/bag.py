@@ -55,7 +55,7 @@ def save_bag(recording: Recording, path: Path) -> Iterator[None]:
             places = [_places(bag, store, topic) for topic in groups_of(recording)]
             for time, place, row in sorted(_moments(places)):
                 topic, connection = places[place]
-                message = _message(store, connection.msgtype, topic.channels, row, time)
+                message = _message(store, connection.msgtype, topic.channels, row=row, time=time)
                 bag.write(connection, time, store.serialize_ros1(message, connection.msgtype))
                 yield
     except OSError as error:
@@ -88,7 +88,7 @@ def _message(store: Any, kind: str, channels: Sequence[Channel], row: int, time:
     if first.kind == JOINTS:
         fields = {part_of(channel.name): channel.values[row] for channel in channels}
         return types[kind](header, list(first.columns), *(fields.get(part, np.zeros(0)) for part in JOINT_PARTS))
-    return _of_kind(types, first, header, first.values[row].tolist())
+    return _of_kind(types, first, header, numbers=first.values[row].tolist())
 
 
 def _labelled(types: Any, channel: Channel, row: int) -> Any:

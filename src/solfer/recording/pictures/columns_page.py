@@ -23,6 +23,6 @@ def columns_page(recording: Recording) -> "Figure":
     figure = new_figure(12.0, 0.5 + 2.4 * max(1, len(channels)))
     grid = np.atleast_1d(figure.subplots(max(1, len(channels)), 1, sharex=True))
     for axes, channel in zip(grid, channels, strict=False):
-        lines(axes, channel.name, [channel], start)
+        lines(axes, channel.name, [channel], start=start)
     grid[-1].set_xlabel("time [s]", fontsize=FONT)
     return figure

@@ -30,7 +30,7 @@ def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
     figure = new_figure(12.0, 0.8 + 1.9 * len(shown))
     grid = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
     for (left, right), verdict in zip(grid, shown, strict=True):
-        _joint(left, right, verdict, comparison, place[verdict.joint], names)
+        _joint(left, right, verdict, comparison=comparison, row=place[verdict.joint], names=names)
     for axes in grid[-1]:
         axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT)
     figure.suptitle(_title(comparison, names), fontsize=FONT + 3)

@@ -53,11 +53,11 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
         return figure
     slots = iter(figure.subfigures(len(parts), 1, height_ratios=parts, squeeze=False)[:, 0])
     if moving:
-        _joints(next(slots), moving, limits, start)
+        _joints(next(slots), moving, limits, start=start)
     if errors:
         _errors(next(slots), errors, start)
     if extras:
-        _draw_extras(next(slots), extras, start, groups, plugin)
+        _draw_extras(next(slots), extras, start, groups=groups, plugin=plugin)
     return figure
 
 
@@ -74,7 +74,7 @@ def _joints(place: "SubFigure", tracks: list[Track], limits: Limits, start: floa
     for axes in grid[len(tracks) :]:
         axes.set_visible(False)
     for index, (axes, track) in enumerate(zip(grid, tracks, strict=False)):
-        _joint(axes, track, limits, start)
+        _joint(axes, track, limits, start=start)
         axes.tick_params(labelbottom=index + COLUMNS >= len(tracks))
     place.supxlabel("time [s]", fontsize=FONT)
     handles = [_line(color=FIRST, lw=1.0), _line(color=WANTED, lw=2.8), _line(color=WRONG, lw=1.3, ls=":")]
@@ -174,7 +174,7 @@ def _draw_extras(
         if channels[0].name == f"{plugin}/timing":
             _timing(axes, channels[0], start)
         else:
-            lines(axes, title, channels, start)
+            lines(axes, title, channels, start=start)
         axes.set_xlabel("time [s]", fontsize=FONT)
         for group in groups:
             for time in {group.first.time, group.last}:

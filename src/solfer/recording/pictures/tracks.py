@@ -60,11 +60,11 @@ class Track:
 def tracks_of(recording: Recording, plugin: str) -> list[Track]:
     """Find the tracks of a plugin, in the order in which its joints were measured."""
     measured = {
-        field: _columns(recording, plugin, ("measured", "feedback"), field) for field in ("position", "velocity")
+        field: _columns(recording, plugin, ("measured", "feedback"), field=field) for field in ("position", "velocity")
     }
-    sent = {field: _columns(recording, plugin, ("command",), field) for field in measured}
+    sent = {field: _columns(recording, plugin, ("command",), field=field) for field in measured}
     if not any(sent.values()):
-        sent = {field: _columns(recording, plugin, ("wanted",), field) for field in measured}
+        sent = {field: _columns(recording, plugin, ("wanted",), field=field) for field in measured}
     tracks = []
     continuous = continuous_joints(recording)
     for joint, (unit, series) in measured["position"].items():
@@ -74,7 +74,7 @@ def tracks_of(recording: Recording, plugin: str) -> list[Track]:
         desired = sent[field].get(joint, ("", None))[1]
         if desired is not None and field == "position" and joint in continuous:
             desired = _nearest(desired, series)
-        tracks.append(Track(joint, field, unit, series, desired))
+        tracks.append(Track(joint, field, unit, measured=series, desired=desired))
     return tracks
 
 

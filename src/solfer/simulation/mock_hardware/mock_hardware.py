@@ -63,7 +63,7 @@ class MockHardware:
         measurement = steps_of(record.delay.measurement, record.where("delay", "measurement"))
         command = steps_of(record.delay.command, record.where("delay", "command"))
         truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
-        self._wiring = Wiring(middleware, encoders, owners, measurement, command, truth)
+        self._wiring = Wiring(middleware, encoders, owners, measurement=measurement, command=command, truth=truth)
         outside = cast(Middleware, self._wiring)
         self._server = SimulationServer(simulation, outside, factor=factor, name=HEALTH, followers=followers)
 
@@ -79,7 +79,7 @@ class MockHardware:
         record = read(path, HardwareRecord)
         simulation = Simulation.from_file(mounted(record), gui, state)
         try:
-            return cls(simulation, record, middleware, factor)
+            return cls(simulation, record, middleware, factor=factor)
         except Exception:
             simulation.close()
             raise

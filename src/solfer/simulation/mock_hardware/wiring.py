@@ -63,14 +63,14 @@ class Wiring:
         if topic in self._truth:
             return _NullWriter(topic)
         encode = self._encoders.measured if message in JOINT_MESSAGES else copied
-        writer = _LateWriter(self, self._outside.writer(topic, message), encode, DelayLine(self._measurement))
+        writer = _LateWriter(self, self._outside.writer(topic, message), encode, line=DelayLine(self._measurement))
         self._writers.append(writer)
         return writer
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
         """Return a queue of commands for joints, which are delayed."""
         outside = self._outside.queue(topic, message, size, largest)
-        return _LateQueue(self, outside, self._encoders, DelayLine(self._command))
+        return _LateQueue(self, outside, self._encoders, line=DelayLine(self._command))
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
         """Offer the services of the controllers, with the hardware's joint names; a simulator's own are left out."""

@@ -54,7 +54,7 @@ class Renderer:
         self._angles = (yaw, pitch)
         self._chart = kinematics.base
         self._engine = Engine()
-        self._body = Body(self._engine, description, kinematics, np.zeros(0, dtype=np.intp), Friction())
+        self._body = Body(self._engine, description, kinematics, motors=np.zeros(0, dtype=np.intp), friction=Friction())
         self._first = kinematics.size - len(self._body.joints)
         self._world = World(self._engine, world)
         self._add_floor(self._world.orientation())

@@ -82,7 +82,7 @@ class Body:
             self.owner = urdf.owner
             self.id = self._load(urdf.text, Path(folder, "robot.urdf"), description.where)
         self._name_links(urdf.base)
-        warn_of_differences(engine, self.id, urdf.text, description.where)
+        warn_of_differences(engine, self.id, urdf.text, where=description.where)
         self._set_dynamics(friction, urdf.owner)
         self._set_losses(description, lossless)
         self._set_motors(kinematics, motors)

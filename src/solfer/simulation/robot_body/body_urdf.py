@@ -74,7 +74,7 @@ def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrd
     meshes = Meshes(description.where, folder)
     inertias = Inertias(description.where)
     for own, links in members.items():
-        link = _link(description, own, links, inertias)
+        link = _link(description, own, links, inertias=inertias)
         for name, place in links.items():
             where = f"{description.where}: link '{name}'"
             moved = (_shape(shape, place) for shape in description.links[name].shapes)

@@ -93,7 +93,7 @@ class Inertias:
                 where=f"{self._where}: link '{link}'",
                 expected="none negative, none larger than the sum of the others",
             )
-        self._note(link, principal, nearest, f" (by {100.0 * share:.2g} %)")
+        self._note(link, principal, nearest, share=f" (by {100.0 * share:.2g} %)")
 
     def _note(self, link: str, before: np.ndarray, after: np.ndarray, share: str = "") -> None:
         self._repaired.append(f"link '{link}': {_listed(before)} -> {_listed(after)} kg m^2{share}")

@@ -67,11 +67,11 @@ def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placemen
         SimulationError: It does not come to the ground, or has nothing to stand on.
     """
     upright = world.orientation(placement.yaw)
-    obstacles = _put_down(body, world, joints, placement, upright)
+    obstacles = _put_down(body, world, joints, placement=placement, orientation=upright)
     if obstacles != [world.ground] or rests(body, obstacles[0], rotation_from_quaternion(upright)[:, 2]):
         return
-    tilted = resting_orientation(body, joints, upright, obstacles[0])
-    _put_down(body, world, joints, placement, upright if tilted is None else tilted)
+    tilted = resting_orientation(body, joints, upright, ground=obstacles[0])
+    _put_down(body, world, joints, placement=placement, orientation=upright if tilted is None else tilted)
     if tilted is not None:
         logger.warning(
             "the robot begins tilted by %.1f degrees: upright, its centre of mass is not above what touches the ground",

@@ -56,7 +56,7 @@ def resting_orientation(
         within LARGEST_TILT.
     """
     start = rotation_from_quaternion(upright)
-    soles = _vertices(body, joints, start, ground, _tilts(start, (GENTLE,)))
+    soles = _vertices(body, joints, start, ground=ground, tilts=_tilts(start, (GENTLE,)))
     body.place(joints)
     center = body.center_of_mass()
     normal = start[:, 2]
@@ -66,7 +66,7 @@ def resting_orientation(
     steps = np.linspace(0.0, LARGEST_TILT, STEPS + 1)
     nearest = LARGEST_TILT
     found = None
-    for corners, outward in _faces(_vertices(body, joints, start, ground, _tilts(start, steps)), center):
+    for corners, outward in _faces(_vertices(body, joints, start, ground=ground, tilts=_tilts(start, steps)), center):
         turn = _turn(start @ outward, -normal)
         rotation = _rotation(turn) @ start
         if np.linalg.norm(turn) < nearest and _below(center, corners, -rotation[2]):

@@ -77,7 +77,7 @@ def publications(simulation: Simulation, middleware: Middleware, rates: Rates) -
             every(getattr(rates, name), rates.where(name)),
             [middleware.writer(topic, sensor.message) for topic in sensor.topics],
             sensor,
-            0 if sensor.truth else delay,
+            delay=0 if sensor.truth else delay,
         )
         for name, sensor in simulation.sensors.items()
     ]

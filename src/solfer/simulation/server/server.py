@@ -99,7 +99,7 @@ class SimulationServer:
         middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
         description = simulation.kinematics.description
         floating = simulation.floating
-        self._camera = Camera(Scene(description.text, description.where, floating, simulation.world.record))
+        self._camera = Camera(Scene(description.text, description.where, floating, world=simulation.world.record))
         self._drawing, self._pictures = ThreadPoolExecutor(1), pictures or Pictures()
         self._drawings: list[Future[Any]] = []
         middleware.serve(SIMULATOR, (screenshot_service(self),), self._draw)

@@ -76,9 +76,9 @@ def screenshot_service(server: SimulationServer) -> Service:
         "screenshot",
         "solfer/Screenshot",
         ScreenshotRequest,
-        Answer,
-        lambda request: Answer(True, str(server.screenshot(request.path))),
-        DRAWING,
+        reply=Answer,
+        handler=lambda request: Answer(True, str(server.screenshot(request.path))),
+        timeout=DRAWING,
     )
 
 
@@ -87,7 +87,7 @@ def simulator_services(server: SimulationServer) -> tuple[Service, ...]:
     simulation = server.simulation
 
     def reset(request: ResetRequest) -> None:
-        placement = StartPlacement(request.x, request.y, request.yaw, request.height)
+        placement = StartPlacement(request.x, request.y, request.yaw, height=request.height)
         simulation.reset(request.state or None, placement, request.seed or None)
 
     def step(request: StepRequest) -> None:
@@ -104,9 +104,15 @@ def simulator_services(server: SimulationServer) -> tuple[Service, ...]:
         simulation.set_friction(request.surface, request.coefficient)
 
     return (
-        Service("reset", "solfer/ResetSimulation", ResetRequest, Answer, answered(reset)),
-        Service("pause", "std_srvs/SetBool", Flag, Answer, answered(lambda request: server.pause(request.data))),
-        Service("step", "solfer/StepSimulation", StepRequest, Answer, answered(step)),
-        Service("push", "solfer/PushLink", PushRequest, Answer, answered(push)),
-        Service("set_friction", "solfer/SetFriction", FrictionRequest, Answer, answered(set_friction)),
+        Service("reset", "solfer/ResetSimulation", ResetRequest, reply=Answer, handler=answered(reset)),
+        Service(
+            "pause",
+            "std_srvs/SetBool",
+            Flag,
+            reply=Answer,
+            handler=answered(lambda request: server.pause(request.data)),
+        ),
+        Service("step", "solfer/StepSimulation", StepRequest, reply=Answer, handler=answered(step)),
+        Service("push", "solfer/PushLink", PushRequest, reply=Answer, handler=answered(push)),
+        Service("set_friction", "solfer/SetFriction", FrictionRequest, reply=Answer, handler=answered(set_friction)),
     )

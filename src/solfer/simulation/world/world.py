@@ -143,7 +143,7 @@ class World:
         shape = self._bullet.createCollisionShape(
             self._bullet.GEOM_PLANE, planeNormal=normal, physicsClientId=self._client
         )
-        return self._body(0.0, shape, -1, ([0.0] * 3, [0.0, 0.0, 0.0, 1.0]), friction)
+        return self._body(0.0, shape, -1, pose=([0.0] * 3, [0.0, 0.0, 0.0, 1.0]), friction=friction)
 
     def _box(self, box: BoxRecord) -> int:
         half = [edge / 2.0 for edge in box.size]
@@ -152,7 +152,7 @@ class World:
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
         visual = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=COLOUR, physicsClientId=client)
         pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))
-        body = self._body(box.mass or 0.0, shape, visual, pose, box.friction)
+        body = self._body(box.mass or 0.0, shape, visual, pose=pose, friction=box.friction)
         if box.mass is not None:
             self._movable.append((body, pose))
         return body

@@ -96,7 +96,7 @@ class ConfiguredTasks:
     def rows(self, name: str, value: float | tuple[float, ...]) -> np.ndarray:
         """Return numbers of all rows of a record's tasks, of one number or one a row; a SizeMismatch for others."""
         tasks = self._members[name]
-        parts = [_share(value, task.rows, place, len(tasks)) for place, task in enumerate(tasks)]
+        parts = [_share(value, task.rows, place, count=len(tasks)) for place, task in enumerate(tasks)]
         for task, part in zip(tasks, parts, strict=True):
             if np.shape(part) not in ((), (task.rows,)):
                 raise SizeMismatch(f"{np.size(part)} numbers for {task.rows} rows", expected="one number, or one a row")
@@ -123,7 +123,7 @@ class ConfiguredTasks:
                 point = self._point(record, link, dofs)
             if len(faults.errors) > before:
                 continue
-            task = self._task(whole, record, point, dofs, place, len(links))
+            task = self._task(whole, record, point, dofs=dofs, place=place, count=len(links))
             if task is not None:
                 self.tasks[whole] = task
                 yield task
@@ -159,7 +159,7 @@ class ConfiguredTasks:
             return None
         for key in ("velocity", "weight", "damping", "gain", "correction"):
             with faults.at(record, key):
-                setattr(task, key, _share(_number_of(record, key), task.rows, place, count))
+                setattr(task, key, _share(_number_of(record, key), task.rows, place, count=count))
         if record.is_motion and np.any(task.gain):
             with faults.at(record, "gain"):
                 raise _no_gain(record, task.where)
@@ -295,14 +295,14 @@ class ConfiguredStack(ConfiguredTasks):
             self.levels,
             self.bounds(period),
             self._limits.constraints(period),
-            self._stack_record.policy,
-            position,
-            self._stack_record.relax,
+            policy=self._stack_record.policy,
+            position=position,
+            relax=self._stack_record.relax,
         )
 
     def _make_limits(self) -> None:
         """See `ConfiguredTasks._make_limits`."""
-        self._limits = LimitMaker(self._robot, self._stack_record, self._maker, self._faults)
+        self._limits = LimitMaker(self._robot, self._stack_record, self._maker, faults=self._faults)
 
 
 def build_stack(record: StackRecord, robot: Robot, points: Mapping[str, Point] | None = None) -> ConfiguredStack:
@@ -359,4 +359,4 @@ def _rows(record: TaskRecord, point: Point) -> list[int] | None:
             known = names or [str(number) for number in range(point.rows)]
             raise UnknownName("row", row, known, where=record.where("rows", index))
         found.append(names.index(row) if isinstance(row, str) else row)
-    return chosen("row", found, point.rows, (), f"task on '{record.point}'", TaskError).tolist()
+    return chosen("row", found, point.rows, names=(), where=f"task on '{record.point}'", error=TaskError).tolist()

@@ -43,7 +43,7 @@ class LimitMaker:
             for link, other in self._pairs(one):
                 with faults.at(one):
                     point = maker.place(link, other)
-                    limit = WorkspaceLimit(name, point, one.nearest, one.farthest, one.weight)
+                    limit = WorkspaceLimit(name, point, one.nearest, farthest=one.farthest, weight=one.weight)
                     self._workspaces.append(limit)
         self._collisions: CollisionLimit | None = None
         if self._limits.collisions is not None:
@@ -60,7 +60,7 @@ class LimitMaker:
         before = len(self._faults.errors)
         if record.pairs is None:
             posture = neutral_posture(kinematics.twin())
-            pairs = pairs_that_may_touch(kinematics.twin(), apart, record.distance, posture)
+            pairs = pairs_that_may_touch(kinematics.twin(), apart, record.distance, position=posture)
         else:
             pairs = [pair for index in range(len(record.pairs)) for pair in self._named_pairs(record, index)]
             pairs = [pair for pair in dict.fromkeys(pairs) if not are_neighbours(kinematics, *pair)]
@@ -69,7 +69,7 @@ class LimitMaker:
         if not pairs:
             raise ConfigError("no two links may touch each other", expected="pairs of links that are not neighbours")
         distances = LinkDistances(kinematics, pairs, record.influence)
-        return CollisionLimit(distances, self._robot, record.distance, record.weight)
+        return CollisionLimit(distances, self._robot, record.distance, weight=record.weight)
 
     def _named_pairs(self, record: CollisionsRecord, index: int) -> list[tuple[str, str]]:
         """Return the pairs of links of a pair of links or groups."""
@@ -127,8 +127,8 @@ class LimitMaker:
             kinematics.dofs,
             kinematics.lower_position if limits.joints else -free,
             kinematics.upper_position if limits.joints else free,
-            np.where(self._fixed, 0.0, speed),
-            horizon_of(limits, period),
+            speed=np.where(self._fixed, 0.0, speed),
+            horizon=horizon_of(limits, period),
         )
         self._bounds.append(bounds)
         return bounds
@@ -159,7 +159,7 @@ class LimitMaker:
         if torques is not None:
             with faults.at(torques):
                 limit = self._robot.kinematics.effort_limit * torques.scale
-                made.append(TorqueLimits(self._robot.dynamics, period, limit, torques.weight))
+                made.append(TorqueLimits(self._robot.dynamics, period, limit, weight=torques.weight))
         for error in faults.errors:
             raise error
         return made

@@ -111,7 +111,7 @@ class ActionServer:
     def _finish(self, outcome: Outcome) -> None:
         state = GoalStatus.SUCCEEDED if outcome.success else GoalStatus.ABORTED
         if self.active is not None:
-            self._end(self.active, state, outcome.text, outcome.result)
+            self._end(self.active, state, outcome.text, result=outcome.result)
 
     def _take(self, message: Any, refusal: str) -> None:
         """Take over a goal, or reject it."""
@@ -140,7 +140,7 @@ class ActionServer:
         except SolferError as error:
             refused = Outcome(self._action.result(), False, described(error, lines=True))
         if refused is not None:
-            self._end(name, GoalStatus.REJECTED, refused.text, refused.result)
+            self._end(name, GoalStatus.REJECTED, refused.text, result=refused.result)
             return
         if self.active is not None:
             self._end(self.active, GoalStatus.PREEMPTED, "another goal has taken over")

@@ -37,7 +37,7 @@ def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, in
             _read(full_name(owner, each.name), each, middleware)
         elif isinstance(each, TopicIn):
             sole = senders.setdefault(each.stream, SoleSender()) if each.stream else None
-            topic = DeclaredIn(owner, each, middleware, sole)
+            topic = DeclaredIn(owner, each, middleware, sole=sole)
             inbox.sources.append(topic.receive)
             queues.append(topic.queue)
         elif isinstance(each, TopicOut):

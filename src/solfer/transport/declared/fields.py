@@ -57,7 +57,7 @@ def message_of(interface: str, value: Any) -> Message:
     stamp = header.get("stamp", 0.0)
     numbers = np.array([float(_at(fields, way).get(name, 0.0)) for way, names in _PLACES[interface] for name in names])
     if interface in WRENCH_MESSAGES:
-        return WrenchMessage(frame, numbers[:3], numbers[3:], stamp)
+        return WrenchMessage(frame, numbers[:3], numbers[3:], stamp=stamp)
     return VectorMessage(frame, numbers, stamp)
 
 

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         from solfer.recording.pictures.canvas import check_suffix
 
         check_suffix(options.plot)
-    result = compare(read(options.first), read(options.second), names, options.names)
+    result = compare(read(options.first), read(options.second), names, plugins=options.names)
     for line in report(result, names, options.limits):
         print(line)
     if options.plot is not None:

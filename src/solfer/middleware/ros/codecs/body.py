@@ -86,13 +86,13 @@ class BodyCodec(Codec):
             odometry.header.frame_id,
             odometry.child_frame_id,
             _get(pose.position),
-            orientation,
-            rotation @ _get(twist.linear),
-            rotation @ _get(twist.angular),
-            odometry.header.stamp.to_sec(),
-            sender,
-            np.reshape(odometry.pose.covariance, (6, 6)),
-            np.reshape(odometry.twist.covariance, (6, 6)),
+            orientation=orientation,
+            linear=rotation @ _get(twist.linear),
+            angular=rotation @ _get(twist.angular),
+            stamp=odometry.header.stamp.to_sec(),
+            sender=sender,
+            pose_covariance=np.reshape(odometry.pose.covariance, (6, 6)),
+            twist_covariance=np.reshape(odometry.twist.covariance, (6, 6)),
         )
 
 
@@ -131,10 +131,10 @@ class ImuCodec(Codec):
             imu.header.frame_id,
             np.full(4, np.nan) if lacks_orientation else _orientation(imu.orientation),
             np.full(3, np.nan) if lacks_angular else _get(imu.angular_velocity),
-            np.full(3, np.nan) if lacks_force else _get(imu.linear_acceleration),
-            deviations,
-            imu.header.stamp.to_sec(),
-            sender,
+            acceleration=np.full(3, np.nan) if lacks_force else _get(imu.linear_acceleration),
+            deviations=deviations,
+            stamp=imu.header.stamp.to_sec(),
+            sender=sender,
         )
 
 
@@ -158,7 +158,9 @@ class WrenchCodec(Codec):
         stamped = unpack(WrenchStamped, packed)
         header = stamped.header
         wrench = stamped.wrench
-        return WrenchMessage(header.frame_id, _get(wrench.force), _get(wrench.torque), header.stamp.to_sec(), sender)
+        return WrenchMessage(
+            header.frame_id, _get(wrench.force), _get(wrench.torque), stamp=header.stamp.to_sec(), sender=sender
+        )
 
 
 def _orientation(element: genpy.Message) -> np.ndarray:

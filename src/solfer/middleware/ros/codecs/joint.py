@@ -56,7 +56,7 @@ class JointLayout:
         """Return the layout of a message, if its numbers lie in rows."""
         distances = {after - before for before, after in pairwise(places.values())}
         in_rows = message.names and places and len(distances) < 2 and not message.interfaces
-        return cls(packed, start, message, places) if in_rows else None
+        return cls(packed, start, message, places=places) if in_rows else None
 
     def read(self, packed: bytes) -> np.ndarray | None:
         """Return the numbers of a message of the same length, and with a header of the same length, row by row.
@@ -136,7 +136,7 @@ class JointCodec(Codec):
             layout = self._layouts.get((len(packed), offset))
             rows = None if layout is None else layout.read(packed)
             if layout is None or rows is None:
-                return self._decode_all(packed, offset, stamp, sender)
+                return self._decode_all(packed, offset, stamp, sender=sender)
             message = JointMessage(layout.names, stamp=stamp, sender=sender, component=layout.component)
             message.lay(layout.rows, rows)
             return message
@@ -168,7 +168,7 @@ class JointCodec(Codec):
             offset = self._unpack_component(packed, offset, message)
         if offset != len(packed):
             raise ValueError(offset)
-        self._remember(len(packed), start, JointLayout.of(packed, start, message, places))
+        self._remember(len(packed), start, JointLayout.of(packed, start, message, places=places))
         return message
 
     def _remember(self, length: int, start: int, layout: JointLayout | None) -> None:

@@ -31,5 +31,9 @@ class RefusalCodec(Codec):
         published = unpack(self._type, packed)
         claims = tuple(map(bool, published.claims))
         return RefusalMessage(
-            tuple(published.owners), claims, tuple(published.reasons), published.header.stamp.to_sec(), sender
+            tuple(published.owners),
+            claims,
+            tuple(published.reasons),
+            stamp=published.header.stamp.to_sec(),
+            sender=sender,
         )

@@ -51,7 +51,7 @@ class VectorCodec(Codec):
                 expected="a message as its publisher packed it",
             ) from error
         values = np.frombuffer(packed, "<f8", self._count, begin).copy()
-        return VectorMessage(frame, values, seconds + 1e-9 * nanoseconds, sender)
+        return VectorMessage(frame, values, seconds + 1e-9 * nanoseconds, sender=sender)
 
 
 class PointsCodec(Codec):
@@ -91,5 +91,9 @@ class PointsCodec(Codec):
             )
         values = np.array(published.value).reshape(published.count, -1)
         return PointsMessage(
-            published.header.frame_id, tuple(published.name), values, published.header.stamp.to_sec(), sender
+            published.header.frame_id,
+            tuple(published.name),
+            values,
+            stamp=published.header.stamp.to_sec(),
+            sender=sender,
         )

@@ -75,7 +75,7 @@ def wait_for_messages(
             continue
         for (topic, sender), number in numbers.items():
             if topic == endpoint.topic:
-                _wait_for_message(endpoint, sender, number, running, before.get((topic, sender), 0))
+                _wait_for_message(endpoint, sender, number, running=running, before=before.get((topic, sender), 0))
 
 
 def _wait_for_message(
@@ -166,7 +166,7 @@ class LockstepClient:
         before = dict(zip(keys, tick.before, strict=True))
         try:
             due = self._clock.grant(
-                tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running, before)
+                tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running, before=before)
             )
         except (ShutdownRequested, MiddlewareError) as error:
             raise rospy.ServiceException(str(error)) from error

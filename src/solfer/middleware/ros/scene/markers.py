@@ -99,23 +99,23 @@ def markers_of(state: SceneState) -> Iterator[Marker]:
 
 
 def _markers(state: SceneState) -> Iterator[Marker]:
-    yield _ball("center", 0, state.center, 0.08, MEASURED)
-    yield _ball("center", 1, state.projection, 0.05, PROJECTED)
-    yield _lines("center", 2, [state.center, state.projection], 0.005, PROJECTED)
+    yield _ball("center", 0, state.center, size=0.08, color=MEASURED)
+    yield _ball("center", 1, state.projection, size=0.05, color=PROJECTED)
+    yield _lines("center", 2, [state.center, state.projection], width=0.005, color=PROJECTED)
     for name, corners, color in (("polygon", state.polygon, EDGES), ("margins", state.inner, INNER)):
         if len(corners):
-            yield _lines(name, 0, [*corners, corners[0]], 0.015, color)
+            yield _lines(name, 0, [*corners, corners[0]], width=0.015, color=color)
     for index, force in enumerate(state.forces):
         if force.touches:
             yield _arrow(index, force)
             yield _cone(index, force, state.friction)
     for index, reference in enumerate(state.references):
         yield _frame(index, reference)
-        yield _ball("desired", index, reference.desired.position, 0.03, GOES)
+        yield _ball("desired", index, reference.desired.position, size=0.03, color=GOES)
         yield _name(index, reference)
     if len(state.path) > 1:
         ground = state.projection[2]
-        yield _lines("path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], 0.015, PATH)
+        yield _lines("path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], width=0.015, color=PATH)
 
 
 def _marker(name: str, number: int, kind: int, scale: tuple[float, float, float], color: Iterable[float]) -> Marker:
@@ -125,19 +125,19 @@ def _marker(name: str, number: int, kind: int, scale: tuple[float, float, float]
 
 
 def _ball(name: str, number: int, position: np.ndarray, size: float, color: Iterable[float]) -> Marker:
-    made = _marker(name, number, Marker.SPHERE, (size, size, size), color)
+    made = _marker(name, number, Marker.SPHERE, scale=(size, size, size), color=color)
     made.pose.position = _point(position)
     return made
 
 
 def _lines(name: str, number: int, points: Iterable[np.ndarray], width: float, color: Iterable[float]) -> Marker:
-    made = _marker(name, number, Marker.LINE_STRIP, (width, 0.0, 0.0), color)
+    made = _marker(name, number, Marker.LINE_STRIP, scale=(width, 0.0, 0.0), color=color)
     made.points = [_point(each) for each in points]
     return made
 
 
 def _arrow(number: int, force: ContactForce) -> Marker:
-    made = _marker("forces", number, Marker.ARROW, (0.02, 0.04, 0.06), FORCE)
+    made = _marker("forces", number, Marker.ARROW, scale=(0.02, 0.04, 0.06), color=FORCE)
     made.points = [_point(force.position), _point(force.position + LENGTH * force.force)]
     return made
 
@@ -145,7 +145,7 @@ def _arrow(number: int, force: ContactForce) -> Marker:
 def _cone(number: int, force: ContactForce, friction: float) -> Marker:
     """Make a cone as high as the vertical force is long: what friction holds has its tip in the base of the cone."""
     height = max(LENGTH * float(force.force[2]), SMALLEST)
-    made = _marker("cones", number, Marker.TRIANGLE_LIST, (1.0, 1.0, 1.0), CONE)
+    made = _marker("cones", number, Marker.TRIANGLE_LIST, scale=(1.0, 1.0, 1.0), color=CONE)
     angles = [math.tau * each / SIDES for each in range(SIDES + 1)]
     radius = friction * height
     rim = [force.position + (radius * math.cos(angle), radius * math.sin(angle), height) for angle in angles]
@@ -156,7 +156,7 @@ def _cone(number: int, force: ContactForce, friction: float) -> Marker:
 
 def _frame(number: int, reference: ShownReference) -> Marker:
     """Make the axes of a reference; of a position they are those of the frame that it is in."""
-    made = _marker("references", number, Marker.LINE_LIST, (0.01, 0.0, 0.0), MEASURED)
+    made = _marker("references", number, Marker.LINE_LIST, scale=(0.01, 0.0, 0.0), color=MEASURED)
     position = reference.reference.position
     rotation = reference.reference.rotation
     for axis, color in zip(rotation.T, OF_AXES, strict=True):
@@ -166,7 +166,7 @@ def _frame(number: int, reference: ShownReference) -> Marker:
 
 
 def _name(number: int, reference: ShownReference) -> Marker:
-    made = _marker("names", number, Marker.TEXT_VIEW_FACING, (0.0, 0.0, 0.05), MEASURED)
+    made = _marker("names", number, Marker.TEXT_VIEW_FACING, scale=(0.0, 0.0, 0.05), color=MEASURED)
     made.text = f"{reference.module}/{reference.task}"
     made.pose.position = _point(reference.reference.position + (0.0, 0.0, AXES))
     return made

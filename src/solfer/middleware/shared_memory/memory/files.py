@@ -113,7 +113,7 @@ def open_file(path: Path, flags: int = os.O_RDONLY) -> int:
         MiddlewareError: It is not to be trusted.
     """
     with folder_of(path) as (folder, name):
-        return _open(folder, name, flags, path)
+        return _open(folder, name, flags, where=path)
 
 
 def make_file(path: Path) -> int:
@@ -132,7 +132,7 @@ def open_or_make(path: Path) -> int:
     with folder_of(path) as (folder, name):
         while True:
             with contextlib.suppress(FileNotFoundError):
-                return _open(folder, name, os.O_RDWR, path)
+                return _open(folder, name, os.O_RDWR, where=path)
             with contextlib.suppress(FileExistsError):
                 return _make(folder, name)
 

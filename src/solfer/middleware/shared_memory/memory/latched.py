@@ -23,7 +23,7 @@ def latched(path: Path, kind: str, layout: bytes, size: int) -> Segment:
         return Segment.attach(path, kind, layout, writable=True)
     except MiddlewareError:
         try:
-            return Segment.create(path, kind, layout, size)
+            return Segment.create(path, kind, layout, size=size)
         except MiddlewareError as refusal:
             with contextlib.suppress(MiddlewareError):  # another process may have been faster
                 return Segment.attach(path, kind, layout, writable=True)

@@ -81,7 +81,7 @@ class Segment:
                 f"shared memory cannot be made: {error.strerror}", where=str(path), expected="room in /dev/shm"
             ) from error
         try:
-            return cls(path, _replace(path, kind, layout, size), lock)
+            return cls(path, _replace(path, kind, layout, size=size), lock)
         except OSError as error:
             lock.release()
             raise MiddlewareError(
@@ -113,7 +113,7 @@ class Segment:
                 where=str(path),
                 expected="shared memory of your own user",
             ) from error
-        check(path, mapped.memory, kind, layout)
+        check(path, mapped.memory, kind, layout=layout)
         return cls(path, mapped)
 
     def recreate(self, layout: bytes, size: int) -> "Segment":
@@ -123,7 +123,7 @@ class Segment:
             MiddlewareError: It cannot be made; this one stays.
         """
         try:
-            mapped = _replace(self.path, kind_of(self._memory), layout, size)
+            mapped = _replace(self.path, kind_of(self._memory), layout, size=size)
         except OSError as error:
             raise MiddlewareError(
                 f"shared memory cannot be made: {error.strerror}", where=str(self.path), expected="room in /dev/shm"
@@ -220,7 +220,7 @@ def _replace(path: Path, kind: str, layout: bytes, size: int) -> _Mapped:
     generation = words[Word.GENERATION] + 1 if words is not None else 1
     draft = path.with_name(f"{path.name}.new")
     mapped = _allocate(draft, HEADER + padded(len(layout)) + padded(size))
-    write_header(mapped.memory, kind.encode(), layout, generation)
+    write_header(mapped.memory, kind.encode(), layout, generation=generation)
     files.replace(draft, path)
     if words is not None:
         words[Word.RETIRED] = 1

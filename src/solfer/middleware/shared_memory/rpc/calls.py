@@ -53,11 +53,11 @@ class Calls:
             name.lstrip("/"),
             interface_of(interface, type(request), reply),
             request,
-            reply,
-            Future(),
-            timeout,
-            self._now() + timeout,
-            self._count,
+            reply=reply,
+            answer=Future(),
+            timeout=timeout,
+            latest=self._now() + timeout,
+            number=self._count,
         )
         self.open.append(asked)
         self.poll()

@@ -99,7 +99,7 @@ class RpcChannel:
             MiddlewareError: The segment cannot be made.
         """
         size = MessageRing.size(REQUEST_SIZE, OPEN) + LINE + MessageRing.size(REPLY_SIZE, 2)
-        return cls(Segment.create(path, KIND, interface, size))
+        return cls(Segment.create(path, KIND, interface, size=size))
 
     @classmethod
     def join(cls, path: Path, interface: bytes) -> "RpcChannel":

@@ -77,7 +77,7 @@ class ServiceServer:
         self._now = now
         self._worker = worker
         self._interface = interface_of(service.interface, service.request, service.reply)
-        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), KIND, self._interface, 0)
+        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), KIND, self._interface, size=0)
         self._channels: dict[str, RpcChannel] = {}
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
@@ -92,7 +92,7 @@ class ServiceServer:
                 number, (awaited, fields) = request
                 now = self._now()
                 if now < awaited:  # else its client has given up: this process stood still
-                    self._open.append(_Call(channel, number, now + self._service.timeout, awaited))
+                    self._open.append(_Call(channel, number, now + self._service.timeout, awaited=awaited))
                     self._begin(self._open[-1], fields)
         if self._open:
             self._open = [call for call in self._open if not self._advance(call)]

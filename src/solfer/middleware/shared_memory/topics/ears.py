@@ -36,7 +36,7 @@ class Ears:
         try:
             path = self._namespace.place(EARS, topic, self._name)
             content = json.dumps({"message": message, "declared": declared}).encode()
-            self._segments[topic] = Segment.create(path, KIND, content, 0)
+            self._segments[topic] = Segment.create(path, KIND, content, size=0)
             self._namespace.bell(EARS, topic).ring()
         except MiddlewareError:
             self._segments[topic] = None

@@ -51,7 +51,7 @@ class XbotReader(Reader):
         self.carries = message
         self._now = now
         self._kept = kept
-        self._sender_segments = SenderSegments(namespace, topic, message, Ring if kept else Slot)
+        self._sender_segments = SenderSegments(namespace, topic, message, end=Ring if kept else Slot)
         self._bell = self._sender_segments.bell
         self.publishers: list[SenderSegment] = []
         self._sources: list[SenderSegment] = []  # with those that have ended, until all of theirs is read
@@ -158,7 +158,7 @@ class XbotQueue(Queue):
 
     def __init__(self, namespace: Namespace, topic: str, message: str, size: int):
         self.topic = topic
-        self._sender_segments = SenderSegments(namespace, topic, message, Ring)
+        self._sender_segments = SenderSegments(namespace, topic, message, end=Ring)
         self._bell = self._sender_segments.bell
         self._messages: deque[Any] = deque(maxlen=size)
         self._sender_segments.update()
@@ -267,7 +267,7 @@ class XbotWriter(Writer):
         self._throttle = Throttle(logger)
         require_message(namespace, topic, message)
         path = namespace.place(PIPES, topic, file_of(sender, number))
-        self._segment = Segment.create(path, KIND, header(message, sender, None), 0)
+        self._segment = Segment.create(path, KIND, header(message, sender, None), size=0)
         self._layout: Layout | None = None
         self._last: Message | None = None
         self._end: Ring | None = None

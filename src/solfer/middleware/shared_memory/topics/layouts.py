@@ -87,7 +87,9 @@ class NumbersLayout:
 
     def bind(self, message_type: type, values: np.ndarray, sender: str) -> WireRecord:
         """Make a record of this layout on `values`."""
-        return NumbersWireRecord(message_type, self.texts, self.shapes, self.tuples, values, sender)
+        return NumbersWireRecord(
+            message_type, self.texts, self.shapes, tuples=self.tuples, values=values, sender=sender
+        )
 
 
 class TextLayout:

@@ -130,7 +130,11 @@ class Imu(SingleSensor):
     def of(cls, state: SimulationState, equipment: Equipment) -> "Imu | None":
         """See `Sensor.of`."""
         record = equipment.record.imu
-        return None if record is None else cls(state, record, equipment.record.seed, 1.0 / equipment.record.rates.imu)
+        return (
+            None
+            if record is None
+            else cls(state, record, equipment.record.seed, period=1.0 / equipment.record.rates.imu)
+        )
 
     def restart(self, seed: int | None = None) -> None:
         """See `Sensor.restart`; the sensor is switched on anew."""
@@ -199,4 +203,4 @@ class Imu(SingleSensor):
 
 
 def _drift(seed: int, sensor: str, record: DriftRecord) -> Drift:
-    return Drift(seed, sensor, record.density, record.bias, record.walk)
+    return Drift(seed, sensor, record.density, bias=record.bias, walk=record.walk)
