@@ -56,6 +56,7 @@ class MotionGuard:
 
     Attributes:
         polygon: The support polygon.
+        is_held: Whether the motion is held.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class MotionGuard:
         velocity: np.ndarray,
     ):
         self.polygon = polygon
+        self.is_held = False
         self._names = tuple(legs)
         kinds = ((CAMBER, "camber", "rad", LEAN), (CASTER, "caster", "rad", LEAN), (VERTICES, "vertex", "m", AWAY))
         watched = [
@@ -110,6 +112,7 @@ class MotionGuard:
 
     def leave(self, least: float) -> None:
         """Set the margin that motions leave [m]."""
+        self.polygon.least = least
         self._memory.record["least"] = least
 
     @property
@@ -135,6 +138,7 @@ class MotionGuard:
     def start(self) -> None:
         """Hold nothing."""
         self._state[:] = 0.0
+        self.is_held = False
 
     def update(self, pace: float, is_bound: bool, passed: float) -> bool:
         """Shorten joint velocities that would use up the margin; return whether the motion is held.
@@ -145,4 +149,5 @@ class MotionGuard:
             passed: Time since the cycle before [s].
         """
         self._memory.record["period"] = passed
-        return hold_back(self._address, pace, is_bound)
+        self.is_held = hold_back(self._address, pace, is_bound)
+        return self.is_held

@@ -12,6 +12,7 @@ from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.errors import ComponentError, UnknownName
+from solfer.numerics.planar_move import PlanarMove
 from solfer.points.contact.contacts import Contact
 
 CARRYING = 3
@@ -75,6 +76,7 @@ class Lifting:
 
     Attributes:
         phase: What is done at present.
+        polygon: The support polygon.
         margin: As above; may be set.
         goal: Where the base goes, or went, to shift the weight, x and y in the world, shape (2,) [m].
     """
@@ -96,7 +98,7 @@ class Lifting:
         self._holding = tuple(holding)
         self._offsets = offsets
         self._references = references
-        self._polygon = polygon
+        self.polygon = polygon
         self.margin = margin
         self._is_whole = is_whole
         self._base_velocity = base_velocity
@@ -112,6 +114,10 @@ class Lifting:
         """Begin with what is lifted."""
         self._shift[:] = self._moved[:] = 0.0
         self.stop()
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move with the base, whose estimate has jumped."""
+        move.move(self.goal)
 
     def stop(self) -> None:
         """Leave all as it is: what is under way is not carried out."""
@@ -149,7 +155,7 @@ class Lifting:
             answer.set_result(LiftReply())
             return answer
         self._answers.append(answer)
-        way = self._polygon.towards([*self._asked, *np.flatnonzero(lifted).tolist()], self.margin)
+        way = self.polygon.towards([*self._asked, *np.flatnonzero(lifted).tolist()], self.margin)
         self._rounds = 0
         self._begin(Phase.SHIFT, *way)
         return answer
@@ -224,7 +230,7 @@ class Lifting:
     def _settle(self) -> None:
         """Lift the wheels as soon as the others carry the robot."""
         lifted = np.flatnonzero(self._references.lifted).tolist()
-        x, y = self._polygon.towards([*self._asked, *lifted], self.margin - WORSE)
+        x, y = self.polygon.towards([*self._asked, *lifted], self.margin - WORSE)
         if math.hypot(x, y) < 1e-3:
             for index in self._asked:
                 self._ground[index] = self._offsets.states[index, 2] - self._plane(index)
@@ -236,7 +242,7 @@ class Lifting:
             return
         self._rounds += 1
         if self._rounds < ROUNDS:
-            self._begin(Phase.SHIFT, *self._polygon.towards([*self._asked, *lifted], self.margin))
+            self._begin(Phase.SHIFT, *self.polygon.towards([*self._asked, *lifted], self.margin))
         else:
             names = ", ".join(self._names[index] for index in self._asked)
             self._fail(f"without {names} the centre of mass stays {math.hypot(x, y):.3f} m too near to an edge")
