@@ -1,6 +1,5 @@
 """The component `wheeled_motion`."""
 
-import logging
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,15 +12,15 @@ from solfer.components.live_tunings import live_tunings
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.inputs import ReferenceInputs
 from solfer.components.wheeled_motion.joints import CommandedJoints
+from solfer.components.wheeled_motion.log import WheelsLog
 from solfer.components.wheeled_motion.original.kernel import ROUNDED, ROUNDED_TURN
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.delay import ClockDelay
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
-from solfer.components.wheeled_motion.recorder import DrivingRecorder
 from solfer.components.wheeled_motion.references import References, about_z
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard
+from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, WeightShift
 from solfer.components.wheeled_motion.tags import CAMBER, CASTER, POINTS, DrivingTags, SteeringRecord, WheeledMotionTags
 from solfer.components.wheeled_motion.targets import BASE_PORT, VERTICES_PORT, Targets, WheelsSupport
 from solfer.components.wheeled_motion.tasks import DrivingTasks
@@ -30,9 +29,6 @@ from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
 from solfer.tasks.stack import Stack
-from solfer.throttle import Throttle
-
-log = logging.getLogger(__name__)
 
 LIMITS = (
     *("base_speed", "turn_speed", "vertex_speed"),
@@ -85,19 +81,12 @@ class WheeledMotion(Component):
         kinematics = robot.kinematics
         ends = kinematics.lower_position[steering], kinematics.upper_position[steering]
         self.joints = CommandedJoints(moved, robot.size, steering, Resteering(*ends) if tags.is_original else None)
+        polygon = SupportPolygon(self.wheels.offsets.vertices, self.wheels.center, tags.support_margin)
+        shift = WeightShift(self.references, self.wheels, self.joints)
         self._lifting = Lifting(
-            [wheel.name for wheel in self.wheels.contacts],
-            self.tasks.holding,
-            self.wheels.offsets,
-            references=self.references,
-            polygon=self.wheels.make_polygon(tags.support_margin),
-            base_velocity=self._base_velocity,
-            forces=self.wheels.measure_forces,
-            margin=tags.lift_margin,
-            is_whole=robot.is_whole,
+            self.wheels, self.references, shift, polygon=polygon, holding=self.tasks.holding, margin=tags.lift_margin
         )
         self._delay = ClockDelay()
-        self._throttle = Throttle(log)
 
     @property
     def drive(self) -> Drive:
@@ -149,7 +138,7 @@ class WheeledMotion(Component):
             turning=wheels.steering,
             velocity=self.tasks.descent.velocity,
         )
-        self._recorder = DrivingRecorder(self.model, wheels, references, steering=self._steering, joints=self.joints)
+        self._log = WheelsLog(self.model, wheels, references, steering=self._steering, joints=self.joints)
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer gains of tasks, speeds and accelerations, margins, and how wheels steer."""
@@ -257,12 +246,11 @@ class WheeledMotion(Component):
         last = self.tasks.descent.last
         guard = self._guard
         if guard.update(self.references.pace, last >= 0, step) and self._pace.held < HELD:
-            why = guard.why or f"joint '{self.model.dofs[last]}' is at its bound"
-            self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
+            guard.warn(self.name, self.model.dofs[last])
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`: references of base and vertices stay where they are as seen from the robot."""
-        for part in (self.references, self.targets, self.drive, self._steering, self._lifting, self.wheels):
+        for part in (self.references, self.targets, self.drive, self._steering, self._lifting.shift, self.wheels):
             part.displace(move)
 
     def send(self) -> None:
@@ -335,18 +323,14 @@ class WheeledMotion(Component):
 
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
-        self._recorder.start(logger)
+        self._log.start(logger)
 
     def log(self, logger: Any, time: float) -> None:
         """See `Component.log`: how far base and vertices are from their references, and the measured velocity."""
-        self._recorder.measure()
+        self._log.measure()
 
     def _published_pace(self) -> float:
         """Return the share of the received velocities with which the motion goes on."""
         if self.references.waits:
             return 0.0
         return self.references.pace * self.received.share * self._delay.share * self.drive.progress
-
-    def _base_velocity(self) -> np.ndarray:
-        """Return how fast the base's link was commanded to move in the last cycle, x and y in the world [m/s]."""
-        return self.wheels.pose.jacobian[:2] @ self.joints.velocity

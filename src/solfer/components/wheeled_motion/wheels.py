@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
-from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, STEERING, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
@@ -52,10 +51,15 @@ class DrivenWheels:
         """Place of the base that is tracked, shape (3,) [m]; live."""
         return self.points[POINTS[BASE]].value[3:]
 
-    def make_polygon(self, least: float) -> SupportPolygon:
-        """Make the polygon of the vertices, of which motions leave a margin [m]."""
-        center = self.points[POINTS[BASE]].center  # type: ignore[attr-defined]
-        return SupportPolygon(self.offsets.vertices, center, least)
+    @property
+    def center(self) -> CenterOfMass:
+        """Centre of mass, up to date with the points."""
+        return self.points[POINTS[BASE]].center  # type: ignore[attr-defined]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether that is the centre of mass of the whole robot."""
+        return self._robot.is_whole
 
     def find_legs(self, moved: np.ndarray) -> dict[str, int]:
         """Return the DoFs among the moved ones, shape (m,), that neither drive nor steer a wheel, by their names."""

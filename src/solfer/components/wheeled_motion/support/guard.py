@@ -1,5 +1,6 @@
 """Where motions come to rest: the margin of the support polygon, wheels that lean, legs that do not reach farther."""
 
+import logging
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -19,6 +20,9 @@ from solfer.components.wheeled_motion.support.kernel import (
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, VERTICES
 from solfer.numerics.pointers import Memory
+from solfer.throttle import Throttle
+
+log = logging.getLogger(__name__)
 
 LEAN = 0.5
 """How far camber and caster may be away from what is desired of them [rad]: steering fails where wheels lean more."""
@@ -72,6 +76,7 @@ class MotionGuard:
     ):
         self.polygon = polygon
         self.is_held = False
+        self._throttle = Throttle(log)
         self._names = tuple(legs)
         kinds = ((CAMBER, "camber", "rad", LEAN), (CASTER, "caster", "rad", LEAN), (VERTICES, "vertex", "m", AWAY))
         watched = [
@@ -134,6 +139,11 @@ class MotionGuard:
             what, unit = self._watched[index]
             return f"{what} is {amount:.2f} {unit} off"
         return f"joint '{self._names[index - len(self._watched)]}' is near a singularity"
+
+    def warn(self, name: str, joint: str) -> None:
+        """Log what holds a component; nothing but a joint at its bound where the guard does not."""
+        why = self.why or f"joint '{joint}' is at its bound"
+        self._throttle.warning("held", "%s holds where it is: %s", name, why)
 
     def start(self) -> None:
         """Hold nothing."""

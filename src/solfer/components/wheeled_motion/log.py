@@ -11,7 +11,7 @@ from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.robot import Robot
 
 
-class DrivingRecorder:
+class WheelsLog:
     """Declares references, vertices, steering and errors, and measures what the cycle does not.
 
     Args:
