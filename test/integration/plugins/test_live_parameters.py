@@ -135,7 +135,7 @@ def numbers_of(component):
             if isinstance(component, SupportShaping):
                 governor = component.governor
                 yield from (governor.limits, np.diag(governor._solver.problem.hessian), [component.reaction.margin])
-                yield [governor.speed, governor._rate, governor._recovery]
+                yield [governor.speed, governor._rows.horizon, governor._rows.recovery]
         case GroundForces():
             yield [component.touch._begin, component.touch._end, component.touch._delay, component.touch._rise]
             yield [component.checks.friction]

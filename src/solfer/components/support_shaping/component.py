@@ -140,7 +140,7 @@ class SupportShaping(WheeledMotion):
         """See `WheeledMotion._set_step`."""
         self.governor.set_period(step)
         if self.program is not None:
-            self.program.set_period(step)
+            self.program.wheels.period = step
         return super()._set_step(step)
 
     def init(self) -> None:
@@ -193,7 +193,7 @@ class SupportShaping(WheeledMotion):
         links = self.wheels.links
         report = self.shaping.report
         edges = ["-".join((links[first], links[second])) for first, second in self.polygon.edges]
-        polygon = self.polygon if self.program is None else self.program.polygon
+        polygon = self.polygon if self.program is None else self.program.wheels.polygon
         logger.add("margins", polygon.margins, edges, "m")
         logger.add("workspaces", polygon.distances, links, "m")
         logger.add("reserves", self.governor.reserves, list(report.names), "m")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.support_shaping.joint_program import JointProgram
+from solfer.components.support_shaping.joint_program import JointProgram, RollingWheels
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.kernel import find_soft
@@ -114,8 +114,9 @@ class OriginalShaping:
             (float(tags.major_axis or wheel.major_axis or 0.0), float(tags.minor_axis or wheel.minor_axis or 0.0))
             for wheel in wheels.contacts
         ]
-        axles = wheels.offsets.axes
-        self.program = JointProgram(robot, tags, tuple(wheels.links), axles=axles, radii=radii, moved=joints.moved)
+        hips = robot.links(tags.hips)
+        rolling = RollingWheels(robot, tuple(wheels.links), hips, axles=wheels.offsets.axes, radii=radii)
+        self.program = JointProgram(robot, tags, rolling, moved=joints.moved)
         self._world = WorldVertices(count, robot.size)
         self._before_camber, self._before_steering = np.zeros((2, count, robot.size))
         self._aims = np.zeros(count)
@@ -128,9 +129,9 @@ class OriginalShaping:
         self._references.position[:] = self._wheels.pose.value[:3]
         self._references.camber[:] = 0.0
         self._aims[:] = steering.measured
-        self.program.measure()
-        self.program.polygon.start(self.program.places)
-        self._world.start(self.program.places)
+        self.program.wheels.update()
+        self.program.wheels.polygon.start(self.program.wheels.places)
+        self._world.start(self.program.wheels.places)
         self._keep_jacobians()
 
     def update(self, steering: Steering, step: float) -> None:
@@ -166,7 +167,7 @@ class OriginalShaping:
         count = rows[BASE].stop
         damping = stack.numbers[:count, DAMPING_COLUMN]
         before = self._first.update(stack.jacobian[:count], stack.velocity[:count], damping)
-        self.program.measure()
+        self.program.wheels.update()
         self._sum_loads()
         self.program.solve(
             stack.jacobian[rows[CONSTRAINTS]],
@@ -184,7 +185,7 @@ class OriginalShaping:
         world = self._world
         world.move(self.program.vertices, offsets.directions, step)
         jacobians = np.array([vertex.jacobian[:2] for vertex in offsets.vertices])
-        world.see(self.program.places, offsets.directions, jacobians)
+        world.see(self.program.wheels.places, offsets.directions, jacobians)
         rows = self._tasks.rows[VERTICES]
         along = slice(rows.start, rows.start + len(world.errors))
         self._tasks.rates.error[rows] = 0.0
