@@ -133,8 +133,12 @@ def numbers_of(component):
             yield [float(component._guard._memory.record["least"]), component._guard.polygon.least]
             yield [float(component._pace._memory.record[key]) for key in ("base_speed", "vertex_speed", "acceleration")]
             if isinstance(component, SupportShaping):
-                governor = component.governor
-                yield from (governor.limits, np.diag(governor._solver.problem.hessian), [component.reaction.margin])
+                governor = component.shaping.governor
+                yield from (
+                    governor.limits,
+                    np.diag(governor._solver.problem.hessian),
+                    [component.shaping.reaction.margin],
+                )
                 yield [governor.speed, governor._rows.horizon, governor._rows.recovery]
         case GroundForces():
             yield [component.touch._begin, component.touch._end, component.touch._delay, component.touch._rise]

@@ -110,7 +110,7 @@ def test_first_program_and_its_solution(repository, recorded, player, robot):
     component.init()
     forces.update()
     component.update()
-    solver, qp = component.program.solver, {name: np.array(value) for name, value in recorded["qp"].items()}
+    solver, qp = component.original.program.solver, {name: np.array(value) for name, value in recorded["qp"].items()}
     assert_allclose(solver.problem.hessian, qp["H"], rtol=0.0, atol=1e-12)
     solution = solver.solve().x
     assert_allclose(solution, recorded["rest"]["x"], rtol=0.0, atol=1e-8)
@@ -176,11 +176,11 @@ def test_rolling_wheel_carries_its_vertex(robot):
 
 def test_a_margin_is_kept(make):
     component = make(margins=(0.25,), workspaces=(0.75,), balance="center_of_mass", base="center_of_mass")
-    before = component.polygon.margins.copy()
+    before = component.shaping.measure.polygon.margins.copy()
     cycle(component, 600, INWARDS)
-    assert component.polygon.margins[1] < before[1] - 0.02
+    assert component.shaping.measure.polygon.margins[1] < before[1] - 0.02
     assert min(reserve(component, name) for name in (RIGHT, LEFT)) > -2e-3
-    message = component.margins()
+    message = component.shaping.report.margins()
     assert {RIGHT, LEFT} <= set(message.active) and not message.infeasible and message.share == 1.0
 
 
@@ -208,7 +208,7 @@ def test_a_joint_beyond_its_range_may_rest(make, robot, side):
     robot.state.position[joint] = limits.position[joint] + 0.1 * side
     robot.update()
     component.update()
-    problem, place = component.program.solver.problem, list(component.moved).index(joint)
+    problem, place = component.original.program.solver.problem, list(component.moved).index(joint)
     speed = robot.upper_limits.velocity[joint]
     assert (problem.least[place], problem.largest[place]) == ((-speed, 0.0) if side > 0.0 else (0.0, speed))
 
@@ -217,7 +217,7 @@ def test_a_joint_beyond_its_range_may_rest(make, robot, side):
 def test_a_leg_stays_within_reach(make):
     component = make(margins=(0.05,), workspaces=(0.64,), balance="center_of_mass")
     cycle(component, 1000, tuple(-each for each in INWARDS))
-    assert component.polygon.distances.max() == pytest.approx(0.64, abs=2e-3)
+    assert component.shaping.measure.polygon.distances.max() == pytest.approx(0.64, abs=2e-3)
 
 
 @pytest.mark.slow
@@ -228,8 +228,8 @@ def test_infeasible_margins_let_it_stand(make, caplog, policy, share, words):
     cycle(component, 1500, (0.0,) * 12)
     before = component.model.command.position.copy()
     cycle(component, 400)
-    assert component.governor.share == pytest.approx(share)
-    assert FRONT in component.margins().infeasible or reserve(component, FRONT) < -0.5
+    assert component.shaping.governor.share == pytest.approx(share)
+    assert FRONT in component.shaping.report.margins().infeasible or reserve(component, FRONT) < -0.5
     assert f"'{FRONT}' cannot be kept" in caplog.text and words in caplog.text
     assert np.abs(component.model.command.position - before)[:LOWER].max() < 2e-2
     assert np.isfinite(component.model.command.velocity).all()
@@ -242,17 +242,18 @@ def test_a_warning_comes_before_the_limit(make, caplog):
     assert RIGHT not in caplog.text
     while reserve(component, RIGHT) > 0.045:
         cycle(component, 10, INWARDS)
-    assert f"m are left of '{RIGHT}'" in caplog.text and not component.governor.active.any()
+    assert f"m are left of '{RIGHT}'" in caplog.text and not component.shaping.governor.active.any()
 
 
 def test_pressure_counts_where_contacts_press(make, robot):
     component = make(balance="center_of_pressure")
     cycle(component, 1)
-    middle = component.polygon.margins.copy()
+    middle = component.shaping.measure.polygon.margins.copy()
     for name, force in zip(robot.contacts.names[:4], (400.0, 400.0, 100.0, 100.0), strict=True):
         robot.contacts[name].wrench[2] = force
     cycle(component, 1)
-    assert component.polygon.margins[0] < middle[0] - 0.1 and component.polygon.margins[3] > middle[3] + 0.1
+    margins = component.shaping.measure.polygon.margins
+    assert margins[0] < middle[0] - 0.1 and margins[3] > middle[3] + 0.1
 
 
 def test_the_polygon_follows_a_push():

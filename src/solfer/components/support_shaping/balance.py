@@ -1,11 +1,10 @@
 """Where the balance of a robot is in its support polygon, and how far wheels are from their hips."""
 
-import math
-
 import numpy as np
 
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
+from solfer.components.wheeled_motion.references import seen_from
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.errors import ComponentError, UnknownName
 from solfer.robot import Robot
@@ -51,11 +50,12 @@ class BalanceMeasure:
         kinematics = self._robot.kinematics
         x, y, _ = self.balance().tolist()
         self.polygon.update(self._wheels.offsets.states.tolist(), self._seen_from_base(x, y))
+        heading = self._wheels.offsets.heading
         legs = []
         for hip, wheel in self._ends:
             hx, hy, hz = kinematics.position(hip).tolist()
             wx, wy, wz = kinematics.position(wheel).tolist()
-            legs.append((*self.turn_back(hx - wx, hy - wy), hz - wz))
+            legs.append((*seen_from(heading, hx - wx, hy - wy), hz - wz))
         self.polygon.measure_legs(legs)
 
     def balance(self) -> np.ndarray:
@@ -74,26 +74,12 @@ class BalanceMeasure:
         x, y, z = center.value.tolist()
         vx, vy, _ = self._velocity.tolist()
         ground = float(self._wheels.offsets.states[:, 2].min())
-        return (*self._seen_from_base(x, y), z - ground), self.turn_back(vx, vy)
-
-    def turn(self, x: float, y: float) -> tuple[float, float]:
-        """Return a vector that is seen from the heading in the axes of the world."""
-        heading = self._wheels.offsets.heading
-        cos = math.cos(heading)
-        sin = math.sin(heading)
-        return cos * x - sin * y, sin * x + cos * y
-
-    def turn_back(self, x: float, y: float) -> tuple[float, float]:
-        """Return a vector of the world as seen from the heading."""
-        heading = self._wheels.offsets.heading
-        cos = math.cos(heading)
-        sin = math.sin(heading)
-        return cos * x + sin * y, cos * y - sin * x
+        return (*self._seen_from_base(x, y), z - ground), seen_from(self._wheels.offsets.heading, vx, vy)
 
     def _seen_from_base(self, x: float, y: float) -> tuple[float, float]:
         """Return a place of the world as seen from the base [m]."""
         px, py, _ = self._robot.kinematics.position(self._base).tolist()
-        return self.turn_back(x - px, y - py)
+        return seen_from(self._wheels.offsets.heading, x - px, y - py)
 
 
 def _hips_of(robot: Robot, tags: SupportShapingTags, count: int) -> list[str]:

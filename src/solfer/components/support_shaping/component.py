@@ -5,11 +5,8 @@ from typing import Any
 import numpy as np
 
 from solfer.components.declaration import LiveParameter, TopicIn, TopicOut
-from solfer.components.support_shaping.governor import Reaction, SupportGovernor
-from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.original import OriginalShaping
-from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.shaping import FootprintShaping
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
@@ -76,26 +73,6 @@ class SupportShaping(WheeledMotion):
                 robot, tags, self.wheels, tasks=self.tasks, references=self.references, joints=self.joints
             )
 
-    @property
-    def polygon(self) -> FootprintGeometry:
-        """The support polygon, as of the last cycle, seen from the heading of the base."""
-        return self.shaping.measure.polygon
-
-    @property
-    def governor(self) -> SupportGovernor:
-        """Keeps the limits of the polygon."""
-        return self.shaping.governor
-
-    @property
-    def reaction(self) -> Reaction:
-        """Moves the polygon under a robot that is pushed."""
-        return self.shaping.reaction
-
-    @property
-    def program(self) -> JointProgram | None:
-        """The quadratic program of the original; None unless original."""
-        return None if self.original is None else self.original.program
-
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer margins, workspaces and how they are kept, beside what `WheeledMotion` offers."""
         return (
@@ -108,7 +85,7 @@ class SupportShaping(WheeledMotion):
     def _take_limits(self, numbers: np.ndarray) -> None:
         """See `WheeledMotion._take_limits`."""
         super()._take_limits(numbers)
-        self.governor.speed = float(numbers[LIMITS.index("vertex_speed")])
+        self.shaping.governor.speed = float(numbers[LIMITS.index("vertex_speed")])
 
     def _sizes_of(self, tags: SupportShapingTags) -> list[tuple[float, ...]]:
         return [tags.each(key, len(self.wheels.links)) for key in SIZES]
@@ -118,18 +95,18 @@ class SupportShaping(WheeledMotion):
 
     def _take_sizes(self, numbers: np.ndarray) -> None:
         """Go on with other numbers of `SIZES`, shape (2, count) [m]."""
-        self.governor.limits[:] = numbers
-        if self.program is not None:
-            self.program.limits[:] = numbers
+        self.shaping.governor.limits[:] = numbers
+        if self.original is not None:
+            self.original.program.limits[:] = numbers
 
     def _take_shaping(self, numbers: np.ndarray) -> None:
         """Go on with other numbers of `SHAPING`."""
         values = numbers.tolist()
         gains = values[:2]
-        horizon, recovery, self.reaction.margin = values[2:]
-        self.governor.tune(gains, horizon, recovery)
-        if self.program is not None:
-            self.program.weigh(gains)
+        horizon, recovery, self.shaping.reaction.margin = values[2:]
+        self.shaping.governor.tune(gains, horizon, recovery)
+        if self.original is not None:
+            self.original.program.weigh(gains)
 
     def set_rate(self, rate: float) -> None:
         """See `WheeledMotion.set_rate`."""
@@ -138,9 +115,9 @@ class SupportShaping(WheeledMotion):
 
     def _set_step(self, step: float) -> float:
         """See `WheeledMotion._set_step`."""
-        self.governor.set_period(step)
-        if self.program is not None:
-            self.program.wheels.period = step
+        self.shaping.governor.set_period(step)
+        if self.original is not None:
+            self.original.program.wheels.period = step
         return super()._set_step(step)
 
     def init(self) -> None:
@@ -164,12 +141,12 @@ class SupportShaping(WheeledMotion):
         """Write what is received to the references, as far as the limits allow."""
         super()._take_over(gap)
         self.shaping.update(self.tags, self.time_step)
-        self._pace.is_found = self.tags.is_paced and not self.reaction.is_active
+        self._pace.is_found = self.tags.is_paced and not self.shaping.reaction.is_active
 
     def _find_errors(self) -> None:
         """See `WheeledMotion._find_errors`: wheels steer faster under a robot that is pushed."""
         super()._find_errors()
-        if self.reaction.is_active and STEERING in self.tasks.rows:
+        if self.shaping.reaction.is_active and STEERING in self.tasks.rows:
             self.tasks.rates.error[self.tasks.rows[STEERING]] *= QUICKER
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
@@ -181,21 +158,19 @@ class SupportShaping(WheeledMotion):
         )
 
     def _published_pace(self) -> float:
-        return super()._published_pace() * self.governor.share
-
-    def margins(self) -> SupportMargins:
-        """Return what is published of the newest cycle."""
-        return self.shaping.report.margins()
+        return super()._published_pace() * self.shaping.governor.share
 
     def start_log(self, logger: Any) -> None:
         """Declare margins and distances, too, and what is left of their limits."""
         super().start_log(logger)
         links = self.wheels.links
         report = self.shaping.report
-        edges = ["-".join((links[first], links[second])) for first, second in self.polygon.edges]
-        polygon = self.polygon if self.program is None else self.program.wheels.polygon
+        polygon = self.shaping.measure.polygon
+        edges = ["-".join((links[first], links[second])) for first, second in polygon.edges]
+        if self.original is not None:
+            polygon = self.original.program.wheels.polygon
         logger.add("margins", polygon.margins, edges, "m")
         logger.add("workspaces", polygon.distances, links, "m")
-        logger.add("reserves", self.governor.reserves, list(report.names), "m")
+        logger.add("reserves", self.shaping.governor.reserves, list(report.names), "m")
         logger.add("share", report.share, ["share"])
         logger.add("reaction", report.reaction, list("xy"), "m/s", "world")

@@ -6,7 +6,7 @@ from solfer.components.support_shaping.balance import BalanceMeasure
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.report import MarginsReport
 from solfer.components.support_shaping.tags import SupportShapingTags
-from solfer.components.wheeled_motion.references import KeptVelocities, References
+from solfer.components.wheeled_motion.references import KeptVelocities, References, turned
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.robot import Robot
 
@@ -82,7 +82,7 @@ class FootprintShaping:
         references = self._references
         offsets = self._wheels.offsets
         seen, rate = self.measure.measure_center()
-        velocity = self.measure.turn(*self.reaction.update(offsets.states.tolist(), seen, rate, step))
+        velocity = turned(offsets.heading, *self.reaction.update(offsets.states.tolist(), seen, rate, step))
         if self.reaction.is_active:
             references.pace = 1.0
             # wheels point to where the robot falls, and nothing pulls it back; footprint and place are what it gets

@@ -123,8 +123,9 @@ class WheeledMotion(Component):
             rests=tags.rests,
             across=tags.gain_across if self.received.straight is None else 0.0,
         )
-        speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
-        self._pace = PathPace(speeds, tags.acceleration, references, steering=self._steering, offsets=wheels.offsets)
+        self._pace = PathPace(
+            tags.speeds, tags.acceleration, references, steering=self._steering, offsets=wheels.offsets
+        )
         self._pace.is_found = tags.is_paced
         self._publisher = PacePublisher(self._published_pace, self.period)
         self.tasks.prepare(tags, self.period, references, steering=self._steering, joints=self.joints)

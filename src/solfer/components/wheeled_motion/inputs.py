@@ -32,10 +32,8 @@ class ReferenceInputs:
         self._name = name
         self._references = references
         self._wheels = wheels
-        speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
-        accelerations = tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration
-        self.drive = Drive(*speeds[:2], *accelerations[:2])
-        self.targets = Targets(len(wheels.links), speeds, accelerations)
+        self.drive = Drive(*tags.speeds[:2], *tags.accelerations[:2])
+        self.targets = Targets(len(wheels.links), tags.speeds, tags.accelerations)
         is_steered = len(wheels.steering) > 0
         self.straight = None if is_steered or tags.is_original else StraightAhead(wheels.links)
         self._throttle = Throttle(log)

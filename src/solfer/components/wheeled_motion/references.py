@@ -136,6 +136,20 @@ class KeptVelocities:
         references.vertex_velocity[:] = self.vertices
 
 
+def turned(heading: float, x: float, y: float) -> tuple[float, float]:
+    """Return a vector that is seen from a heading [rad] in the axes of the world."""
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+def seen_from(heading: float, x: float, y: float) -> tuple[float, float]:
+    """Return a vector of the world as seen from a heading [rad]."""
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    return cos * x + sin * y, cos * y - sin * x
+
+
 def about_z(angle: float) -> tuple[float, float, float, float]:
     """Return the quaternion of a turn about z [rad]."""
     return 0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0)

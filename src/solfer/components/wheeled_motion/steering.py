@@ -43,8 +43,7 @@ class Steering:
 
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         self._given = period
-        self.law = np.array((across, 0.0, rests, *self.numbers(tuning), period), dtype=LAW)
-        self.set_step(period)
+        self.law = np.array((across, period / RELAXATION, rests, *self.numbers(tuning), period), dtype=LAW)
         self.wheels = np.zeros(count, WHEEL)
         self.before = np.zeros(3)
         self.steered = np.zeros((4, count))

@@ -180,6 +180,16 @@ class DrivingTags(OriginalTaskTags):
         return self.pace and not self.is_original
 
     @property
+    def speeds(self) -> tuple[float, float, float]:
+        """Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s]."""
+        return self.base_speed, self.turn_speed, self.vertex_speed
+
+    @property
+    def accelerations(self) -> tuple[float, float, float]:
+        """The same of accelerations."""
+        return self.acceleration, self.turn_acceleration, self.vertex_acceleration
+
+    @property
     def rests(self) -> bool:
         """Whether wheels that steer as `steerings` say rest with small errors."""
         return self.rest and not self.is_original

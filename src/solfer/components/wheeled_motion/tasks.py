@@ -135,11 +135,7 @@ class DrivingTasks:
             forward=self.rates.forward,
             half=PERIOD if self._feeds_forward else ROUNDED,
         )
-        self.limit(
-            (tags.base_speed, tags.turn_speed, tags.vertex_speed),
-            (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
-            (tags.correction, tags.turn_correction, tags.furthest),
-        )
+        self.limit(tags.speeds, tags.accelerations, (tags.correction, tags.turn_correction, tags.furthest))
 
     def limit(self, speeds: Any, accelerations: Any, corrections: Any) -> None:
         """Set the largest speeds and accelerations of base, heading and vertices, and the limits of corrections.

@@ -158,6 +158,5 @@ class MotionGuard:
             is_bound: Whether a joint is at its bound.
             passed: Time since the cycle before [s].
         """
-        self._memory.record["period"] = passed
-        self.is_held = hold_back(self._address, pace, is_bound)
+        self.is_held = hold_back(self._address, pace, is_bound, passed)
         return self.is_held

@@ -52,7 +52,7 @@ GUARD = np.dtype(
         # rows that are watched, and their bounds; joints of the legs, and those that steer
         *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds")),
         *((name, np.int64) for name in ("leg_count", "legs", "turning_count", "turning")),
-        *((name, np.float64) for name in ("least", "period")),
+        ("least", np.float64),
     ]
 )
 """What `hold_back` reads and writes, see `solfer.numerics.pointers.Memory`."""
@@ -210,7 +210,7 @@ def _reason(memory, is_short, margin, speed, velocity):
 
 
 @part
-def _guard(memory, state, is_short, forward, pace, velocity):
+def _guard(memory, state, is_short, forward, pace, velocity, passed):
     """Whether the motion is held, since it leads where the robot does not get on."""
     way = vector_at(memory.way, memory.rows)
     size = 0.0
@@ -233,19 +233,20 @@ def _guard(memory, state, is_short, forward, pace, velocity):
         return True
     if state[WHY] == NOTHING:
         return False
-    state[AGE] += memory.period
+    state[AGE] += passed
     if state[AGE] > RETRY and why == NOTHING:
         state[WHY] = state[AMOUNT] = state[WORST] = state[AGE] = 0.0
     return state[WHY] != NOTHING and not is_other
 
 
-def _hold_back(start, pace, is_bound):
+def _hold_back(start, pace, is_bound, passed):
     """Shorten joint velocities that may not go on; return whether the motion is held.
 
     Args:
         start: Address of a `GUARD`.
         pace: Share of the desired rates that goes on.
         is_bound: Whether a joint is at its bound.
+        passed: Time since the cycle before [s].
     """
     memory = _guard_at(start)
     state = vector_at(memory.state, STATE_SIZE)
@@ -257,7 +258,7 @@ def _hold_back(start, pace, is_bound):
         for k in range(memory.dofs):
             velocity[k] *= share
     is_bound = (is_bound or share < 1.0) and _lacks(memory, away, forward)
-    return _guard(memory, state, is_short, forward, pace, velocity) or is_bound
+    return _guard(memory, state, is_short, forward, pace, velocity, passed) or is_bound
 
 
 def _find_alone(points, lifted, order, edges):
@@ -265,5 +266,5 @@ def _find_alone(points, lifted, order, edges):
     return _find(points, lifted, order, edges)
 
 
-hold_back = cached("boolean(int64, float64, boolean)", _hold_back)
+hold_back = cached("boolean(int64, float64, boolean, float64)", _hold_back)
 find_edges = cached("int64(int64[:, ::1], boolean[::1], int64[::1], float64[:, ::1])", _find_alone)

@@ -1,11 +1,10 @@
 """Desired velocities that wheels without steering cannot follow."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.wheeled_motion.references import KeptVelocities, References
+from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from
 
 SMALL = 1e-6
 """Velocities that are left out without a warning [m/s, rad/s]."""
@@ -37,9 +36,7 @@ class StraightAhead:
         dx, dy = direction.tolist()
         self._across[:] = -dy, dx
         base = self._remove(references.velocity)
-        cos = math.cos(heading)
-        sin = math.sin(heading)
-        self._across[:] = sin * dx - cos * dy, cos * dx + sin * dy
+        self._across[:] = seen_from(heading, -dy, dx)
         footprint = 0.0
         for velocity, is_lifted in zip(references.vertex_velocity, references.lifted.tolist(), strict=True):
             footprint = max(footprint, 0.0 if is_lifted else self._remove(velocity))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
-from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.references import References, seen_from, turned
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.numerics.planar_move import PlanarMove
 
@@ -57,11 +57,8 @@ class WeightShift:
 
     def begin_back(self) -> None:
         """Let the base move back by all ways that it has gone."""
-        heading = self._references.heading
-        cos = math.cos(heading)
-        sin = math.sin(heading)
-        x, y = self._way.tolist()
-        self.begin(sin * y - cos * x, -sin * x - cos * y)
+        x, y = turned(self._references.heading, *self._way.tolist())
+        self.begin(-x, -y)
 
     def end(self) -> None:
         """Let vertices be desired where the way back has left them."""
@@ -91,8 +88,4 @@ class WeightShift:
 
     def _seen(self, way: np.ndarray) -> np.ndarray:
         """Return a way in the world as seen from the heading [m]."""
-        heading = self._references.heading
-        cos = math.cos(heading)
-        sin = math.sin(heading)
-        x, y = way.tolist()
-        return np.array((cos * x + sin * y, cos * y - sin * x))
+        return np.array(seen_from(self._references.heading, *way.tolist()))
