@@ -245,6 +245,13 @@ def test_a_warning_comes_before_the_limit(make, caplog):
     assert f"m are left of '{RIGHT}'" in caplog.text and not component.shaping.governor.active.any()
 
 
+def test_limits_that_change_are_published(make):
+    component = make()
+    parameter = next(each for each in component.live_parameters() if each.path == ("margins",))
+    parameter.write(np.array((4 * [0.07], 4 * [0.6])))
+    assert component.shaping.report.margins().limits == (*4 * [0.07], *4 * [0.6])
+
+
 def test_pressure_counts_where_contacts_press(make, robot):
     component = make(balance="center_of_pressure")
     cycle(component, 1)
