@@ -27,20 +27,23 @@ class References:
         caster: Caster of the wheels, shape (count,) [rad].
         tilt: Orientation of the base as seen from its heading, quaternion.
         lifted: Which wheels do not carry the robot, shape (count,).
+        motion: Velocity, turn and position, shape (3, 3).
+        places: Velocities of the vertices, and vertices, shape (2, count, 3).
+        orientations: Orientation and tilt, shape (2, 4).
         numbers: Pace, share of the limits, heading, and whether velocities wait, shape (4,).
     """
 
     def __init__(self, count: int):
-        self._motion = np.zeros((3, 3))
-        self._places = np.zeros((2, count, 3))
-        self.velocity, self.turn, self.position = self._motion
-        self.vertex_velocity, self.vertices = self._places
+        self.motion = np.zeros((3, 3))
+        self.places = np.zeros((2, count, 3))
+        self.velocity, self.turn, self.position = self.motion
+        self.vertex_velocity, self.vertices = self.places
         self.camber, self.caster = np.zeros((2, count))
         self.numbers = np.zeros(4)
         self.lifted = np.zeros(count, dtype=bool)
-        self._orientations = np.zeros((2, 4))
-        self.orientation, self.tilt = self._orientations
-        self._orientations[:, 3] = self.numbers[PACE] = self.numbers[LIMITS] = 1.0
+        self.orientations = np.zeros((2, 4))
+        self.orientation, self.tilt = self.orientations
+        self.orientations[:, 3] = self.numbers[PACE] = self.numbers[LIMITS] = 1.0
 
     @property
     def pace(self) -> float:
@@ -106,7 +109,7 @@ class References:
 
     def step(self, period: float) -> None:
         """Go on for a time [s], at the pace."""
-        step(self._motion, self._places, self._orientations, self.numbers, period)
+        step(self.motion, self.places, self.orientations, self.numbers, period)
 
 
 class KeptVelocities:

@@ -32,8 +32,7 @@ vertex at it [m/s]."""
 GOING = np.dtype(
     [
         *((name, np.int64) for name in ("count", "state", "steered", "base")),
-        *((name, np.int64) for name in ("numbers", "velocity", "turn", "position", "vertex_velocity", "vertices")),
-        *((name, np.int64) for name in ("orientation", "tilt", "desired")),
+        *((name, np.int64) for name in ("numbers", "motion", "vertices", "orientations", "desired")),
         *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "acceleration")),
     ]
 )
@@ -50,9 +49,10 @@ WANTED_X, WANTED_Y, WANTED_Z, WANTED_TURN, IN_WORLD, AGE, BEFORE = range(7)
 @part
 def _limit(memory, state):
     """Find the share of what is desired that is not larger than it may be."""
-    velocity = vector_at(memory.velocity, 3)
-    turn = vector_at(memory.turn, 3)
-    vertices = matrix_at(memory.vertex_velocity, memory.count, 3)
+    motion = matrix_at(memory.motion, 3, 3)
+    velocity = motion[0]
+    turn = motion[1]
+    vertices = matrix_at(memory.vertices, memory.count, 3)
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
     share = memory.base_speed / max(memory.base_speed, speed)
     share = min(share, memory.turn_speed / max(memory.turn_speed, abs(turn[2])))
@@ -95,14 +95,19 @@ def _multiply(a, b, out):
 
 
 @part
-def _step(numbers, velocity, turn, position, vertex_velocity, vertices, orientation, tilt, period):
+def _step(numbers, motion, velocities, vertices, orientations, period):
     """Let references go on for a time, at the pace."""
+    velocity = motion[0]
+    turn = motion[1]
+    position = motion[2]
+    orientation = orientations[0]
+    tilt = orientations[1]
     time = period * numbers[PACE]
     for k in range(3):
         position[k] += time * velocity[k]
     for index in range(len(vertices)):
         for k in range(3):
-            vertices[index, k] += time * vertex_velocity[index, k]
+            vertices[index, k] += time * velocities[index, k]
     heading = numbers[HEADING] + time * turn[2]
     numbers[HEADING] = heading - 2.0 * math.pi * math.floor(heading / (2.0 * math.pi) + 0.5)
     if turn[0] != 0.0 or turn[1] != 0.0:
@@ -139,26 +144,16 @@ def _advance(start, is_paced, is_first, is_held, most, passed):
         if not is_first:
             _update(memory, state, is_held, most, passed)
         numbers[LIMITS], numbers[PACE] = state[MOST], state[VALUE]
-    vertices = matrix_at(memory.vertices, count, 3)
-    _step(
-        numbers,
-        vector_at(memory.velocity, 3),
-        vector_at(memory.turn, 3),
-        vector_at(memory.position, 3),
-        matrix_at(memory.vertex_velocity, count, 3),
-        vertices,
-        vector_at(memory.orientation, 4),
-        vector_at(memory.tilt, 4),
-        passed,
-    )
+    both = matrix_at(memory.vertices, 2 * count, 3)
+    vertices = both[count:]
+    motion = matrix_at(memory.motion, 3, 3)
+    _step(numbers, motion, both[:count], vertices, matrix_at(memory.orientations, 2, 4), passed)
     matrix_at(memory.desired, count, 3)[:] = vertices
 
 
 def _step_alone(motion, places, orientations, numbers, period):
     """See `_step`; arrays as `solfer.components.wheeled_motion.references.References` has them."""
-    _step(
-        numbers, motion[0], motion[1], motion[2], places[0], places[1], orientations[0], orientations[1], period
-    )  # fmt: skip
+    _step(numbers, motion, places[0], places[1], orientations, period)
 
 
 def _follow(state, velocity, turn, heading, counted, passed, patience, change, turn_change):
