@@ -69,10 +69,11 @@ class ReferenceInputs:
             self._references.step(0.5 * gap)
         if wrong := self.targets.read():
             self._throttle.warning("targets", "%s: %s, it is ignored", self._name, wrong)
-        if self.targets.ports[BASE_PORT].fresh and self.targets.has_base:
-            self.drive.start()
-        elif self.drive.is_active:
-            self.targets.leave_base()
+        if self.targets.has_base:
+            if self.targets.ports[BASE_PORT].fresh:
+                self.drive.start()
+            elif self.drive.is_active:
+                self.targets.leave_base()
         is_at_rest = self._write(step + gap)
         if gap and not is_at_rest:
             self._references.step(0.5 * gap)

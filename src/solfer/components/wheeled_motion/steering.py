@@ -43,6 +43,7 @@ class Steering:
 
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         self._given = period
+        self._step = period
         self.law = np.array((across, period / RELAXATION, rests, *self.numbers(tuning), period), dtype=LAW)
         self.wheels = np.zeros(count, WHEEL)
         self.before = np.zeros(3)
@@ -61,8 +62,10 @@ class Steering:
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""
-        self.law["rate"] = step / RELAXATION
-        self.law["period"] = step
+        if step != self._step:
+            self._step = step
+            self.law["rate"] = step / RELAXATION
+            self.law["period"] = step
 
     def measure(self, directions: np.ndarray) -> None:
         """Take over the directions in which wheels roll in the world, shape (count, 2)."""

@@ -147,8 +147,9 @@ class Lifting:
         """Write the velocities of what is under way to the references, in place of others, for a time [s]."""
         self._period = passed
         references = self._references
-        references.waits = self.phase is not Phase.NONE
-        if not references.waits:
+        is_moving = self.phase is not Phase.NONE
+        references.waits = is_moving
+        if not is_moving:
             return
         references.velocity[:] = 0.0
         references.turn[:] = 0.0
