@@ -98,7 +98,7 @@ class Drive:
             NotFinite: A number is NaN or infinite.
             ComponentError: It is far beyond what the base may do.
         """
-        self._want((message.linear.x, message.linear.y, 0.0), message.angular.z, "cmd_vel", in_world=False)
+        self._take((message.linear.x, message.linear.y, 0.0), message.angular.z, "cmd_vel", in_world=False)
 
     def receive_state(self, message: WheelsState, references: References) -> None:
         """Take over a velocity in the world, and angles of the wheels; nothing changes if a part of it is wrong.
@@ -110,13 +110,13 @@ class Drive:
         """
         for what, angles in (("cs", message.cs), ("cm", message.cm)):
             check(what, angles, len(references.camber))
-        self._want((message.x, message.y, message.z), message.rz, "wheels_state", in_world=True)
+        self._take((message.x, message.y, message.z), message.rz, "wheels_state", in_world=True)
         if message.cs:
             references.camber[:] = message.cs
         if message.cm:
             references.caster[:] = message.cm
 
-    def _want(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
+    def _take(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
         """Take over a velocity."""
         desired = *velocity, turn
         if not all(map(math.isfinite, desired)):

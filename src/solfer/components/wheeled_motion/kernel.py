@@ -28,6 +28,9 @@ AHEAD = 4.0
 PACE, LIMITS, HEADING, WAITS = range(4)
 """Numbers of the references."""
 
+VELOCITY, TURN, PLACE = range(3)
+"""Rows of what is desired of the base."""
+
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
 """Rows of what is known of steered wheels."""
 
@@ -55,7 +58,7 @@ WHEELS = np.dtype(
         # of the vertices: places, errors, offsets, directions, which are lifted; heading of the base
         *((name, np.int64) for name in ("places", "errors", "offsets", "directions", "lifted", "base")),
         # of the references
-        *((name, np.int64) for name in ("numbers", "motion", "turning", "velocities", "desired_place", "orientation")),
+        *((name, np.int64) for name in ("numbers", "motion", "velocities", "orientation")),
         *((name, np.int64) for name in ("desired_camber", "desired_caster")),
         # of the points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
         *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
@@ -141,12 +144,12 @@ def _compile_steer(sources):
         lifted = flags_at(memory.lifted, count)
         pose = vector_at(memory.pose, 7)
         center = vector_at(memory.center, 2)
-        motion = vector_at(memory.motion, 3)
+        motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
         numbers = vector_at(memory.numbers, 4)
         heading = vector_at(memory.base, 1)[0]
         period = law.period
         share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
-        turn = share * vector_at(memory.turning, 3)[2]
+        turn = share * matrix_at(memory.motion, 3, 3)[TURN][2]
         cos = math.cos(heading)
         sin = math.sin(heading)
         vx = share * (cos * motion[0] + sin * motion[1])
@@ -263,7 +266,7 @@ def _find_errors(start):
         _find_base(
             vector_at(memory.place, 3),
             vector_at(memory.pose, 7),
-            vector_at(memory.desired_place, 3),
+            matrix_at(memory.motion, 3, 3)[PLACE],
             vector_at(memory.orientation, 4),
             error[memory.of_base :],
         )
@@ -307,9 +310,9 @@ def _find_soft_alone(angles, desired, half, most, error):
 def _feed_forward(memory, forward):
     """Write the desired rates of base, steering and vertices."""
     count = memory.count
-    turning = vector_at(memory.turning, 3)
+    turning = matrix_at(memory.motion, 3, 3)[TURN]
     if memory.of_base >= 0:
-        motion = vector_at(memory.motion, 3)
+        motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
         for k in range(3):
             forward[memory.of_base + k], forward[memory.of_base + 3 + k] = turning[k], motion[k]
     if memory.of_steering >= 0:
@@ -370,7 +373,7 @@ def _turn_ahead(memory, rates, gain, pace):
     wheels = _states_at(memory.wheels, memory.count)
     most = vector_at(memory.most, 1)[0]
     error = vector_at(memory.error, memory.rows)
-    with_base = pace * vector_at(memory.turning, 3)[2]
+    with_base = pace * matrix_at(memory.motion, 3, 3)[TURN][2]
     for index in range(memory.count):
         row = memory.of_steering + index
         if abs(error[row]) < (1.0 - 1e-9) * most:
@@ -431,7 +434,7 @@ def _find_rates(start, is_paced, feeds_forward):
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration
             turn_most = memory.turn_correction
-            turn_most = min(turn_most, STANDING * turn_most + TURNING * abs(vector_at(memory.turning, 3)[2]))
+            turn_most = min(turn_most, STANDING * turn_most + TURNING * abs(matrix_at(memory.motion, 3, 3)[TURN][2]))
             _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
             _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:

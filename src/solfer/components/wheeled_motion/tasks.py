@@ -1,6 +1,6 @@
 """The tasks of a component that drives: rows, errors and rates, and the joint velocities that follow from them."""
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -106,11 +106,9 @@ class DrivingTasks:
             lifted=references.lifted,
             base=offsets.base,
             numbers=references.numbers,
-            motion=references.velocity,
-            turning=references.turn,
-            velocities=references.vertex_velocity,
-            desired_place=references.position,
-            orientation=references.orientation,
+            motion=references.motion,
+            velocities=references.places,
+            orientation=references.orientations,
             desired_camber=references.camber,
             desired_caster=references.caster,
             pose=wheels.pose.value,
@@ -137,7 +135,7 @@ class DrivingTasks:
         )
         self.limit(tags.speeds, tags.accelerations, (tags.correction, tags.turn_correction, tags.furthest))
 
-    def limit(self, speeds: Any, accelerations: Any, corrections: Any) -> None:
+    def limit(self, speeds: Sequence[float], accelerations: Sequence[float], corrections: Sequence[float]) -> None:
         """Set the largest speeds and accelerations of base, heading and vertices, and the limits of corrections.
 
         Args:

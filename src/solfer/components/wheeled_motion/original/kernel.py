@@ -23,7 +23,7 @@ RESTING = 2e-3
 """Errors of vertices that no wheel steers for, where no motion is desired [m]."""
 
 NEAR = 2e-4
-"""Errors count whole where they want a larger way than this in one cycle [m]."""
+"""Errors count whole where their way in one cycle is larger than this [m]."""
 
 
 @part

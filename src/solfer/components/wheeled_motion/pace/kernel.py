@@ -42,7 +42,7 @@ desired. Then largest speeds, and the largest acceleration of a vertex."""
 
 _going_at = record_at(GOING)
 
-WANTED_X, WANTED_Y, WANTED_Z, WANTED_TURN, IN_WORLD, AGE, BEFORE = range(7)
+DESIRED_X, DESIRED_Y, DESIRED_Z, DESIRED_TURN, IN_WORLD, AGE, BEFORE = range(7)
 """State of velocities that others send; see `solfer.components.wheeled_motion.drive.Drive`."""
 
 
@@ -172,15 +172,15 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
     vx = cos * x + sin * y
     vy = cos * y - sin * x
     counts = 0.0 if is_old else counted
-    dx = counts * state[WANTED_X] - vx
-    dy = counts * state[WANTED_Y] - vy
-    dz = counts * state[WANTED_Z] - z
+    dx = counts * state[DESIRED_X] - vx
+    dy = counts * state[DESIRED_Y] - vy
+    dz = counts * state[DESIRED_Z] - z
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     share = 1.0 if size <= change else change / size
     vx = vx + share * dx
     vy = vy + share * dy
     z = z + share * dz
-    turn[2] += min(max(counts * state[WANTED_TURN] - turn[2], -turn_change), turn_change)
+    turn[2] += min(max(counts * state[DESIRED_TURN] - turn[2], -turn_change), turn_change)
     cos, sin = (1.0, 0.0) if in_world else (math.cos(heading), math.sin(heading))
     velocity[0], velocity[1], velocity[2] = cos * vx - sin * vy, sin * vx + cos * vy, z
     if is_old and math.sqrt(vx * vx + vy * vy + z * z + turn[2] * turn[2]) < 1e-12:

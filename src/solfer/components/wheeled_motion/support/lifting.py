@@ -271,7 +271,7 @@ class Lifting:
         self.phase = Phase.BACK
 
     def _end(self, failure: str) -> None:
-        """Answer all who wait, and let other motions go on."""
+        """Answer all requests, and let other motions go on."""
         self.phase = Phase.NONE
         answers = self._answers
         self._answers = []
