@@ -77,7 +77,7 @@ class Cycle:
         parts = {
             "kinematics": (self._robot, "update"),
             "rows": (component.stack, "update_jacobian"),
-            "velocities": (component._descent, "update"),
+            "velocities": (component.tasks.descent, "update"),
         }
         whole = Stopwatch(self.run, spent.setdefault("rest", []))
         for name, (owner, method) in parts.items():

@@ -50,5 +50,5 @@ class Follower:
 
 def holder(component: WheeledMotion) -> str:
     """Return what holds a component where it is; empty: nothing."""
-    joint = component._descent.last
+    joint = component.tasks.descent.last
     return component._guard.why or (f"joint '{component.model.dofs[joint]}' is at its bound" if joint >= 0 else "")

@@ -123,7 +123,7 @@ class Model:
             self.lost[CAUSES.index("lift")] += PERIOD
             return
         pace, steering = self.component._pace, self.component._steering
-        away = steering.aims - steering.measured + self.component._offsets.heading
+        away = steering.aims - steering.measured + self.component.wheels.offsets.heading
         across = max(SIDEWAYS, float(np.abs(steering.speeds * np.sin(away)).max()))
         speeds, wheels = self.component.references.limits, SIDEWAYS / across
         free = min(wheels, pace.held)

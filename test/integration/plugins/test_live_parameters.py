@@ -122,16 +122,20 @@ def numbers_of(component):
             yield from (numbers for _, _, numbers in component._gains)
             yield from (component._filter.limits, component._tolerances)
         case WheeledMotion():
-            law, record = component._steering.law, component._memory.record
-            yield from (component._gain, [float(law[key]) for key in ("across", *TUNED)], component.targets._limits)
+            law, record = component._steering.law, component.tasks.numbers.record
+            yield from (
+                component.tasks.gain,
+                [float(law[key]) for key in ("across", *TUNED)],
+                component.targets._limits,
+            )
             yield [float(record[key]) for key in record.dtype.names if record.dtype[key].kind == "f"]
             yield [*component.drive._speeds, *component.drive._limits, component._lifting.margin]
-            yield [float(component._guard._memory.record["least"]), component._polygon.least]
+            yield [float(component._guard._memory.record["least"]), component._guard.polygon.least]
             yield [float(component._pace._memory.record[key]) for key in ("base_speed", "vertex_speed", "acceleration")]
             if isinstance(component, SupportShaping):
                 governor = component.governor
                 yield from (governor.limits, np.diag(governor._solver.problem.hessian), [component.reaction.margin])
-                yield [governor.speed, governor._rate, governor._recovery]
+                yield [governor.speed, governor._rows.horizon, governor._rows.recovery]
         case GroundForces():
             yield [component.touch._begin, component.touch._end, component.touch._delay, component.touch._rise]
             yield [component.checks.friction]

@@ -51,7 +51,7 @@ def test_it_balances_the_pressure_of_the_ground(file):
         message = queue.drain()[-1]
         assert len(message.fields["names"]) == 8 and not message.fields["infeasible"]
         component = locomotion.component
-        pressed = component._balance()
+        pressed = component.shaping.measure.balance()
         assert pressed is component.model.center_of_pressure.value
         # at rest it is below the centre of mass of the whole robot, which the locomotion does not know
         world.simulation.kinematics.update(world.simulation.q)

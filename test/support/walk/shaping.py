@@ -24,7 +24,7 @@ class _Words(logging.Handler):
 
 def shaping(folder: Path) -> str:
     """Drive the curve of `driving` with a pushed base; return a digest, and the limits of which it warns."""
-    logger, words = logging.getLogger("solfer.components.wheeled_motion.component"), _Words()
+    logger, words = logging.getLogger("solfer.components.support_shaping.report"), _Words()
     logger.addHandler(words)
     robot = centauro()
     robot.contacts.forces  # noqa: B018 they are made

@@ -51,7 +51,7 @@ def lifting(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
     component.model.update()
     component.update()
     component.services()[0].handler(LiftContacts(("front_left_leg",)))
-    return str(component._lifting.goal)
+    return str(component._lifting.shift.goal)
 
 
 def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:

@@ -125,14 +125,14 @@ def test_the_vertex_of_a_lifted_wheel_follows_its_reference(make, wheel, velocit
     update(robot, vertex)
     assert_allclose(vertex.value[2] - before, references.vertices[wheel, 2] - start, atol=1e-3)
     assert 0.03 < vertex.value[2] - before < 0.041
-    errors = component._offsets.errors
+    errors = component.wheels.offsets.errors
     assert abs(errors[wheel]).max() < 1e-3 and abs(errors[others][:, :2]).max() < 3e-3
     assert references.pace > 0.99
 
 
 def places(component):
     """Return the vertices in the world, shape (4, 3) [m]."""
-    return np.array([vertex.value for vertex in component._offsets.vertices])
+    return np.array([vertex.value for vertex in component.wheels.offsets.vertices])
 
 
 @pytest.mark.parametrize("wheel", [0, 3])
@@ -198,8 +198,11 @@ def test_a_wheel_that_is_set_down_steers_again(make):
     assert not component.stack.jacobian[3:6].any()
     lift(component, LEGS[1], lifted=False)
     cycle(component, 400, (0.0, 0.1, 0.0))
-    assert component.stack.jacobian[3:6].any() and abs(component.stack.jacobian[:12] @ component._velocity).max() < 1e-5
-    assert abs(component._offsets.errors[:, :2]).max() < 5e-3 and component.references.position[1] > 0.1
+    assert (
+        component.stack.jacobian[3:6].any()
+        and abs(component.stack.jacobian[:12] @ component.joints.velocity).max() < 1e-5
+    )
+    assert abs(component.wheels.offsets.errors[:, :2]).max() < 5e-3 and component.references.position[1] > 0.1
 
 
 def test_too_few_wheels_are_never_left(make):

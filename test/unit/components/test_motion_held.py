@@ -41,7 +41,7 @@ def cycle(component, count):
         robot.update()
         component.update()
         component.send()
-        sliding = max(sliding, abs(component.stack.jacobian[:12] @ component._velocity).max())
+        sliding = max(sliding, abs(component.stack.jacobian[:12] @ component.joints.velocity).max())
         robot.state.position[:LOWER], robot.state.velocity[:LOWER] = (
             robot.command.position[:LOWER],
             robot.command.velocity[:LOWER],
@@ -72,18 +72,18 @@ def test_a_motion_holds_before_its_bound(make, caplog, tags, vertices, up, reaso
         sliding, speeds = cycle(component, 2400), []
         for _ in range(600):
             sliding = max(sliding, cycle(component, 1))
-            speeds.append(abs(component._velocity).max())
+            speeds.append(abs(component.joints.velocity).max())
     # every second it tries to go on
     assert references.pace < 0.05 and np.median(speeds) < 0.1
     assert sliding < 2e-3
     assert reason in caplog.text
     assert component._guard.margin > 0.03
-    center = component._points["base"].value[3:5]
+    center = component.wheels.points["base"].value[3:5]
     assert_allclose(center, start[:2], atol=5e-3)
     references.vertex_velocity[:] *= -1.0
     references.velocity[2] *= -1.0  # back again
     cycle(component, 600)
-    assert references.pace > 0.5 and abs(component._offsets.errors[:, :2]).max() < 8e-3
+    assert references.pace > 0.5 and abs(component.wheels.offsets.errors[:, :2]).max() < 8e-3
 
 
 def test_speeds_that_jump_are_limited(make):
@@ -93,7 +93,7 @@ def test_speeds_that_jump_are_limited(make):
     sliding, errors = 0.0, []
     for _ in range(40):
         sliding = max(sliding, cycle(component, 10))
-        errors.append(abs(component._offsets.errors[:, :2]).max())
+        errors.append(abs(component.wheels.offsets.errors[:, :2]).max())
     way = abs(references.vertices - before).max()
     assert 0.05 < way <= 0.2 + 1e-9  # 0.1 m/s for 2 s
     assert max(errors) < 6e-3 and sliding < 1e-3
@@ -102,19 +102,18 @@ def test_speeds_that_jump_are_limited(make):
 def test_a_wheel_keeps_the_way_it_began(make):
     """The aim flickers around the end of its range: turning back and forth would stop the robot for ever."""
     component, index = make(), 2
-    dof, bounds, side = component._turning[index], component._bounds, math.radians(80.0)
-    start, row = component.model.state.position[dof], component._rows["STEERING"].start + index
+    dof, bounds, side = component.wheels.steering[index], component.tasks.bounds, math.radians(80.0)
+    start, row = component.model.state.position[dof], component.tasks.rows["STEERING"].start + index
     turn = math.copysign(1.0, component.stack.jacobian[row, dof])
     # the end of its range is where it is to turn to, a little less or a little more
     bounds.lower_position[dof] = start - (side if turn < 0.0 else math.radians(130.0))
     bounds.upper_position[dof] = start + (side if turn > 0.0 else math.radians(130.0))
-    component._name_parts()
     for count in range(60):
         angle = side + math.radians(2.0 if count % 2 else -2.0)
         component.references.velocity[:2] = 0.1 * math.cos(angle), 0.1 * math.sin(angle)
         cycle(component, 5)
     steering = component._steering
-    away = steering.aims[index] - steering.measured[index] + component._offsets.heading
+    away = steering.aims[index] - steering.measured[index] + component.wheels.offsets.heading
     assert abs(math.sin(away)) < 0.1 and component.references.pace > 0.3
 
 
@@ -126,17 +125,17 @@ def test_wheels_turn_with_their_directions(make):
         cycle(component, 1)
         angle += 0.8 * 0.005 * references.pace
         paces.append(references.pace)
-        bound += component._descent.last >= 0
+        bound += component.tasks.descent.last >= 0
     assert min(paces[200:400]) > 0.95  # they do not lag behind
     # at the ends of their ranges they go on the other way round
     assert angle > 4.5 and min(paces[400:]) < 0.2
     assert bound == 0 and component._guard.why == ""
-    assert abs(component._offsets.errors[:, :2]).max() < 5e-3
+    assert abs(component.wheels.offsets.errors[:, :2]).max() < 5e-3
 
 
 def test_wheels_turn_round_where_joints_are_late(make):
     component = make()
-    robot, references, turning = component.model, component.references, component._turning
+    robot, references, turning = component.model, component.references, component.wheels.steering
     angle, paces = 0.0, []
     for _ in range(2400):
         references.velocity[:2] = 0.15 * math.cos(angle), 0.15 * math.sin(angle)
@@ -154,12 +153,12 @@ def test_a_way_begins_where_its_joint_is_measured(make):
     component = make()
     component.model.update()
     component.stack.update_jacobian()
-    dof, steered = component._turning[0], component._steering.steered
-    row = component.stack.jacobian[component._rows["STEERING"].start, dof]
-    end = component._bounds.upper_position[dof]
+    dof, steered = component.wheels.steering[0], component._steering.steered
+    row = component.stack.jacobian[component.tasks.rows["STEERING"].start, dof]
+    end = component.tasks.bounds.upper_position[dof]
     way = 0.52 / row  # beyond the end of the range, but not from its commanded position
-    component.model.state.position[dof], component._position[dof] = end - 0.5, end - 0.55
+    component.model.state.position[dof], component.joints.position[dof] = end - 0.5, end - 0.55
     steered[0] = steered[3]
     steered[0, 0] += way
-    component._find_errors()
-    assert (component._desired[0] - steered[3, 0]) * way < 0.0  # the other way round
+    component.tasks.find_errors()
+    assert (component.tasks.aims[0] - steered[3, 0]) * way < 0.0  # the other way round

@@ -127,14 +127,14 @@ def test_directions_turn_round_as_those_of_the_equations(component):
     turns = random.uniform(-cmath.pi, cmath.pi, size) * (random.random(size) < 0.1) + random.normal(0.0, 0.02, size)
     vectors = speeds * np.exp(1j * np.cumsum(turns, axis=0))
     moved = 10.0 ** random.uniform(-7.0, -3.0, len(speeds))
-    steering, pose, original = component._steering, component._pose.value, part("driving_cases.original")
+    steering, pose, original = component._steering, component.wheels.pose.value, part("driving_cases.original")
     gains = component.tags.steering_record()
     plain, found = [original.OriginalSteering(gains, PERIOD) for _ in range(4)], []
     for (velocities, errors), way in zip(vectors, moved, strict=True):
         component.references.vertex_velocity[:, :2] = velocities[:, None].view(float)
-        component._offsets.errors[:, :2] = errors[:, None].view(float)
+        component.wheels.offsets.errors[:, :2] = errors[:, None].view(float)
         steering.before[:2] = pose[:2] - (way, 0.0)
-        steer(component._memory.address)
+        steer(component.tasks.numbers.address)
         angles = [wheel.update(*each, way / PERIOD) for wheel, *each in zip(plain, velocities, errors, strict=True)]
         found.append(np.abs(steering.angles - angles))
     assert np.max(found) <= 1e-9, f"in cycle {np.argmax(np.max(found, axis=1) > 1e-9)}"

@@ -94,8 +94,8 @@ def test_the_component_follows_the_law(make, course, tags):
         velocity = plain.update(law.measured(component), component.references)
         assert_allclose(robot.command.velocity[moved], velocity[moved], atol=1e-8, rtol=0.0, err_msg=str(cycle))
         robot.state.position[moved] = robot.command.position[moved]
-        scales.append(component._descent.scale)
-        counts.append(component._descent.count)
+        scales.append(component.tasks.descent.scale)
+        counts.append(component.tasks.descent.count)
     assert (min(scales) < 0.9) == (course == "slow joints")
     assert (max(counts) > 0) == (course == "short ranges")
     assert component.references.lifted.any() == (course == "lifted")

@@ -156,7 +156,7 @@ def test_wheels_rest_near_their_references(make):
         component = make(rest=rest, across=0.0)
         component.references.vertices[:, 1] += 1e-3
         cycle(component, 100)
-        found[rest] = abs(component.steering_angles).max()
+        found[rest] = abs(component._steering.measured).max()
     assert found[True] < 1e-10 < 1e-6 < found[False]
 
 
@@ -165,7 +165,7 @@ def test_the_base_waits_for_its_wheels(make, pace, largest):
     component, errors, paces = make(pace=pace), [], []
     for _ in range(100):
         cycle(component, 5, (0.0, 0.1, 0.0))  # all wheels have to turn by a quarter
-        errors.append(abs(component._offsets.errors[:, :2]).max())
+        errors.append(abs(component.wheels.offsets.errors[:, :2]).max())
         paces.append(component.references.pace)
     assert max(errors) < largest
     if pace:
@@ -179,7 +179,7 @@ def test_errors_across_the_wheels_steer_them(make, across):
     component = make(across=across)
     component.references.vertices[:, 1] += 0.02
     cycle(component, 600, (0.1, 0.0, 0.0))
-    left = abs(component._offsets.errors[:, 1]).max()
+    left = abs(component.wheels.offsets.errors[:, 1]).max()
     assert left < 3e-3 if across else left > 6e-3, left
 
 
@@ -196,7 +196,7 @@ def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
     rates = []
     for _ in range(200):
         cycle(component)
-        base = component.stack.jacobian[component._rows["BASE"]] @ component._velocity
+        base = component.stack.jacobian[component.tasks.rows["BASE"]] @ component.joints.velocity
         rates.append(np.abs(base).max())
     assert max(rates) < 1.01 * limit and rates[-1] > 0.5 * limit
     assert np.diff(rates, prepend=0.0).max() < 1.01 * getattr(component.tags, growth) * component.period
@@ -210,7 +210,7 @@ def test_a_base_that_turns_is_corrected_faster(make, turn, correction):
     rates = []
     for _ in range(200):
         cycle(component, 1, (0.0, 0.0, turn))
-        rates.append(abs((component.stack.jacobian[component._rows["BASE"]] @ component._velocity)[2]))
+        rates.append(abs((component.stack.jacobian[component.tasks.rows["BASE"]] @ component.joints.velocity)[2]))
     assert abs(turn) + 0.9 * correction < max(rates) < abs(turn) + 1.05 * correction
 
 
@@ -220,7 +220,7 @@ def test_corrections_count_within_the_speed_of_the_base(make):
     rates = []
     for _ in range(600):
         cycle(component, 1, (0.1, 0.0, 0.0))
-        rates.append((component.stack.jacobian[component._rows["BASE"]] @ component._velocity)[3])
+        rates.append((component.stack.jacobian[component.tasks.rows["BASE"]] @ component.joints.velocity)[3])
     assert 0.09 < max(rates) < 0.101
 
 
@@ -231,7 +231,7 @@ def test_what_is_too_far_is_named(make):
         cycle(component)
     assert error.value.expected == "0.3 m at most, the tag `furthest`"
     component = make()
-    component.references.vertices[2, :2] += 0.5 * component._offsets.directions[2]
+    component.references.vertices[2, :2] += 0.5 * component.wheels.offsets.directions[2]
     with pytest.raises(ComponentError, match=r"the vertex of '.*' is 0\.\d+ m from its reference"):
         cycle(component)
 
@@ -243,23 +243,23 @@ def test_it_turns_about_what_is_tracked(make):
     cycle(component, 600, (0.0, 0.0, 0.3))
     robot.update()
     assert_allclose(robot.center_of_mass.value[:2], before, atol=2e-3)
-    assert abs(component._offsets.errors[:, :2]).max() < 3e-3 and component.references.heading > 0.5
+    assert abs(component.wheels.offsets.errors[:, :2]).max() < 3e-3 and component.references.heading > 0.5
 
 
 def test_joints_at_their_limits_slow_the_motion_down(make):
     component = make()
     robot = component.model
-    component._bounds.speed[11:30:6] = 1.0  # wheels: 0.078 m/s
+    component.tasks.bounds.speed[11:30:6] = 1.0  # wheels: 0.078 m/s
     cycle(component, 600, (0.2, 0.0, 0.0))
     references = component.references
     assert 0.2 < references.pace < 0.6
-    assert_allclose(component._points["base"].value[3:5], references.position[:2], atol=5e-3)
+    assert_allclose(component.wheels.points["base"].value[3:5], references.position[:2], atol=5e-3)
     assert np.nanmax(abs(robot.command.velocity[11:30:6])) <= 1.0 + 1e-6
 
 
 def test_joints_stay_within_their_limits(make):
     component = make()
-    robot, highest, limit = component.model, 0.0, component._bounds.speed[:LOWER]
+    robot, highest, limit = component.model, 0.0, component.tasks.bounds.speed[:LOWER]
     component.references.vertex_velocity[:, 1] = (0.05, -0.05, 0.05, -0.05)
     limit[10:30:6] = 0.4  # slower ankles
     for _ in range(200):
@@ -296,7 +296,7 @@ def test_wheels_stay_where_silence_leaves_them(make):
         cycle(component, 200, (0.2, 0.0, 0.0))
         component.references.vertices[:, 1] += 8e-3  # behind which the wheels are
         cycle(component, 300, None if silent else (0.0, 0.0, 0.0))
-    turned = {silent: abs(each.steering_angles).max() for silent, each in components.items()}
+    turned = {silent: abs(each._steering.measured).max() for silent, each in components.items()}
     assert turned[True] < 0.2 < 0.5 < turned[False], turned
     assert not components[True].references.velocity.any()
 
@@ -337,7 +337,7 @@ def test_vertices_go_to_places_by_a_pipe(make):
     port.fresh = False
     speed, change = speeds_and_changes(component, 800, lambda references: references.vertex_velocity[0])
     assert_allclose(component.references.vertices[:, :2], wanted[:, :2], atol=1e-9)
-    assert abs(component._offsets.errors[:, :2]).max() < 3e-3
+    assert abs(component.wheels.offsets.errors[:, :2]).max() < 3e-3
     assert 0.02 < speed <= 0.1 + 1e-9 and change <= 0.2 + 1e-6
 
 
@@ -350,7 +350,7 @@ def test_the_base_goes_to_a_pose_by_a_pipe(make):
     port.fresh = False
     speed, change = speeds_and_changes(component, 900, lambda references: references.velocity)
     assert_allclose((*references.position, references.heading), (*wanted, turn), atol=1e-9)
-    assert_allclose(component._points["base"].value[3:], wanted, atol=1e-3)
+    assert_allclose(component.wheels.points["base"].value[3:], wanted, atol=1e-3)
     assert speed <= 0.5 + 1e-9 and change <= 0.3 + 1e-6
 
 
@@ -463,7 +463,7 @@ def test_velocities_are_bounded(make):
     for _ in range(100):
         component._take_over(0.0)
     assert_allclose(component.references.velocity, (0.09, 0.12, 0.0))  # 0.3 m/s2 for 0.5 s
-    assert_allclose(component._offsets.heading, 0.0)
+    assert_allclose(component.wheels.offsets.heading, 0.0)
     assert_allclose(component.references.turn[2], -0.25)
     assert_allclose(
         component.references.vertex_velocity[:, 0], 0.5 / 7.0

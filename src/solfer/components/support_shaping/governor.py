@@ -18,6 +18,54 @@ SMALL = 1e-6
 """Difference of velocities that changes nothing [m/s]."""
 
 
+class LimitRows:
+    """Rows of the limits by the velocities of the vertices, and what they demand.
+
+    Args:
+        rows: Where the rows are written, shape (2 count, 2 count); live.
+        limits: Least margins and largest distances, shape (2, count) [m]; live.
+
+    Attributes:
+        reserves: What is left of each limit, margins before workspaces, shape (2 count,) [m]; live.
+        demand: Least rates of margins and legs, shape (2 count,) [m/s]; live.
+        horizon: Time in which a reserve may be used up [s]; may be set.
+        recovery: Largest speed of the way back [m/s]; may be set.
+    """
+
+    def __init__(self, rows: np.ndarray, limits: np.ndarray):
+        count = limits.shape[1]
+        self._rows = rows
+        self._limits = limits
+        self._index = np.arange(count)[:, None]
+        self._order: list[tuple[int, int]] | None = None
+        self._places = np.zeros((2, count, 2), dtype=int)
+        self.reserves, self.demand = np.zeros((2, 2 * count))
+        self.horizon = self.recovery = 1.0
+
+    def update(self, polygon: FootprintGeometry, infeasible: np.ndarray) -> None:
+        """Write rows and demands of a polygon; what is infeasible and is kept again counts as feasible."""
+        count = len(polygon.edges)
+        margins, workspaces = self._limits
+        index = self._index
+        if self._order is not polygon.edges:
+            self._order = polygon.edges
+            self._places[:] = 2 * np.array(polygon.edges).T[:, :, None] + (0, 1)
+            self._rows[:] = 0.0
+        starts, ends = self._places
+        self._rows[index, starts] = polygon.of_start
+        self._rows[index, ends] = polygon.of_end
+        self._rows[count + index, 2 * index + (0, 1)] = (
+            polygon.legs[:, :2] / np.maximum(polygon.distances, 1e-9)[:, None]
+        )
+        np.subtract(polygon.margins, margins, out=self.reserves[:count])
+        np.subtract(workspaces, polygon.distances, out=self.reserves[count:])
+        np.multiply(self.reserves, -1.0 / self.horizon, out=self.demand)
+        np.minimum(self.demand, self.recovery, out=self.demand)
+        infeasible &= self.reserves < 0.0
+        if infeasible.any():
+            np.minimum(self.demand, 0.0, out=self.demand)
+
+
 class SupportGovernor:
     """Changes desired velocities of the vertices, seen from the base, as little as the limits of the polygon ask for.
 
@@ -45,7 +93,6 @@ class SupportGovernor:
         limits: Least margins and largest distances, shape (2, count) [m]; live.
         speed: Largest speed of a vertex [m/s]; may be set.
         velocities: Velocities of the vertices, shape (count, 2) [m/s]; live.
-        reserves: What is left of each limit, margins before workspaces, shape (2 count,) [m]; live.
         active: The limits that changed a velocity, shape (2 count,); live.
         infeasible: The limits that are exceeded and could not be brought back, shape (2 count,); live.
         share: Share of the desired velocities that goes on.
@@ -66,31 +113,31 @@ class SupportGovernor:
         self.speed = speed
         self._least = 0.0 if holds else SLOWEST
         self.velocities = np.zeros((count, 2))
-        self.reserves, self._demand, self._reached, self._missed = np.zeros((4, 2 * count))
+        self._desired, self._reached, self._missed = np.zeros((3, 2 * count))
         self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
         self._solver = QpSolver(4 * count, 0, 2 * count)
         problem = self._solver.problem
         size = 2 * count
         problem.hessian[np.arange(size), np.arange(size)] = 1.0
-        self.tune(gains, horizon, recovery)
-        problem.inequality_matrix[:, size:] = np.eye(2 * count)
+        problem.inequality_matrix[:, size:] = np.eye(size)
         problem.least[size:] = 0.0
-        self._rows = problem.inequality_matrix[:, :size]
-        own = np.arange(count)[:, None]
-        self._edges = own
-        self._wheels = count + own
-        self._own = 2 * own + (0, 1)
-        self._order: list[tuple[int, int]] | None = None
-        self._desired = np.zeros(size)
+        self._matrix = problem.inequality_matrix[:, :size]
+        self._rows = LimitRows(self._matrix, self.limits)
+        self.tune(gains, horizon, recovery)
         self._period = 0.0
         self.start()
 
     def tune(self, gains: Sequence[float], horizon: float, recovery: float) -> None:
         """Set the weights, the horizon and the speed of the way back, see above."""
-        self._rate = 1.0 / horizon
-        self._recovery = recovery
+        self._rows.horizon = horizon
+        self._rows.recovery = recovery
         slacks = np.arange(2 * self.limits.shape[1], 4 * self.limits.shape[1])
         self._solver.problem.hessian[slacks, slacks] = np.repeat(gains, self.limits.shape[1])
+
+    @property
+    def reserves(self) -> np.ndarray:
+        """What is left of each limit, margins before workspaces, shape (2 count,) [m]; live."""
+        return self._rows.reserves
 
     def set_period(self, period: float) -> None:
         """Set the period of the control cycle [s]."""
@@ -112,9 +159,9 @@ class SupportGovernor:
         """
         count = len(desired)
         np.multiply(desired[:, :2], self.share, out=self._desired.reshape(count, 2))
-        self._write(polygon)
-        np.dot(self._rows, self._desired, out=self._reached)
-        if (self._reached >= self._demand).all():
+        self._rows.update(polygon, self.infeasible)
+        np.dot(self._matrix, self._desired, out=self._reached)
+        if (self._reached >= self._rows.demand).all():
             self.velocities.ravel()[:] = self._desired
             self.active[:] = False
             self._missed[:] = 0.0
@@ -123,37 +170,12 @@ class SupportGovernor:
         step = self._period * (-SLOWER if self.infeasible.any() else FASTER)
         self.share = min(max(self.share + step, self._least), 1.0)
 
-    def _write(self, polygon: FootprintGeometry) -> None:
-        """Write rows and what is demanded of them."""
-        count, (margins, workspaces) = len(polygon.edges), self.limits
-        rows = self._rows
-        reserves = self.reserves
-        edges = self._edges
-        wheels = self._wheels
-        if self._order is not polygon.edges:
-            self._find_places(polygon.edges)
-        rows[edges, self._starts], rows[edges, self._ends] = polygon.of_start, polygon.of_end
-        rows[wheels, self._own] = polygon.legs[:, :2] / np.maximum(polygon.distances, 1e-9)[:, None]
-        np.subtract(polygon.margins, margins, out=reserves[:count])
-        np.subtract(workspaces, polygon.distances, out=reserves[count:])
-        np.multiply(reserves, -self._rate, out=self._demand)
-        np.minimum(self._demand, self._recovery, out=self._demand)
-        self.infeasible &= reserves < 0.0
-        if self.infeasible.any():
-            np.minimum(self._demand, 0.0, out=self._demand)
-
-    def _find_places(self, edges: list[tuple[int, int]]) -> None:
-        """Find where gradients of the two vertices of each edge belong."""
-        self._order = edges
-        pairs = np.array(edges)
-        self._rows[:] = 0.0
-        self._starts, self._ends = (2 * pairs[:, side : side + 1] + (0, 1) for side in (0, 1))
-
     def _solve(self) -> None:
         problem = self._solver.problem
+        demand = self._rows.demand
         size = len(self._desired)
         np.negative(self._desired, out=problem.gradient[:size])
-        problem.lower[:] = self._demand
+        problem.lower[:] = demand
         largest = max(self.speed, float(np.abs(self._desired).max()))
         problem.least[:size] = -largest
         problem.largest[:size] = largest
@@ -162,13 +184,13 @@ class SupportGovernor:
         if not solution.is_solved:
             # slacks make every program feasible, but not every one can be solved exactly
             self.velocities[:] = 0.0
-            np.less(self._reached, self._demand, out=self.active)
+            np.less(self._reached, demand, out=self.active)
             self.infeasible |= self.active
             return
         self.velocities.ravel()[:] = x[:size]
-        np.dot(self._rows, x[:size], out=self._reached)
-        np.less(self._reached, self._demand + SMALL, out=self.active)
-        is_missed = (x[size:] > LOST * self._demand) & (self._demand > SMALL)
+        np.dot(self._matrix, x[:size], out=self._reached)
+        np.less(self._reached, demand + SMALL, out=self.active)
+        is_missed = (x[size:] > LOST * demand) & (demand > SMALL)
         np.add(self._missed, self._period, out=self._missed)
         self._missed[~is_missed] = 0.0
         if self._missed.max() > PATIENCE:

@@ -19,6 +19,69 @@ CAMBER_RATE = 1e-5
 """How far the rate of a wheel's camber may be from its present one [rad/s]."""
 
 
+class RollingWheels:
+    """Vertices of wheels that roll, their polygon, and what moves them.
+
+    Args:
+        robot: The Robot.
+        wheels: Links of the wheels.
+        hips: Links of their hips.
+        axles: Axes of the wheels in the frames of their links, shape (count, 3).
+        radii: Radii of ring and tube of each wheel [m].
+
+    Attributes:
+        centers: Poses of the wheels' links.
+        hips: Poses of the hips.
+        places: The vertices, shape (count, 3) [m]; live.
+        rolling: Rows of the vertices' velocities while the wheels roll, x and y of each, shape (2 count, n); live.
+        turning: Rows of the wheels' angular velocities, shape (3 count, n); live.
+        polygon: The polygon of the vertices; the point is the centre of pressure.
+        period: Period of the control cycle [s]; may be set.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        wheels: tuple[str, ...],
+        hips: Sequence[str],
+        axles: np.ndarray,
+        radii: list[tuple[float, float]],
+    ):
+        count = len(wheels)
+        self._robot = robot
+        self._links = wheels
+        self._axles = axles
+        self._radii = radii
+        self.centers = [SpatialPoint(link, robot) for link in wheels]
+        self.hips = [SpatialPoint(link, robot) for link in hips]
+        self.places = np.zeros((count, 3))
+        self.rolling = np.zeros((2 * count, robot.size))
+        self.turning = np.zeros((3 * count, robot.size))
+        self.polygon = FootprintGeometry(count)
+        self.period = 0.0
+
+    def update(self) -> None:
+        """Compute vertices, margins and workspaces at the last update of the Robot."""
+        robot = self._robot
+        legs = []
+        for index, (center, hip) in enumerate(zip(self.centers, self.hips, strict=True)):
+            center.update()
+            hip.update()
+            axis = robot.kinematics.rotation(self._links[index]) @ self._axles[index]
+            ring, tube = self._radii[index]
+            turning = center.jacobian[3:]
+            self.turning[3 * index : 3 * index + 3] = turning
+            rolling = rolling_map(axis, turning @ robot.state.velocity, ring, tube=tube, period=self.period)
+            np.dot(rolling[:2], turning, out=self.rolling[2 * index : 2 * index + 2])
+            slope = float(axis[2])
+            lowest = (np.array((0.0, 0.0, 1.0)) - slope * axis) / np.sqrt(1.0 - slope**2)
+            self.places[index] = center.value[:3] - ring * lowest
+            self.places[index, 2] -= tube
+            legs.append((hip.value[:3] - center.value[:3]).tolist())
+        self.polygon.update(self.places.tolist(), robot.center_of_pressure.value.tolist())
+        self.polygon.measure_legs(legs)
+
+
 class JointProgram:
     """Velocities of the joints for which vertices move least while margins and workspaces hold.
 
@@ -35,47 +98,27 @@ class JointProgram:
     Args:
         robot: The Robot.
         tags: Tags of the component.
-        wheels: Links of the wheels.
-        axles: Their axes in the frames of their links, shape (count, 3).
-        radii: Radii of ring and tube of each wheel [m].
+        wheels: The wheels.
         moved: DoFs that move, shape (m,).
 
     Attributes:
         solver: The program.
         velocity: Joint velocities of the solution, zero if there is none, shape (n,); live.
         vertices: Velocities of the vertices then, shape (count, 2) [m/s]; live.
-        places: The vertices, shape (count, 3) [m]; live.
-        polygon: Their polygon; the point is the centre of pressure.
+        wheels: As above.
         infeasible: How many programs had no solution.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        tags: SupportShapingTags,
-        wheels: tuple[str, ...],
-        axles: np.ndarray,
-        radii: list[tuple[float, float]],
-        moved: np.ndarray,
-    ):
-        count = len(wheels)
+    def __init__(self, robot: Robot, tags: SupportShapingTags, wheels: RollingWheels, moved: np.ndarray):
+        count = len(wheels.centers)
         size = len(moved)
         self._robot = robot
-        self._tags = tags
-        self._wheels = wheels
-        self._axles = axles
-        self._radii = radii
-        self._moved, self._centers = moved, [SpatialPoint(link, robot) for link in wheels]
-        self._hips = [SpatialPoint(link, robot) for link in robot.links(tags.hips)]
-        self._pelvis = SpatialPoint(str(robot.kinematics.base_link), robot)
+        self.wheels = wheels
+        self._moved = moved
+        self._pelvis = SpatialPoint(str(robot.kinematics.base_link), robot) if tags.centers else None
         self.limits = np.array((tags.each("margins", count), tags.each("workspaces", count)))
-        self.polygon = FootprintGeometry(count)
         self.velocity = np.zeros(robot.size)
         self.vertices = np.zeros((count, 2))
-        self.places = np.zeros((count, 3))
-        self._rolling = np.zeros((2 * count, robot.size))
-        self._turning = np.zeros((3 * count, robot.size))
-        self._centers_places, self._hips_places = np.zeros((2, count, 3))
         effort = robot.upper_limits.torque
         self._driven = moved[np.isfinite(effort[moved]) & (effort[moved] > 0.0)]
         self._torques, self._cambers = slice(0, len(self._driven)), slice(len(self._driven), len(self._driven) + count)
@@ -86,39 +129,14 @@ class JointProgram:
         self.weigh((tags.margin_gain, tags.workspace_gain))
         problem.inequality_matrix[self._soft, size:] = -np.eye(2 * count)
         problem.largest[size:] = 0.0
-        self._period = 0.0
         self.infeasible = 0
         robot.dynamics.subscribe(INERTIA)
 
     def weigh(self, gains: Sequence[float]) -> None:
         """Set the weights of what margins, and what workspaces lack."""
-        slacks = np.arange(len(self._moved), len(self._moved) + 2 * len(self._wheels))
-        self.solver.problem.hessian[slacks, slacks] = np.repeat(gains, len(self._wheels))
-
-    def set_period(self, period: float) -> None:
-        """Set the period of the control cycle [s]."""
-        self._period = period
-
-    def measure(self) -> None:
-        """Compute vertices, margins and workspaces at the last update of the Robot."""
-        robot = self._robot
-        velocity = self._robot.state.velocity
-        for index, (center, hip) in enumerate(zip(self._centers, self._hips, strict=True)):
-            center.update()
-            hip.update()
-            axis = robot.kinematics.rotation(self._wheels[index]) @ self._axles[index]
-            ring, tube = self._radii[index]
-            turning = center.jacobian[3:]
-            self._turning[3 * index : 3 * index + 3] = turning
-            rolling = rolling_map(axis, turning @ velocity, ring, tube=tube, period=self._period)
-            np.dot(rolling[:2], turning, out=self._rolling[2 * index : 2 * index + 2])
-            slope = float(axis[2])
-            lowest = (np.array((0.0, 0.0, 1.0)) - slope * axis) / np.sqrt(1.0 - slope**2)
-            self.places[index] = center.value[:3] - ring * lowest
-            self.places[index, 2] -= tube
-            self._centers_places[index], self._hips_places[index] = center.value[:3], hip.value[:3]
-        self.polygon.update(self.places.tolist(), robot.center_of_pressure.value.tolist())
-        self.polygon.measure_legs((self._hips_places - self._centers_places).tolist())
+        count = len(self.wheels.centers)
+        slacks = np.arange(len(self._moved), len(self._moved) + 2 * count)
+        self.solver.problem.hessian[slacks, slacks] = np.repeat(gains, count)
 
     def solve(
         self,
@@ -129,7 +147,7 @@ class JointProgram:
         rates: np.ndarray,
         force: np.ndarray,
     ) -> Solution:
-        """Solve the program of this cycle, after `measure`.
+        """Solve the program of this cycle, after an update of the wheels.
 
         Args:
             contacts: Jacobian of the contacts, shape (3 count, n).
@@ -155,20 +173,20 @@ class JointProgram:
             self.velocity[moved] = solution.x[:size]
         else:
             self.infeasible += 1
-        self.vertices.ravel()[:] = self._rolling @ self.velocity
+        self.vertices.ravel()[:] = self.wheels.rolling @ self.velocity
         return solution
 
     def _write_cost(self) -> None:
         moved = self._moved
         hessian = self.solver.problem.hessian
         size = len(self._moved)
-        rolling = self._rolling[:, moved]
+        rolling = self.wheels.rolling[:, moved]
         center = self._robot.center_of_mass.jacobian[:2, moved]
-        counted = [self._turning[:, moved], center, *(hip.jacobian[:3, moved] for hip in self._hips)]
-        if self._tags.centers:
+        counted = [self.wheels.turning[:, moved], center, *(hip.jacobian[:3, moved] for hip in self.wheels.hips)]
+        if self._pelvis is not None:
             self._pelvis.update()
             counted.append(self._pelvis.jacobian[:2, moved])
-            counted.extend(point.jacobian[:2, moved] for point in self._centers)
+            counted.extend(point.jacobian[:2, moved] for point in self.wheels.centers)
         rows = np.concatenate(counted)
         hessian[:size, :size] = rolling.T @ rolling + WHEELS_DAMPING * (rows.T @ rows)
         hessian[np.arange(size), np.arange(size)] += JOINTS_DAMPING
@@ -190,8 +208,8 @@ class JointProgram:
         moved = self._moved
         size = len(self._moved)
         for position in (robot.state.position, robot.command.position):
-            lower = (robot.lower_limits.position - position)[moved] / self._period
-            upper = (robot.upper_limits.position - position)[moved] / self._period
+            lower = (robot.lower_limits.position - position)[moved] / self.wheels.period
+            upper = (robot.upper_limits.position - position)[moved] / self.wheels.period
             if position is robot.state.position:
                 problem.least[:size] = lower
                 problem.largest[:size] = upper
@@ -210,27 +228,27 @@ class JointProgram:
         inertia = robot.dynamics.inertia
         problem.inequality_matrix[self._torques, : len(moved)] = inertia[np.ix_(driven, moved)]
         now = (inertia @ robot.state.velocity)[driven]
-        problem.lower[self._torques] = now + (force + robot.lower_limits.torque)[driven] * self._period
-        problem.upper[self._torques] = now + (force + robot.upper_limits.torque)[driven] * self._period
+        problem.lower[self._torques] = now + (force + robot.lower_limits.torque)[driven] * self.wheels.period
+        problem.upper[self._torques] = now + (force + robot.upper_limits.torque)[driven] * self.wheels.period
 
     def _write_soft(self) -> None:
         problem = self.solver.problem
         moved = self._moved
         size = len(self._moved)
-        polygon = self.polygon
+        polygon = self.wheels.polygon
         count = len(polygon.edges)
         rows = problem.inequality_matrix[self._soft, : len(moved)]
         center = self._robot.center_of_mass.jacobian[:2]
         for index, (first, second) in enumerate(polygon.edges):
-            row = polygon.of_start[index] @ self._rolling[2 * first : 2 * first + 2]
-            row += polygon.of_end[index] @ self._rolling[2 * second : 2 * second + 2]
+            row = polygon.of_start[index] @ self.wheels.rolling[2 * first : 2 * first + 2]
+            row += polygon.of_end[index] @ self.wheels.rolling[2 * second : 2 * second + 2]
             rows[index] = (row + polygon.of_point[index] @ center)[moved]
             leg = 2.0 * polygon.legs[index, :2]
-            wheel = self._centers[index].jacobian[:2]
-            wheel = wheel if self._tags.centers else self._rolling[2 * index : 2 * index + 2]
-            rows[count + index] = (leg @ (wheel - self._hips[index].jacobian[:2]))[moved]
+            wheel = self.wheels.centers[index].jacobian[:2]
+            wheel = wheel if self._pelvis is not None else self.wheels.rolling[2 * index : 2 * index + 2]
+            rows[count + index] = (leg @ (wheel - self.wheels.hips[index].jacobian[:2]))[moved]
         problem.inequality_matrix[self._soft, :size] = rows
         margins, workspaces = self.limits
         lower = problem.lower[self._soft]
-        lower[:count] = -(polygon.margins - margins) / self._period
-        lower[count:] = -(workspaces**2 - polygon.distances**2) / self._period
+        lower[:count] = -(polygon.margins - margins) / self.wheels.period
+        lower[count:] = -(workspaces**2 - polygon.distances**2) / self.wheels.period

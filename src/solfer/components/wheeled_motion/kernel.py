@@ -61,7 +61,7 @@ WHEELS = np.dtype(
         *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
         # of the joints: which of them steer, measured positions, commanded ones, velocities, and ends of
         # their ranges; 0: they have none
-        *((name, np.int64) for name in ("turning_dofs", "measured", "position", "velocity", "limits")),
+        *((name, np.int64) for name in ("turning_dofs", "measured", "position", "velocity", "lower", "upper")),
         # first rows of the tasks; -1: there is no such task
         *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
@@ -275,9 +275,10 @@ def _find_errors(start):
         steered = matrix_at(memory.steered, 4, count)
         desired = vector_at(memory.aims, count)
         desired[:] = steered[ANGLES]
-        if memory.limits:
+        if memory.lower:
             rows = matrix_at(memory.steering_rows, count, dofs)
-            limits = matrix_at(memory.limits, 2, dofs)
+            lower = vector_at(memory.lower, dofs)
+            upper = vector_at(memory.upper, dofs)
             turning = indices_at(memory.turning_dofs, count)
             position = vector_at(memory.position, dofs)
             velocity = vector_at(memory.velocity, dofs)
@@ -285,7 +286,7 @@ def _find_errors(start):
             wheels = _states_at(memory.wheels, count)
             angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
-            _choose_ways(*given, limits[0], limits[1], most[0], ahead)
+            _choose_ways(*given, lower, upper, most[0], ahead)
         _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles = vector_at(memory.camber, count)
@@ -375,7 +376,7 @@ def _turn_ahead(memory, rates, gain, pace):
         if abs(error[row]) < (1.0 - 1e-9) * most:
             limit = most * gain[row]
             rates[row] = min(max(rates[row] + wheels[index].turn, -limit), limit)
-        if memory.limits:
+        if memory.lower:
             least, largest = _room(memory, index)
             rates[row] = min(max(rates[row], least + with_base), largest + with_base)
 
@@ -385,11 +386,12 @@ def _room(memory, index):
     """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
     dof = indices_at(memory.turning_dofs, memory.count)[index]
     rate = 1.0 / _law_at(memory.law).period
-    limits = matrix_at(memory.limits, 2, memory.dofs)
+    lower = vector_at(memory.lower, memory.dofs)[dof]
+    upper = vector_at(memory.upper, memory.dofs)[dof]
     place = vector_at(memory.position, memory.dofs)[dof]
     by = rate * matrix_at(memory.steering_rows, memory.count, memory.dofs)[index, dof]
-    first = by * min(limits[0, dof] - place, 0.0)
-    second = by * max(limits[1, dof] - place, 0.0)
+    first = by * min(lower - place, 0.0)
+    second = by * max(upper - place, 0.0)
     return min(first, second), max(first, second)
 
 

@@ -109,6 +109,33 @@ class References:
         step(self._motion, self._places, self._orientations, self.numbers, period)
 
 
+class KeptVelocities:
+    """Desired velocities that a cycle changes, and that are the same again after it.
+
+    Attributes:
+        base: Velocity of the base, shape (3,) [m/s].
+        turn: Rate of its heading [rad/s].
+        vertices: Velocities of the vertices, shape (count, 3) [m/s].
+    """
+
+    def __init__(self, count: int):
+        self.base = np.zeros(3)
+        self.turn = 0.0
+        self.vertices = np.zeros((count, 3))
+
+    def keep(self, references: References) -> None:
+        """Keep what is desired now."""
+        self.base[:] = references.velocity
+        self.turn = float(references.turn[2])
+        self.vertices[:] = references.vertex_velocity
+
+    def restore(self, references: References) -> None:
+        """Let it be desired again."""
+        references.velocity[:] = self.base
+        references.turn[2] = self.turn
+        references.vertex_velocity[:] = self.vertices
+
+
 def about_z(angle: float) -> tuple[float, float, float, float]:
     """Return the quaternion of a turn about z [rad]."""
     return 0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0)

@@ -65,6 +65,10 @@ class Steering:
         self.law["rate"] = step / RELAXATION
         self.law["period"] = step
 
+    def measure(self, directions: np.ndarray) -> None:
+        """Take over the directions in which wheels roll in the world, shape (count, 2)."""
+        np.arctan2(directions[:, 1], directions[:, 0], out=self.measured)
+
     def displace(self, move: PlanarMove) -> None:
         """Remember the base where its estimate has jumped to."""
         move.move(self.before[:2])

@@ -8,11 +8,76 @@ from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, Ro
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, STEERING, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
+from solfer.numerics.planar_move import PlanarMove
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.robot import Robot
 
 PARALLEL = 0.7
 """Cosine of the angle between a joint's axis and the axle below it from which on the joint bends a leg."""
+
+
+class DrivenWheels:
+    """The wheels that a component drives on, and the points of its tasks.
+
+    Args:
+        robot: The Robot.
+        tags: Tags of the component.
+
+    Attributes:
+        contacts: Their contacts, in the order of the group.
+        links: Their links.
+        pose: Pose of the base's link.
+        points: The points, by their names in the stack.
+        offsets: The vertices, which are one of them.
+        steering: DoFs that steer the wheels, shape (m,); empty where no task does.
+
+    Raises:
+        SolferError: A tag does not fit the robot.
+    """
+
+    def __init__(self, robot: Robot, tags: DrivingTags):
+        self._robot = robot
+        self.contacts = find_wheels(robot, tags)
+        self.links = [wheel.end_frame for wheel in self.contacts]
+        self.pose = SpatialPoint(robot.kinematics.base_link, robot)
+        self.points = make_points(robot, tags, self.contacts, pose=self.pose)
+        self.offsets: RollingOffsets = self.points[POINTS[VERTICES]]  # type: ignore[assignment]
+        steered = any(STEERING in level for level in tags.stack_record().levels)
+        dofs = [steered_by(robot, tags, wheel) for wheel in self.contacts] if steered else []
+        self.steering = np.array(dofs, dtype=int)
+
+    @property
+    def place(self) -> np.ndarray:
+        """Place of the base that is tracked, shape (3,) [m]; live."""
+        return self.points[POINTS[BASE]].value[3:]
+
+    @property
+    def center(self) -> CenterOfMass:
+        """Centre of mass, up to date with the points."""
+        return self.points[POINTS[BASE]].center  # type: ignore[attr-defined]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether that is the centre of mass of the whole robot."""
+        return self._robot.is_whole
+
+    def find_legs(self, moved: np.ndarray) -> dict[str, int]:
+        """Return the DoFs among the moved ones, shape (m,), that neither drive nor steer a wheel, by their names."""
+        robot = self._robot
+        driving = {robot.dof(robot.description.links[link].parent) for link in self.links}
+        driving.update(self.steering.tolist())
+        return {robot.dofs[dof]: dof for dof in moved.tolist() if dof >= 6 and dof not in driving}
+
+    def measure_forces(self) -> np.ndarray:
+        """Return the vertical forces on the wheels that a pipe receives, shape (m,) [N]; without one zeros."""
+        contacts = self._robot.contacts
+        return np.array([contacts[wheel.name].wrench[2] for wheel in self.contacts])
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move with the base, whose estimate has jumped."""
+        self.offsets.displace(move)
+        move.move(self.pose.value[:3])
+        move.turn_orientation(self.pose.value[3:])
 
 
 def find_wheels(robot: Robot, tags: DrivingTags) -> tuple[ContactRecord, ...]:

@@ -26,6 +26,9 @@ class PathPace:
         references: What is desired.
         steering: Where wheels aim, and the desired speeds of their vertices.
         offsets: The vertices.
+
+    Attributes:
+        is_found: Whether motions wait for wheels and joints; else the pace stays what it is in the references.
     """
 
     def __init__(
@@ -36,6 +39,7 @@ class PathPace:
         steering: Steering,
         offsets: RollingOffsets,
     ):
+        self.is_found = True
         self._state = np.zeros(5)
         base, turn, vertex = speeds
         self._memory = Memory(

@@ -3,5 +3,6 @@
 from solfer.components.wheeled_motion.support.guard import MotionGuard, TaskRates
 from solfer.components.wheeled_motion.support.lifting import TIMEOUT, Lifting
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
+from solfer.components.wheeled_motion.support.weight import WeightShift
 
-__all__ = ["TIMEOUT", "Lifting", "MotionGuard", "SupportPolygon", "TaskRates"]
+__all__ = ["TIMEOUT", "Lifting", "MotionGuard", "SupportPolygon", "TaskRates", "WeightShift"]

@@ -1,5 +1,6 @@
 """Where motions come to rest: the margin of the support polygon, wheels that lean, legs that do not reach farther."""
 
+import logging
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -19,6 +20,9 @@ from solfer.components.wheeled_motion.support.kernel import (
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, VERTICES
 from solfer.numerics.pointers import Memory
+from solfer.throttle import Throttle
+
+log = logging.getLogger(__name__)
 
 LEAN = 0.5
 """How far camber and caster may be away from what is desired of them [rad]: steering fails where wheels lean more."""
@@ -56,6 +60,7 @@ class MotionGuard:
 
     Attributes:
         polygon: The support polygon.
+        is_held: Whether the motion is held.
     """
 
     def __init__(
@@ -70,6 +75,8 @@ class MotionGuard:
         velocity: np.ndarray,
     ):
         self.polygon = polygon
+        self.is_held = False
+        self._throttle = Throttle(log)
         self._names = tuple(legs)
         kinds = ((CAMBER, "camber", "rad", LEAN), (CASTER, "caster", "rad", LEAN), (VERTICES, "vertex", "m", AWAY))
         watched = [
@@ -110,6 +117,7 @@ class MotionGuard:
 
     def leave(self, least: float) -> None:
         """Set the margin that motions leave [m]."""
+        self.polygon.least = least
         self._memory.record["least"] = least
 
     @property
@@ -132,9 +140,15 @@ class MotionGuard:
             return f"{what} is {amount:.2f} {unit} off"
         return f"joint '{self._names[index - len(self._watched)]}' is near a singularity"
 
+    def warn(self, name: str, joint: str) -> None:
+        """Log what holds a component; nothing but a joint at its bound where the guard does not."""
+        why = self.why or f"joint '{joint}' is at its bound"
+        self._throttle.warning("held", "%s holds where it is: %s", name, why)
+
     def start(self) -> None:
         """Hold nothing."""
         self._state[:] = 0.0
+        self.is_held = False
 
     def update(self, pace: float, is_bound: bool, passed: float) -> bool:
         """Shorten joint velocities that would use up the margin; return whether the motion is held.
@@ -145,4 +159,5 @@ class MotionGuard:
             passed: Time since the cycle before [s].
         """
         self._memory.record["period"] = passed
-        return hold_back(self._address, pace, is_bound)
+        self.is_held = hold_back(self._address, pace, is_bound)
+        return self.is_held

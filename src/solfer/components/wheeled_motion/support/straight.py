@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.references import KeptVelocities, References
 
 SMALL = 1e-6
 """Velocities that are left out without a warning [m/s, rad/s]."""
@@ -23,9 +23,7 @@ class StraightAhead:
     def __init__(self, wheels: Sequence[str]):
         self._wheels = ", ".join(f"'{wheel}'" for wheel in wheels)
         self._across = np.zeros(2)
-        self._base = np.zeros(3)
-        self._turn = 0.0
-        self._vertices = np.zeros((len(wheels), 3))
+        self._kept = KeptVelocities(len(wheels))
 
     def update(self, references: References, direction: np.ndarray, heading: float) -> str:
         """Change the desired velocities until `restore`; return what is left out, empty if nothing is.
@@ -35,8 +33,7 @@ class StraightAhead:
             direction: Direction in which the wheels roll in the world, shape (2,).
             heading: Heading of the base [rad].
         """
-        self._base[:], self._vertices[:] = references.velocity, references.vertex_velocity
-        self._turn = float(references.turn[2])
+        self._kept.keep(references)
         dx, dy = direction.tolist()
         self._across[:] = -dy, dx
         base = self._remove(references.velocity)
@@ -46,7 +43,7 @@ class StraightAhead:
         footprint = 0.0
         for velocity, is_lifted in zip(references.vertex_velocity, references.lifted.tolist(), strict=True):
             footprint = max(footprint, 0.0 if is_lifted else self._remove(velocity))
-        turn = abs(self._turn)
+        turn = abs(self._kept.turn)
         references.turn[2] = 0.0
         left = [
             text
@@ -61,8 +58,7 @@ class StraightAhead:
 
     def restore(self, references: References) -> None:
         """Restore the velocities that `update` changed."""
-        references.velocity[:], references.vertex_velocity[:] = self._base, self._vertices
-        references.turn[2] = self._turn
+        self._kept.restore(references)
 
     def _remove(self, velocity: np.ndarray) -> float:
         """Remove what is across from a velocity, shape (3,); return how much that was [m/s]."""
