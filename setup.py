@@ -26,7 +26,7 @@ else:
     shutil.rmtree("build/lib", ignore_errors=True)  # a module that is gone since would come into the wheel from there
     packages.append(CONFIG)
     package_dir[CONFIG] = "config"
-    package_data[CONFIG] = ["**/LICENSE", "**/*.csv", "**/*.json", "**/*.srdf", "**/*.urdf", "**/*.yaml"]
+    package_data[CONFIG] = ["**/LICENSE", "**/*.csv", "**/*.json", "**/*.rviz", "**/*.srdf", "**/*.urdf", "**/*.yaml"]
 
 setup(
     name=manifest.findtext("name"),

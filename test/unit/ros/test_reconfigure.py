@@ -27,7 +27,7 @@ class Ros:
         self.topics, self.services = {}, {}
         for module in (services, reconfigure):
             monkeypatch.setattr(module.rospy, "Service", self._offer)
-            monkeypatch.setattr(module, "bound_requests", lambda *limits: None)
+            monkeypatch.setattr(module, "bound_requests", lambda *limits, **named: None)
         monkeypatch.setattr(services, "provider", lambda name: None)
         monkeypatch.setattr(reconfigure.rospy, "Publisher", self._topic)
 

@@ -27,6 +27,7 @@ def scene(**changes):
         "friction": FRICTION,
         "references": (ShownReference("hands", "left", "pose", "pelvis", pose, pose, pose),),
         "path": np.array(((0.0, 0.0, 0.7), (0.1, 0.0, 0.7))),
+        "estimated_path": np.zeros((0, 3)),
     }
     return SceneState(**(parts | changes))
 

@@ -28,7 +28,7 @@ def offered(monkeypatch):
     monkeypatch.setattr(services.rospy, "Service", offer)
     monkeypatch.setattr(middleware, "ReconfigureServer", lambda *services: None)
     monkeypatch.setattr(services, "provider", lambda name: None)
-    monkeypatch.setattr(services, "bound_requests", lambda *limits: None)
+    monkeypatch.setattr(services, "bound_requests", lambda *limits, **named: None)
     return found
 
 
