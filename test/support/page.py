@@ -1,13 +1,21 @@
 """A page of viser without a browser: its websocket, in the messages of viser itself."""
 
+import re
+import shutil
+import signal
+import subprocess
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import msgspec
 import viser
 import zstandard
 from viser import _messages
 from websockets.sync.client import connect
+
+ADDRESS = re.compile(r"http://localhost:\d+/[\w-]{20,}/\n")
+REPOSITORY = Path(__file__).parents[2]
 
 
 class FakePage:
@@ -43,6 +51,29 @@ class FakePage:
     def find(self, label):
         """Return the identity of what has a label or a text."""
         return next(key for key, props in self.gui.items() if label in (props.get("label"), props.get("content")))
+
+    @property
+    def content(self):
+        """All texts of the page."""
+        texts = (props.get(key, "") for props in self.gui.values() for key in ("content", "_markdown"))
+        return " ".join(map(str, texts))
+
+    @property
+    def labels(self):
+        """Labels of all buttons and inputs."""
+        return {props.get("label") for props in self.gui.values()}
+
+    @property
+    def tabs(self):
+        """Names of all tabs."""
+        return [name for props in self.gui.values() for name in props.get("_tab_labels") or ()]
+
+    def until(self, condition, what, patience=40.0):
+        """Receive until a condition holds."""
+        end = time.monotonic() + patience
+        while not condition():
+            assert time.monotonic() < end, f"not within {patience:g} s: {what}\n{self.content}"
+            self.receive(0.1)
 
     def click(self, label):
         """Click on a button."""
@@ -93,3 +124,17 @@ def opened_page(address, origin=None):
         compression=None,
     ) as connection:
         yield FakePage(connection)
+
+
+@contextmanager
+def view(*words, command=("solfer", "view")):
+    """Start `solfer view` on any port; yields its address. It has to end well by Ctrl-C."""
+    program = [shutil.which(command[0]) or command[0], *command[1:], "--port", "0", *words]
+    with subprocess.Popen(program, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            first = process.stdout.readline()
+            assert ADDRESS.fullmatch(first), first
+            yield first.strip()
+        finally:
+            process.send_signal(signal.SIGINT)
+        assert process.wait(20.0) == 0

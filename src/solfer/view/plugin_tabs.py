@@ -4,6 +4,7 @@ import html
 import json
 import math
 from collections.abc import Mapping
+from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -32,6 +33,9 @@ REACH = 4.0
 
 STEPS = 400
 """Steps of a slider."""
+
+TRIALS, PAUSE = 10, 2.0
+"""How often, and after which time [s], a part is asked for its parameters: it may report before it offers them."""
 
 Control = GuiSliderHandle[float] | GuiCheckboxHandle | GuiTextHandle
 
@@ -76,19 +80,32 @@ class _PluginTab:
         self._tab = group.add_tab(name.rpartition("/")[2])
         with self._tab:
             self._text: GuiHtmlHandle = gui.add_html("")
-        service = f"{name}/{GET_PARAMETERS}"
-        known = requests.middleware.request(
-            requests.middleware.resolve(service), GETTING, GetParameters(), ParametersReply, 2.0
-        )
-        known.add_done_callback(
-            lambda answer: None if answer.exception() else requests.ask(lambda: self._add_controls(answer.result()))
-        )
+        self._parameters: Future[ParametersReply] | None = None
+        self._left = TRIALS
+        self._next = -math.inf
 
     def show(self, report: HealthReport) -> None:
         """Show a report, if it is new."""
         if report is not self._report:
             self._report = report
             self._text.content = _table(report)
+        self._find_parameters()
+
+    def _find_parameters(self) -> None:
+        """Ask for parameters until they are known, or nothing that reports only its health offers them."""
+        middleware = self._requests.middleware
+        now = middleware.now()
+        if self._parameters is not None and self._parameters.done():
+            answer = self._parameters
+            self._parameters = None
+            if answer.exception() is None:
+                self._left = 0
+                self._add_controls(answer.result())
+        elif self._parameters is None and self._left and now >= self._next:
+            self._left -= 1
+            self._next = now + PAUSE
+            service = middleware.resolve(f"{self._name}/{GET_PARAMETERS}")
+            self._parameters = middleware.request(service, GETTING, GetParameters(), ParametersReply, PAUSE)
 
     def _add_controls(self, reply: ParametersReply) -> None:
         """Add what only plugins have: they know their parameters."""

@@ -90,9 +90,8 @@ class Bench:
 
     @property
     def content(self):
-        """All texts of the page."""
-        texts = (props.get(key, "") for props in self.clients[0].gui.values() for key in ("content", "_markdown"))
-        return " ".join(map(str, texts))
+        """All texts of the first page."""
+        return self.clients[0].content
 
     @property
     def beat(self):
@@ -111,7 +110,7 @@ def bench(repository, request):
 
 
 def has(bench, label):
-    return any(props.get("label") == label for props in bench.clients[0].gui.values())
+    return label in bench.clients[0].labels
 
 
 def command(bench):
