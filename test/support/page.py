@@ -19,10 +19,11 @@ REPOSITORY = Path(__file__).parents[2]
 
 
 class FakePage:
-    """One page; it answers what the server asks for as long as `is_alive`."""
+    """One page; it sends signs of life as long as `is_alive`, and something is received."""
 
-    def __init__(self, connection):
-        self._connection, self.is_alive = connection, True
+    def __init__(self, connection, connect):
+        self._connection, self._connect, self.is_alive = connection, connect, True
+        self._life = None
         self.nodes, self.gui, self.scripts, self.modals = {}, {}, [], []
         self.positions = {}
         self.notes = []
@@ -41,9 +42,11 @@ class FakePage:
         end = time.monotonic() + duration
         while (left := end - time.monotonic()) > 0.0:
             try:
-                data = self._connection.recv(timeout=left)
+                data = self._connection.recv(timeout=min(left, 0.05))
             except TimeoutError:
-                return
+                continue
+            finally:
+                self._live()
             size = int.from_bytes(data[8:16], "little")
             for message in msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))["messages"]:
                 self._take(message)
@@ -90,6 +93,15 @@ class FakePage:
     def close(self):
         """Close the page."""
         self._connection.close()
+        if self._life is not None:
+            self._life.close()
+
+    def _live(self):
+        keys = re.findall(r"}(life/[\w-]+)`", " ".join(self.scripts))
+        if self._life is None and keys:
+            self._life = self._connect(keys[0])
+        if self._life is not None and self.is_alive:
+            self._life.send("")
 
     def _take(self, message):
         kind = message["type"]
@@ -103,8 +115,6 @@ class FakePage:
             self.modals.append(message["title"])
         elif kind == "NotificationShowMessage":
             self.notes.append(message["props"]["body"])
-        elif kind == "LocalStorageGetItemRequestMessage" and self.is_alive:
-            self.send(_messages.LocalStorageGetItemResponseMessage(None, None, message["request_uuid"]))
         elif "props" in message and "uuid" in message:
             self.gui[message["uuid"]] = dict(message["props"], value=message.get("value"))
         elif "props" in message:
@@ -116,14 +126,18 @@ def opened_page(address, origin=None):
     """Open a page of a server."""
     place = address.removeprefix("http").rstrip("/")
     own = "http" + place.rpartition("/")[0]
-    with connect(
-        f"ws{place}",
-        origin=origin or own,
-        subprotocols=[f"viser-v{viser.__version__}"],
-        max_size=None,
-        compression=None,
-    ) as connection:
-        yield FakePage(connection)
+
+    def connection(path="", *protocols):
+        return connect(
+            f"ws{place}/{path}", origin=origin or own, subprotocols=protocols or None, max_size=None, compression=None
+        )
+
+    with connection("", f"viser-v{viser.__version__}") as first:
+        page = FakePage(first, connection)
+        try:
+            yield page
+        finally:
+            page.close()
 
 
 @contextmanager

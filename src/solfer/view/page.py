@@ -60,7 +60,7 @@ class Page:
         EmergencyStopButton(self._viser, self._requests, stop)
         self._columns = LiveColumns(middleware)
         self._plots = Plots(gui, self._requests, self._columns)
-        self._control = PageControl(self._viser, self._requests, middleware) if control else None
+        self._control = PageControl(server, self._requests, middleware) if control else None
         self._tabs = PluginTabs(gui, self._requests, self._control)
 
     def update(self, state: SceneState | None) -> None:

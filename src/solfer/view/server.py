@@ -23,6 +23,9 @@ NAMES = ("localhost", HOST)
 
 PORT = 8080
 
+LIFE = "life"
+"""Path of the websockets by which pages show that they live."""
+
 HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "frame-ancestors 'none'",
@@ -30,6 +33,7 @@ HEADERS = {
 }
 """Of the page: neither stored nor shown inside of another one, and its address is not passed on."""
 
+Handler = Callable[[ServerConnection], Awaitable[None]]
 Process = Callable[[ServerConnection, Request], Response | None | Awaitable[Response | None]]
 
 
@@ -44,6 +48,7 @@ class PageServer:
     Attributes:
         viser: What is on the page.
         address: Address of the page.
+        lives: What notes a sign of life, in the server's thread, by the random key of a page.
 
     Raises:
         MiddlewareError: It cannot be served.
@@ -53,6 +58,7 @@ class PageServer:
         rich.get_console().quiet = True  # viser prints addresses without the token
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
+        self.lives: dict[str, Callable[[], None]] = {}
         # viser has no hook for requests
         with patch.object(websockets.asyncio.server, "serve", self._guarded(websockets.asyncio.server.serve)):
             self.viser = viser.ViserServer(HOST, port, label="solfer", verbose=False)
@@ -77,9 +83,9 @@ class PageServer:
         self.viser.stop()
 
     def _guarded(self, serve: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a `serve` that asks `_refusal` about each request first."""
+        """Return a `serve` that asks `_refusal` about each request first, and receives signs of life."""
 
-        def guarded(*arguments: Any, process_request: Process, **options: Any) -> Any:
+        def guarded(handler: Handler, *arguments: Any, process_request: Process, **options: Any) -> Any:
             self._is_guarded = True
 
             def process(connection: ServerConnection, request: Request) -> Any:
@@ -92,7 +98,17 @@ class PageServer:
                     response.headers.update(HEADERS)
                 return response
 
-            return serve(*arguments, process_request=process, **options)
+            async def handle(connection: ServerConnection) -> None:
+                assert connection.request is not None
+                kind, _, key = connection.request.path.strip("/").partition("/")
+                if kind != LIFE:
+                    return await handler(connection)
+                async for _ in connection:
+                    if key not in self.lives:
+                        return
+                    self.lives[key]()
+
+            return serve(handle, *arguments, process_request=process, **options)
 
         return guarded
 
