@@ -67,6 +67,11 @@ class FakePage:
         return {props.get("label") for props in self.gui.values()}
 
     @property
+    def is_known(self):
+        """Whether it shows life."""
+        return self._life is not None
+
+    @property
     def tabs(self):
         """Names of all tabs."""
         return [name for props in self.gui.values() for name in props.get("_tab_labels") or ()]
@@ -141,14 +146,31 @@ def opened_page(address, origin=None):
 
 
 @contextmanager
-def view(*words, command=("solfer", "view")):
-    """Start `solfer view` on any port; yields its address. It has to end well by Ctrl-C."""
-    program = [shutil.which(command[0]) or command[0], *command[1:], "--port", "0", *words]
+def started_view(*words):
+    """Start `solfer view` on any port; yields its process and its address, and ends it."""
+    program = [shutil.which("solfer"), "view", "--port", "0", *words]
     with subprocess.Popen(program, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
         try:
             first = process.stdout.readline()
             assert ADDRESS.fullmatch(first), first
-            yield first.strip()
+            yield process, first.strip()
         finally:
             process.send_signal(signal.SIGINT)
-        assert process.wait(20.0) == 0
+
+
+@contextmanager
+def view(*words):
+    """Start `solfer view` on any port; yields its address. It has to end well by Ctrl-C."""
+    with started_view(*words) as (process, address):
+        yield address
+    assert process.wait(20.0) == 0
+
+
+def drive(address):
+    """Take control and drive ahead, without an end; for a process of its own."""
+    with opened_page(address) as page:
+        page.until(lambda: "take control" in page.labels and page.is_known, "a page that may command")
+        page.click("take control")
+        while True:
+            page.hold("ahead")
+            page.receive(0.1)

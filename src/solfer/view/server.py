@@ -3,6 +3,7 @@
 import http
 import secrets
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 from unittest.mock import patch
 
@@ -12,6 +13,7 @@ import websockets.asyncio.server
 from viser import _messages
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from solfer.errors import MiddlewareError
@@ -103,10 +105,11 @@ class PageServer:
                 kind, _, key = connection.request.path.strip("/").partition("/")
                 if kind != LIFE:
                     return await handler(connection)
-                async for _ in connection:
-                    if key not in self.lives:
-                        return
-                    self.lives[key]()
+                with suppress(ConnectionClosed):
+                    async for _ in connection:
+                        if key not in self.lives:
+                            return
+                        self.lives[key]()
 
             return serve(handle, *arguments, process_request=process, **options)
 
