@@ -120,6 +120,11 @@ class PageControl:
             return False
         return True
 
+    @property
+    def is_free(self) -> bool:
+        """Whether no page commands."""
+        return self._holder is None
+
     def _find_modules(self, now: float) -> None:
         """Look once a second which components drive the base."""
         if self._topics is None and now >= self._next:

@@ -4,7 +4,6 @@ import html
 import json
 import math
 from collections.abc import Mapping
-from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -14,16 +13,9 @@ from solfer.components.declaration import Accepted
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
-from solfer.transport.parameters import (
-    GET_PARAMETERS,
-    GETTING,
-    SET_PARAMETERS,
-    SETTING,
-    GetParameters,
-    ParametersReply,
-    SetParameters,
-)
+from solfer.transport.parameters import SET_PARAMETERS, SETTING, ParametersReply, SetParameters
 from solfer.view.control import PageControl
+from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
 
 COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
@@ -34,9 +26,6 @@ REACH = 4.0
 STEPS = 400
 """Steps of a slider."""
 
-TRIALS, PAUSE = 10, 2.0
-"""How often, and after which time [s], a part is asked for its parameters: it may report before it offers them."""
-
 Control = GuiSliderHandle[float] | GuiCheckboxHandle | GuiTextHandle
 
 
@@ -46,12 +35,14 @@ class PluginTabs:
     Args:
         gui: Where they are.
         requests: Calls services.
+        parameters: Those of the parts.
         control: Says which page may switch plugins and change parameters; None: none may.
     """
 
-    def __init__(self, gui: GuiApi, requests: PageRequests, control: PageControl | None):
+    def __init__(self, gui: GuiApi, requests: PageRequests, parameters: KnownParameters, control: PageControl | None):
         self._gui = gui
         self._requests = requests
+        self._parameters = parameters
         self._control = control
         self._group = gui.add_tab_group()
         self._tabs: dict[str, _PluginTab] = {}
@@ -63,7 +54,7 @@ class PluginTabs:
                 self._tabs[name] = _PluginTab(
                     self._gui, self._group, name, requests=self._requests, control=self._control
                 )
-            self._tabs[name].show(report)
+            self._tabs[name].show(report, self._parameters.known.get(name))
 
 
 class _PluginTab:
@@ -80,32 +71,16 @@ class _PluginTab:
         self._tab = group.add_tab(name.rpartition("/")[2])
         with self._tab:
             self._text: GuiHtmlHandle = gui.add_html("")
-        self._parameters: Future[ParametersReply] | None = None
-        self._left = TRIALS
-        self._next = -math.inf
+        self._has_controls = False
 
-    def show(self, report: HealthReport) -> None:
-        """Show a report, if it is new."""
+    def show(self, report: HealthReport, parameters: ParametersReply | None) -> None:
+        """Show a report, if it is new, and the parameters once they are known."""
         if report is not self._report:
             self._report = report
             self._text.content = _table(report)
-        self._find_parameters()
-
-    def _find_parameters(self) -> None:
-        """Ask for parameters until they are known, or nothing that reports only its health offers them."""
-        middleware = self._requests.middleware
-        now = middleware.now()
-        if self._parameters is not None and self._parameters.done():
-            answer = self._parameters
-            self._parameters = None
-            if answer.exception() is None:
-                self._left = 0
-                self._add_controls(answer.result())
-        elif self._parameters is None and self._left and now >= self._next:
-            self._left -= 1
-            self._next = now + PAUSE
-            service = middleware.resolve(f"{self._name}/{GET_PARAMETERS}")
-            self._parameters = middleware.request(service, GETTING, GetParameters(), ParametersReply, PAUSE)
+        if parameters is not None and not self._has_controls:
+            self._has_controls = True
+            self._add_controls(parameters)
 
     def _add_controls(self, reply: ParametersReply) -> None:
         """Add what only plugins have: they know their parameters."""

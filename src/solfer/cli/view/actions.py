@@ -52,7 +52,10 @@ def show(options: argparse.Namespace) -> int:
                 stop=source.stop,
                 control=options.control,
                 playback=source.playback,
+                foxglove=options.foxglove,
             )
+            if page.foxglove is not None:
+                print(page.foxglove.address, flush=True)
             FixedRateLoop(source.middleware, RATE).run(
                 lambda *_: page.update(scene.update()), source.middleware.running
             )
