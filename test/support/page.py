@@ -51,6 +51,18 @@ class FakePage:
             for message in msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))["messages"]:
                 self._take(message)
 
+    def take_raw(self, duration):
+        """Take what arrives within a time [s] without a look at it; return the number of messages."""
+        end, count = time.monotonic() + duration, 0
+        while (left := end - time.monotonic()) > 0.0:
+            try:
+                self._connection.recv(timeout=left)
+                count += 1
+            except TimeoutError:
+                break
+        self._live()
+        return count
+
     def find(self, label):
         """Return the identity of what has a label or a text."""
         return next(key for key, props in self.gui.items() if label in (props.get("label"), props.get("content")))
