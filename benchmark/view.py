@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """Measures what a page in the browser costs: its process, and the periods that a real-time layer leaves out beside it.
 
-Run with `./run exec python benchmark/view.py [--seconds S] [--profile FILE] [--json]`. `joint_states` runs at 500 Hz beside
-CENTAURO in PyBullet, first without a page, then with one that a client receives and does not draw. With `--profile`
-the process of the page is profiled, and pays for it. Exit code 1: the page takes more than 15 % of a core, or more than
-5 further periods are left out in 30 s.
+Run with `./run exec python benchmark/view.py [--seconds S] [--json]`. `joint_states` runs at 500 Hz beside CENTAURO in
+PyBullet, first without a page, then with one that a client receives and does not draw. Exit code 1: the page takes more
+than 15 % of a core, or more than 5 further periods are left out in 30 s.
 """
 
 import os
@@ -63,20 +62,10 @@ def receive(address: str, is_over: threading.Event, pictures: list[int]) -> None
             pictures[0] += page.take_raw(0.5)
 
 
-def start_view(namespace: str, profile: str | None) -> tuple[subprocess.Popen, str]:
-    """Start the page; return its process and address."""
-    program = [sys.executable, *(["-m", "cProfile", "-o", profile] if profile else []), shutil.which("solfer") or ""]
-    command = [*program, "view", "--port", "0", "--namespace", namespace]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    return process, process.stdout.readline().strip()
-
-
 def main() -> int:
     """Measure, and return the exit code."""
     parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="of each measurement (default: 30)")
-    parser.add_argument("--profile", metavar="FILE", help="where cProfile writes what it has seen of the page's loop")
     options = parser.parse_args()
     figures = Figures(options.json)
     with ExitStack() as stack:
@@ -102,8 +91,11 @@ def main() -> int:
         without = skipped(namespace) - before
         figures.row("without a page", share=0.0, left_out=without, pictures_hz=0.0)
 
-        view, address = start_view(namespace.name, options.profile)
+        command = [shutil.which("solfer") or "solfer", "view", "--port", "0", "--namespace", namespace.name]
+        view = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         processes.append(view)
+        assert view.stdout is not None
+        address = view.stdout.readline().strip()
         is_over = threading.Event()
         pictures = [0]
         client = threading.Thread(target=receive, args=(address, is_over, pictures))
