@@ -25,7 +25,7 @@ class FakePage:
         self._connection, self._connect, self.is_alive = connection, connect, True
         self._life = None
         self.nodes, self.gui, self.scripts, self.modals = {}, {}, [], []
-        self.positions = {}
+        self.positions, self.turns = {}, {}
         self.notes = []
         self.send(
             _messages.ViewerCameraMessage(
@@ -126,6 +126,8 @@ class FakePage:
             self.scripts.append(message["source"])
         elif kind == "SetPositionMessage":
             self.positions[message["name"]] = message["position"]
+        elif kind == "SetOrientationMessage":
+            self.turns[message["name"]] = message["wxyz"]
         elif kind == "GuiUpdateMessage":
             self.gui.setdefault(message["uuid"], {}).update(message["updates"])
         elif kind == "GuiModalMessage":
