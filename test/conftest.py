@@ -23,7 +23,7 @@ UNHURRIED = frozenset(
 )
 """Rostests that may run beside others: their simulation waits for its plugins, all go by its time, or there is none."""
 
-REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory")
+REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory", "integration/view")
 """Folders of tests in real time, which a stall of the machine may fail."""
 
 GRACE = 1.5

@@ -1,7 +1,12 @@
 """A page of viser without a browser: its websocket, in the messages of viser itself."""
 
+import re
+import shutil
+import signal
+import subprocess
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import msgspec
 import viser
@@ -9,14 +14,18 @@ import zstandard
 from viser import _messages
 from websockets.sync.client import connect
 
+ADDRESS = re.compile(r"http://localhost:\d+/[\w-]{20,}/\n")
+REPOSITORY = Path(__file__).parents[2]
+
 
 class FakePage:
-    """One page; it answers what the server asks for as long as `is_alive`."""
+    """One page; it sends signs of life as long as `is_alive`, and something is received."""
 
-    def __init__(self, connection):
-        self._connection, self.is_alive = connection, True
+    def __init__(self, connection, connect):
+        self._connection, self._connect, self.is_alive = connection, connect, True
+        self._life = None
         self.nodes, self.gui, self.scripts, self.modals = {}, {}, [], []
-        self.positions = {}
+        self.positions, self.turns = {}, {}
         self.notes = []
         self.send(
             _messages.ViewerCameraMessage(
@@ -33,16 +42,58 @@ class FakePage:
         end = time.monotonic() + duration
         while (left := end - time.monotonic()) > 0.0:
             try:
-                data = self._connection.recv(timeout=left)
+                data = self._connection.recv(timeout=min(left, 0.05))
             except TimeoutError:
-                return
+                continue
+            finally:
+                self._live()
             size = int.from_bytes(data[8:16], "little")
             for message in msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))["messages"]:
                 self._take(message)
 
+    def take_raw(self, duration):
+        """Take what arrives within a time [s] without a look at it; return the number of messages."""
+        end, count = time.monotonic() + duration, 0
+        while (left := end - time.monotonic()) > 0.0:
+            try:
+                self._connection.recv(timeout=left)
+                count += 1
+            except TimeoutError:
+                break
+        self._live()
+        return count
+
     def find(self, label):
         """Return the identity of what has a label or a text."""
         return next(key for key, props in self.gui.items() if label in (props.get("label"), props.get("content")))
+
+    @property
+    def content(self):
+        """All texts of the page."""
+        texts = (props.get(key, "") for props in self.gui.values() for key in ("content", "_markdown"))
+        return " ".join(map(str, texts))
+
+    @property
+    def labels(self):
+        """Labels of all buttons and inputs."""
+        return {props.get("label") for props in self.gui.values()}
+
+    @property
+    def is_known(self):
+        """Whether it shows life."""
+        return self._life is not None
+
+    @property
+    def tabs(self):
+        """Names of all tabs."""
+        return [name for props in self.gui.values() for name in props.get("_tab_labels") or ()]
+
+    def until(self, condition, what, patience=40.0):
+        """Receive until a condition holds."""
+        end = time.monotonic() + patience
+        while not condition():
+            assert time.monotonic() < end, f"not within {patience:g} s: {what}\n{self.content}"
+            self.receive(0.1)
 
     def click(self, label):
         """Click on a button."""
@@ -59,6 +110,15 @@ class FakePage:
     def close(self):
         """Close the page."""
         self._connection.close()
+        if self._life is not None:
+            self._life.close()
+
+    def _live(self):
+        keys = re.findall(r"}(life/[\w-]+)`", " ".join(self.scripts))
+        if self._life is None and keys:
+            self._life = self._connect(keys[0])
+        if self._life is not None and self.is_alive:
+            self._life.send("")
 
     def _take(self, message):
         kind = message["type"]
@@ -66,14 +126,14 @@ class FakePage:
             self.scripts.append(message["source"])
         elif kind == "SetPositionMessage":
             self.positions[message["name"]] = message["position"]
+        elif kind == "SetOrientationMessage":
+            self.turns[message["name"]] = message["wxyz"]
         elif kind == "GuiUpdateMessage":
             self.gui.setdefault(message["uuid"], {}).update(message["updates"])
         elif kind == "GuiModalMessage":
             self.modals.append(message["title"])
         elif kind == "NotificationShowMessage":
             self.notes.append(message["props"]["body"])
-        elif kind == "LocalStorageGetItemRequestMessage" and self.is_alive:
-            self.send(_messages.LocalStorageGetItemResponseMessage(None, None, message["request_uuid"]))
         elif "props" in message and "uuid" in message:
             self.gui[message["uuid"]] = dict(message["props"], value=message.get("value"))
         elif "props" in message:
@@ -85,11 +145,46 @@ def opened_page(address, origin=None):
     """Open a page of a server."""
     place = address.removeprefix("http").rstrip("/")
     own = "http" + place.rpartition("/")[0]
-    with connect(
-        f"ws{place}",
-        origin=origin or own,
-        subprotocols=[f"viser-v{viser.__version__}"],
-        max_size=None,
-        compression=None,
-    ) as connection:
-        yield FakePage(connection)
+
+    def connection(path="", *protocols):
+        return connect(
+            f"ws{place}/{path}", origin=origin or own, subprotocols=protocols or None, max_size=None, compression=None
+        )
+
+    with connection("", f"viser-v{viser.__version__}") as first:
+        page = FakePage(first, connection)
+        try:
+            yield page
+        finally:
+            page.close()
+
+
+@contextmanager
+def started_view(*words):
+    """Start `solfer view` on any port; yields its process and its address, and ends it."""
+    program = [shutil.which("solfer"), "view", "--port", "0", *words]
+    with subprocess.Popen(program, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            first = process.stdout.readline()
+            assert ADDRESS.fullmatch(first), first
+            yield process, first.strip()
+        finally:
+            process.send_signal(signal.SIGINT)
+
+
+@contextmanager
+def view(*words):
+    """Start `solfer view` on any port; yields its address. It has to end well by Ctrl-C."""
+    with started_view(*words) as (process, address):
+        yield address
+    assert process.wait(20.0) == 0
+
+
+def drive(address):
+    """Take control and drive ahead, without an end; for a process of its own."""
+    with opened_page(address) as page:
+        page.until(lambda: "take control" in page.labels and page.is_known, "a page that may command")
+        page.click("take control")
+        while True:
+            page.hold("ahead")
+            page.receive(0.1)

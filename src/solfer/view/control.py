@@ -1,15 +1,12 @@
 """Commands of pages: one page at a time drags references and drives the base."""
 
 import math
-import uuid
 from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from viser import ClientHandle, GuiButtonHandle, GuiEvent, TransformControlsEvent, TransformControlsHandle, ViserServer
-from viser._messages import LocalStorageGetItemRequestMessage, LocalStorageGetItemResponseMessage
+from viser import ClientHandle, GuiButtonHandle, GuiEvent, TransformControlsEvent, TransformControlsHandle
 
 from solfer.errors import MiddlewareError, NotFinite
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -18,10 +15,12 @@ from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage
 from solfer.transport.topics import Topics
 from solfer.view.drawing import name_of, wxyz
+from solfer.view.life import PageLives
 from solfer.view.requests import PageRequests
+from solfer.view.server import PageServer
 
 SILENCE = 0.5
-"""Time without an answer of the page that commands after which everything comes to rest [s]."""
+"""Time without a sign of life of the page that commands after which everything comes to rest [s]."""
 
 RELEASED = 0.25
 """Time after which a button of the pad counts as released [s]; while it is pressed it says so ten times a second."""
@@ -47,32 +46,26 @@ FREE = "no page commands"
 WORLD = ScenePose(np.zeros(3), np.eye(3))
 
 
-@dataclass(frozen=True)
-class _Holder:
-    """The page that commands, and when it has answered last [s]."""
-
-    client: ClientHandle
-    answered: float
-
-
 class PageControl:
-    """Lets one page command, as long as it answers.
+    """Lets one page command, as long as it shows life.
 
-    The page that commands is asked for a sign of life in each cycle. Without one for `SILENCE`, or when it closes, the
-    velocity is zero, references stay where they are, and others may command.
+    Without a sign of it for `SILENCE`, or when it closes, the velocity is zero, references stay where they are, and
+    others may command.
 
     Args:
-        viser: The pages.
+        server: The pages.
         requests: Carries out what they ask for.
         middleware: Carries the commands.
     """
 
-    def __init__(self, viser: ViserServer, requests: PageRequests, middleware: Middleware):
+    def __init__(self, server: PageServer, requests: PageRequests, middleware: Middleware):
+        viser = server.viser
         self._viser = viser
+        self._lives = PageLives(server, middleware.now)
         self._requests = requests
         self._middleware = middleware
         self._dragged = DraggedReferences(middleware)
-        self._holder: _Holder | None = None
+        self._holder: int | None = None
         self._handles: dict[str, TransformControlsHandle] = {}
         self._shown: dict[str, ShownReference] = {}
         self._frames: Mapping[str, ScenePose] = {}
@@ -94,7 +87,7 @@ class PageControl:
 
         @take.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            requests.ask(partial(self._take, event.client))
+            requests.ask(partial(self._take, event.client_id))
 
         @give.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
@@ -111,10 +104,8 @@ class PageControl:
         """Publish what is commanded; without a scene, None, nothing is."""
         now = self._middleware.now()
         self._find_modules(now)
-        if self._holder is not None and (state is None or now - self._holder.answered > SILENCE):
+        if self._holder is not None and (state is None or self._lives.age(self._holder) > SILENCE):
             self._rest()
-        if self._holder is not None:
-            self._ask_for_life(self._holder.client)
         if state is not None:
             self._show(state)
         self._drive(now)
@@ -128,6 +119,11 @@ class PageControl:
             self._requests.show("another page, or none, commands: take control first")
             return False
         return True
+
+    @property
+    def is_free(self) -> bool:
+        """Whether no page commands."""
+        return self._holder is None
 
     def _find_modules(self, now: float) -> None:
         """Look once a second which components drive the base."""
@@ -149,32 +145,26 @@ class PageControl:
     @property
     def _name(self) -> str:
         """Name of the page that commands; empty: none does."""
-        return "" if self._holder is None else str(self._holder.client.client_id)
+        return "" if self._holder is None else str(self._holder)
 
     def _is_holder(self, client: int | None) -> bool:
-        return self._holder is not None and client == self._holder.client.client_id
+        return self._holder is not None and client == self._holder
 
-    def _take(self, client: ClientHandle | None) -> None:
-        if client is None or self._is_holder(client.client_id):
+    def _take(self, client: int | None) -> None:
+        if client is None or self._is_holder(client):
             return
         if self._holder is not None:
-            client.add_notification("solfer", "another page commands", color="red", auto_close_seconds=5.0)
-            return
-        self._holder = _Holder(client, self._middleware.now())
-        self._state.content = f"page {client.client_id} commands"
+            self._refuse(client, "another page commands")
+        elif self._lives.age(client) > SILENCE:
+            self._refuse(client, "this page does not answer in time to command")
+        else:
+            self._holder = client
+            self._state.content = f"page {client} commands"
 
-        def answered(client_id: int, _: LocalStorageGetItemResponseMessage) -> None:
-            self._requests.ask(partial(self._note_life, client_id))
-
-        client._websock_connection.register_handler(LocalStorageGetItemResponseMessage, answered)
-
-    def _note_life(self, client: int) -> None:
-        if self._holder is not None and self._is_holder(client):
-            self._holder = replace(self._holder, answered=self._middleware.now())
-
-    def _ask_for_life(self, client: ClientHandle) -> None:
-        """Ask the page for something that only a page that works answers."""
-        client._websock_connection.queue_message(LocalStorageGetItemRequestMessage("solfer", uuid.uuid4().hex))
+    def _refuse(self, client: int, reason: str) -> None:
+        page = self._viser.get_clients().get(client)
+        if page is not None:
+            page.add_notification("solfer", reason, color="red", auto_close_seconds=5.0)
 
     def _give(self, client: int | None) -> None:
         if self._is_holder(client):

@@ -1,6 +1,7 @@
 """The page: what is seen of a robot, and what belongs to it."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from solfer.model.urdf.description import Description
 from solfer.scene import SceneState
@@ -10,12 +11,16 @@ from solfer.view.control import PageControl
 from solfer.view.drawing import SceneDrawing
 from solfer.view.emergency_stop import EmergencyStopButton
 from solfer.view.freshness import Freshness
+from solfer.view.parameters import KnownParameters
 from solfer.view.playback import Playback
 from solfer.view.plots import Plots
 from solfer.view.plugin_tabs import PluginTabs
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 from solfer.view.time_line import TimeLine
+
+if TYPE_CHECKING:
+    from solfer.view.foxglove_server import FoxgloveServer
 
 CAMERA, LOOK = (2.1, -1.8, 1.4), (0.0, 0.0, 0.6)
 """Where a page looks from at first, and where to [m]."""
@@ -31,6 +36,10 @@ class Page:
         stop: The emergency stop; None: the service of the lower level.
         control: Whether pages may command.
         playback: The recording that is shown; None: what is shown is live.
+        foxglove: Port at which a server for Foxglove has the same; None: there is none.
+
+    Attributes:
+        foxglove: That server.
     """
 
     def __init__(
@@ -41,6 +50,7 @@ class Page:
         stop: Callable[[], None] | None = None,
         control: bool = False,
         playback: Playback | None = None,
+        foxglove: int | None = None,
     ):
         self._viser = server.viser
         self._middleware = middleware
@@ -53,6 +63,7 @@ class Page:
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)
         self._control: PageControl | None = None
+        self.foxglove: FoxgloveServer | None = None
         if playback is not None:
             self._time_line = TimeLine(self._viser, self._requests, playback)
             self._plots = Plots(gui, self._requests, playback)
@@ -60,8 +71,16 @@ class Page:
         EmergencyStopButton(self._viser, self._requests, stop)
         self._columns = LiveColumns(middleware)
         self._plots = Plots(gui, self._requests, self._columns)
-        self._control = PageControl(self._viser, self._requests, middleware) if control else None
-        self._tabs = PluginTabs(gui, self._requests, self._control)
+        self._control = PageControl(server, self._requests, middleware) if control else None
+        self._parameters = KnownParameters(middleware)
+        self._tabs = PluginTabs(gui, self._requests, self._parameters, control=self._control)
+        if foxglove is not None:
+            self.foxglove = self._make_foxglove(foxglove)
+
+    def _make_foxglove(self, port: int) -> "FoxgloveServer":
+        from solfer.view.foxglove_server import FoxgloveServer  # 54 MB, which most do without
+
+        return FoxgloveServer(port, self._requests, self._columns, parameters=self._parameters, control=self._control)
 
     def update(self, state: SceneState | None) -> None:
         """Show a scene; None: nothing new is known."""
@@ -71,9 +90,12 @@ class Page:
             now = self._playback.time - self._playback.begin
         else:
             reports = dict(self._middleware.reports())
+            self._parameters.update(reports)
             self._tabs.update(reports)
             self._columns.update(state, reports)
             now = self._middleware.now()
+            if self.foxglove is not None:
+                self.foxglove.update(state)
         if self._control is not None:
             self._control.update(state)
         if state is None:

@@ -13,16 +13,9 @@ from solfer.components.declaration import Accepted
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
-from solfer.transport.parameters import (
-    GET_PARAMETERS,
-    GETTING,
-    SET_PARAMETERS,
-    SETTING,
-    GetParameters,
-    ParametersReply,
-    SetParameters,
-)
+from solfer.transport.parameters import SET_PARAMETERS, SETTING, ParametersReply, SetParameters
 from solfer.view.control import PageControl
+from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
 
 COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
@@ -42,12 +35,14 @@ class PluginTabs:
     Args:
         gui: Where they are.
         requests: Calls services.
+        parameters: Those of the parts.
         control: Says which page may switch plugins and change parameters; None: none may.
     """
 
-    def __init__(self, gui: GuiApi, requests: PageRequests, control: PageControl | None):
+    def __init__(self, gui: GuiApi, requests: PageRequests, parameters: KnownParameters, control: PageControl | None):
         self._gui = gui
         self._requests = requests
+        self._parameters = parameters
         self._control = control
         self._group = gui.add_tab_group()
         self._tabs: dict[str, _PluginTab] = {}
@@ -59,7 +54,7 @@ class PluginTabs:
                 self._tabs[name] = _PluginTab(
                     self._gui, self._group, name, requests=self._requests, control=self._control
                 )
-            self._tabs[name].show(report)
+            self._tabs[name].show(report, self._parameters.known.get(name))
 
 
 class _PluginTab:
@@ -76,19 +71,16 @@ class _PluginTab:
         self._tab = group.add_tab(name.rpartition("/")[2])
         with self._tab:
             self._text: GuiHtmlHandle = gui.add_html("")
-        service = f"{name}/{GET_PARAMETERS}"
-        known = requests.middleware.request(
-            requests.middleware.resolve(service), GETTING, GetParameters(), ParametersReply, 2.0
-        )
-        known.add_done_callback(
-            lambda answer: None if answer.exception() else requests.ask(lambda: self._add_controls(answer.result()))
-        )
+        self._has_controls = False
 
-    def show(self, report: HealthReport) -> None:
-        """Show a report, if it is new."""
+    def show(self, report: HealthReport, parameters: ParametersReply | None) -> None:
+        """Show a report, if it is new, and the parameters once they are known."""
         if report is not self._report:
             self._report = report
             self._text.content = _table(report)
+        if parameters is not None and not self._has_controls:
+            self._has_controls = True
+            self._add_controls(parameters)
 
     def _add_controls(self, reply: ParametersReply) -> None:
         """Add what only plugins have: they know their parameters."""

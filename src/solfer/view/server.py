@@ -3,6 +3,7 @@
 import http
 import secrets
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 from unittest.mock import patch
 
@@ -12,6 +13,7 @@ import websockets.asyncio.server
 from viser import _messages
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from solfer.errors import MiddlewareError
@@ -23,6 +25,9 @@ NAMES = ("localhost", HOST)
 
 PORT = 8080
 
+LIFE = "life"
+"""Path of the websockets by which pages show that they live."""
+
 HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "frame-ancestors 'none'",
@@ -30,6 +35,7 @@ HEADERS = {
 }
 """Of the page: neither stored nor shown inside of another one, and its address is not passed on."""
 
+Handler = Callable[[ServerConnection], Awaitable[None]]
 Process = Callable[[ServerConnection, Request], Response | None | Awaitable[Response | None]]
 
 
@@ -44,6 +50,7 @@ class PageServer:
     Attributes:
         viser: What is on the page.
         address: Address of the page.
+        lives: What notes a sign of life, in the server's thread, by the random key of a page.
 
     Raises:
         MiddlewareError: It cannot be served.
@@ -53,6 +60,7 @@ class PageServer:
         rich.get_console().quiet = True  # viser prints addresses without the token
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
+        self.lives: dict[str, Callable[[], None]] = {}
         # viser has no hook for requests
         with patch.object(websockets.asyncio.server, "serve", self._guarded(websockets.asyncio.server.serve)):
             self.viser = viser.ViserServer(HOST, port, label="solfer", verbose=False)
@@ -77,9 +85,9 @@ class PageServer:
         self.viser.stop()
 
     def _guarded(self, serve: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a `serve` that asks `_refusal` about each request first."""
+        """Return a `serve` that asks `_refusal` about each request first, and receives signs of life."""
 
-        def guarded(*arguments: Any, process_request: Process, **options: Any) -> Any:
+        def guarded(handler: Handler, *arguments: Any, process_request: Process, **options: Any) -> Any:
             self._is_guarded = True
 
             def process(connection: ServerConnection, request: Request) -> Any:
@@ -92,7 +100,18 @@ class PageServer:
                     response.headers.update(HEADERS)
                 return response
 
-            return serve(*arguments, process_request=process, **options)
+            async def handle(connection: ServerConnection) -> None:
+                assert connection.request is not None
+                kind, _, key = connection.request.path.strip("/").partition("/")
+                if kind != LIFE:
+                    return await handler(connection)
+                with suppress(ConnectionClosed):
+                    async for _ in connection:
+                        if key not in self.lives:
+                            return
+                        self.lives[key]()
+
+            return serve(handle, *arguments, process_request=process, **options)
 
         return guarded
 

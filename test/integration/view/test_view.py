@@ -1,11 +1,7 @@
 """`solfer view` as a process: the commands of docs/view.md, with a page without a browser, and in Debian's Chromium."""
 
 import re
-import shutil
-import signal
-import subprocess
 import time
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -13,23 +9,7 @@ import pytest
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
 from support.browser import CHROMIUM, browser  # noqa: E402
-from support.page import opened_page  # noqa: E402
-
-ADDRESS = re.compile(r"http://localhost:\d+/[\w-]{20,}/\n")
-
-
-@contextmanager
-def view(repository, *words):
-    """Start `solfer view` on any port; yields its address."""
-    command = [shutil.which("solfer"), "view", "--port", "0", *words]
-    with subprocess.Popen(command, cwd=repository, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            first = process.stdout.readline()
-            assert ADDRESS.fullmatch(first), first
-            yield first.strip()
-        finally:
-            process.send_signal(signal.SIGINT)
-        assert process.wait(20.0) == 0
+from support.page import opened_page, view  # noqa: E402
 
 
 @pytest.mark.slow
@@ -37,7 +17,7 @@ def test_a_study_drives_on_the_page(repository):
     (line,) = re.findall(
         r"^solfer view (--run \S+ --control)$", (repository / "docs/view.md").read_text(), re.MULTILINE
     )
-    with view(repository, *line.split()) as address, opened_page(address) as page:
+    with view(*line.split()) as address, opened_page(address) as page:
         end = time.monotonic() + 60.0
         places = []
         while time.monotonic() < end and (len(places) < 2 or np.linalg.norm(places[-1] - places[0]) < 0.01):
@@ -45,17 +25,15 @@ def test_a_study_drives_on_the_page(repository):
             if "/measured/pelvis" in page.positions:
                 places.append(np.array(page.positions["/measured/pelvis"]))
         assert np.linalg.norm(places[-1] - places[0]) >= 0.01, "it does not move"
-        texts = " ".join(str(props.get("content", "")) for props in page.gui.values())
-        assert "wheeled_motion" in str(page.gui.values()) and "running" in texts
+        assert "wheeled_motion" in page.tabs and "running" in page.content
         page.click("take control")
-        page.receive(1.0)
-        assert any("commands" in str(props.get("_markdown")) for props in page.gui.values())
+        page.until(lambda: re.search(r"page \d+ commands", page.content), "control")
 
 
 @pytest.mark.soak
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
-def test_chromium_draws_the_page(repository, tmp_path):
-    with view(repository, "--run", "config/studies/robustness.yaml") as address:
+def test_chromium_draws_the_page(tmp_path):
+    with view("--run", "config/studies/robustness.yaml") as address:
         with browser(tmp_path / "profile", address) as seen:
             seen.wait("(document.getElementById('solfer-beat')?.dataset.count ?? 0) > 20")
             seen.picture(tmp_path / "view.png")
@@ -63,6 +41,22 @@ def test_chromium_draws_the_page(repository, tmp_path):
             seen.click("EMERGENCY STOP")
             seen.click("stop the robot now")
             seen.wait("!document.body.innerText.includes('stop the robot now')")
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
+def test_chromium_keeps_control_however_slowly_it_draws(tmp_path):
+    """Without a graphics card it draws about one picture a second."""
+    commands = r"/page \d+ commands/.test(document.body.innerText)"
+    with view("--run", "config/studies/robustness.yaml", "--control") as address:
+        with browser(tmp_path / "profile", address) as seen:
+            seen.wait("(document.getElementById('solfer-beat')?.dataset.count ?? 0) > 20")
+            seen.click("take control")
+            seen.wait(commands)
+            end = time.monotonic() + 10.0
+            while time.monotonic() < end:
+                assert seen.evaluate(commands)
+                time.sleep(0.2)
 
 
 GREEN = (60, 190, 70)

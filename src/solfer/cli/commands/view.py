@@ -22,6 +22,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=Number(0, 65535, ""), default=8080, help="port, or the next free one (default: 8080; 0: any)"
     )
     parser.add_argument(
+        "--foxglove",
+        metavar="PORT",
+        nargs="?",
+        const=8765,
+        type=Number(0, 65535, "", int),
+        help="a server for Foxglove beside it, for this machine alone (default: 8765; 0: any)",
+    )
+    parser.add_argument(
         "--control", action="store_true", help="let one page at a time command: references, the base, plugins"
     )
 
@@ -32,8 +40,9 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         SolferError: There is no such robot or source, or viser is missing.
     """
-    if options.file is not None and (options.namespace is not None or options.study is not None or options.control):
-        options.parser.error("a recording with --namespace, --run or --control, expected FILE alone")
+    others = (options.namespace, options.study, options.foxglove, options.control or None)
+    if options.file is not None and any(each is not None for each in others):
+        options.parser.error("a recording with --namespace, --run, --foxglove or --control, expected FILE alone")
     from solfer.cli.view.actions import show
 
     return show(options)

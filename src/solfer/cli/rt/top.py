@@ -10,8 +10,8 @@ from solfer.cli.columns import aligned
 from solfer.cli.rt.tables import overview
 from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.health import layer_report, plugin_report
-from solfer.realtime.telemetry.statistics_memory import EXECUTOR, RuntimeStatistics
+from solfer.realtime.telemetry.health import reports_of
+from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
 from solfer.transport.middleware import HealthReport
 
@@ -37,9 +37,7 @@ def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
         if layer is None:
             yield "the RT layer has ended"
         else:
-            reports = {EXECUTOR: layer_report(layer, before)}
-            reports |= {plugin.name: plugin_report(plugin) for plugin in layer.plugins}
-            yield from health({**reports, **others.read()})
+            yield from health({**reports_of(layer, before), **others.read()})
             yield ""
             yield from overview(layer, since)
         before = layer

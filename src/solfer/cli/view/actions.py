@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 
 from solfer.cli.view.paced import PacedMiddleware
 from solfer.robot import Robot
@@ -51,7 +52,10 @@ def show(options: argparse.Namespace) -> int:
                 stop=source.stop,
                 control=options.control,
                 playback=source.playback,
+                foxglove=options.foxglove,
             )
+            if page.foxglove is not None:
+                print(page.foxglove.address, flush=True)
             FixedRateLoop(source.middleware, RATE).run(
                 lambda *_: page.update(scene.update()), source.middleware.running
             )
@@ -105,14 +109,14 @@ def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
 
 
 def _layer(options: argparse.Namespace) -> ShownSource:
-    from solfer.middleware.shared_memory.middleware import XbotMiddleware
+    from solfer.cli.view.layer import LayerMiddleware
     from solfer.realtime.emergency_stop import EmergencyStopLatch
     from solfer.realtime.namespaces import find
 
     namespace = find(options.namespace)
     latch = EmergencyStopLatch(namespace.folder)
-    middleware = XbotMiddleware(namespace, NAME, listens=False)
-    return ShownSource(_named(options.robot or ROBOT), middleware, lambda: latch.trip("by the page"))
+    stop = partial(latch.trip, "by the page")
+    return ShownSource(_named(options.robot or ROBOT), LayerMiddleware(namespace, NAME), stop)
 
 
 def _ros(options: argparse.Namespace) -> ShownSource:

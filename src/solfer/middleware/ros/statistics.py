@@ -8,11 +8,10 @@ from typing import Any
 import rospy
 
 from solfer.msg import LayerStatistics, PluginStatistics, StageTimes
-from solfer.realtime.telemetry.health import layer_report, plugin_report
+from solfer.realtime.telemetry.health import reports_of
 from solfer.realtime.telemetry.statistics_memory import EXECUTOR
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 from solfer.transport import Middleware
-from solfer.transport.health import Health
 
 logger = logging.getLogger(__name__)
 
@@ -44,25 +43,20 @@ class StatisticsPublisher:
     def cycle(self) -> None:
         """Read the statistics once and publish them."""
         figures, self._before, before = self._look(), None, self._before
+        for name, report in reports_of(figures, before).items():
+            self._middleware.report(name, report.level, report.summary, report.values)
         if figures is None:
-            self._middleware.report(EXECUTOR, Health.ERROR, "there is no real-time layer", {})
             return
         self._before = figures
         message = message_of(figures)
         message.header.stamp = rospy.Time.now()
         self._publisher.publish(message)
-        self._report(EXECUTOR, layer_report(figures, before))
-        for plugin in figures.plugins:
-            self._report(plugin.name, plugin_report(plugin))
 
     def close(self) -> None:
         """Stop publishing."""
         self._end.set()
         self._thread.join()
         self._publisher.unregister()
-
-    def _report(self, name: str, report: Any) -> None:
-        self._middleware.report(name, report.level, report.summary, report.values)
 
     def _run(self) -> None:
         while not self._end.wait(self._period):

@@ -2,12 +2,20 @@
 
 from collections.abc import Iterable
 
+from solfer.realtime.telemetry.statistics_memory import EXECUTOR
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 from solfer.transport.plugin_state import FAILED
 
 FAILED_NAMES = frozenset(state.name for state in FAILED)
+
+
+def reports_of(now: LayerSummary | None, before: LayerSummary | None) -> dict[str, HealthReport]:
+    """Judge the health of a layer and of each of its plugins; None: there is no layer."""
+    if now is None:
+        return {EXECUTOR: HealthReport(Health.ERROR, "there is no real-time layer", {})}
+    return {EXECUTOR: layer_report(now, before), **{plugin.name: plugin_report(plugin) for plugin in now.plugins}}
 
 
 def layer_report(now: LayerSummary, before: LayerSummary | None) -> HealthReport:

@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""Measures what a page in the browser costs: its process, and the periods that a real-time layer leaves out beside it.
+
+Run with `./run exec python benchmark/view.py [--seconds S] [--json]`. `joint_states` runs at 500 Hz beside CENTAURO in
+PyBullet, first without a page, then with one that a client receives and does not draw. Exit code 1: the page takes more
+than 15 % of a core, or more than 5 further periods are left out in 30 s.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from executor import CONFIG, REPOSITORY, end, wait_for_all, wait_for_robot
+from form import Figures, parser_of
+
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
+from solfer.supervision import supervise
+
+sys.path.insert(0, str(REPOSITORY / "test"))
+from support.page import opened_page  # noqa: E402
+
+RATE = 500
+SHARE, LEFT_OUT = 0.15, 5
+"""Largest share of a core, and largest number of further periods that are left out in 30 s."""
+
+SETTLES = 5.0
+"""Time from the first picture until it is measured [s]."""
+
+TICK = 1.0 / os.sysconf("SC_CLK_TCK")
+
+
+def spent(process: int) -> float:
+    """Return the time that a process has computed [s]."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return TICK * (int(fields[11]) + int(fields[12]))
+
+
+def skipped(namespace: Namespace) -> int:
+    """Return the periods that the layer has left out.
+
+    Raises:
+        SystemExit: It has ended.
+    """
+    summary: LayerSummary | None = StatisticsReader(namespace.folder).look()
+    if summary is None:
+        raise SystemExit("the layer has ended")
+    return summary.skipped
+
+
+def receive(address: str, is_over: threading.Event, pictures: list[int]) -> None:
+    """Receive what a page gets, without a look at it; count the messages of pictures."""
+    with opened_page(address) as page:
+        page.receive(SETTLES)  # it shows life, as every page
+        while not is_over.is_set():
+            pictures[0] += page.take_raw(0.5)
+
+
+def main() -> int:
+    """Measure, and return the exit code."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each measurement (default: 30)")
+    options = parser.parse_args()
+    figures = Figures(options.json)
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        layer = folder / "layer.yaml"
+        layer.write_text(
+            f"XBotRTPlugins: {{plugins: [joint_states]}}\nmwoibn: {{config_file: {CONFIG / 'centauro.yaml'}}}\n"
+            f"executor: {{rate: {RATE}, start: [joint_states], blend: 0.2}}\n"
+        )
+        namespace = Namespace(f"benchmark-{os.getpid()}")
+        stack.callback(shutil.rmtree, namespace.folder, ignore_errors=True)
+        processes: list[subprocess.Popen] = []
+        stack.callback(end, processes)
+        robot, world = CONFIG / "robots" / "centauro" / "robot.yaml", CONFIG / "worlds" / "flat.yaml"
+        for node, *arguments in (("xbot_simulator", "--robot", robot, "--world", world), ("xbot", layer)):
+            command = [sys.executable, REPOSITORY / "nodes" / node, *arguments, "--namespace", namespace.name]
+            environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+            processes.append(subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL))
+            wait_for_robot(namespace.name)
+        wait_for_all(namespace, processes)
+        before = skipped(namespace)
+        time.sleep(options.seconds)
+        without = skipped(namespace) - before
+        figures.row("without a page", share=0.0, left_out=without, pictures_hz=0.0)
+
+        command = [shutil.which("solfer") or "solfer", "view", "--port", "0", "--namespace", namespace.name]
+        view = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        processes.append(view)
+        assert view.stdout is not None
+        address = view.stdout.readline().strip()
+        is_over = threading.Event()
+        pictures = [0]
+        client = threading.Thread(target=receive, args=(address, is_over, pictures))
+        client.start()
+        time.sleep(2.0 * SETTLES)
+        before, begun, shown, since = skipped(namespace), spent(view.pid), pictures[0], time.monotonic()
+        time.sleep(options.seconds)
+        took = time.monotonic() - since
+        share, seen = (spent(view.pid) - begun) / took, (pictures[0] - shown) / took
+        beside = skipped(namespace) - before
+        figures.row("a page with one client", share=share, left_out=beside, pictures_hz=seen)
+        is_over.set()
+        client.join()
+    most = LEFT_OUT * max(options.seconds / 30.0, 1.0)
+    return 0 if share <= SHARE and beside - without <= most else 1
+
+
+if __name__ == "__main__":
+    supervise()
+    sys.exit(main())

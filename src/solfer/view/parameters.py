@@ -1,0 +1,54 @@
+"""Live parameters of all parts that offer them."""
+
+import math
+from collections.abc import Iterable
+from concurrent.futures import Future
+
+from solfer.transport import Middleware
+from solfer.transport.parameters import GET_PARAMETERS, GETTING, GetParameters, ParametersReply
+
+TRIALS, PAUSE = 10, 2.0
+"""How often, and after which time [s], a part is asked for its parameters: it may report before it offers them."""
+
+
+class KnownParameters:
+    """Asks each part that reports its health for its parameters, until they are known.
+
+    Args:
+        middleware: Has their services.
+
+    Attributes:
+        known: What is known, by part.
+    """
+
+    def __init__(self, middleware: Middleware):
+        self._middleware = middleware
+        self.known: dict[str, ParametersReply] = {}
+        self._asked: dict[str, Future[ParametersReply]] = {}
+        self._left: dict[str, int] = {}
+        self._next: dict[str, float] = {}
+
+    def update(self, parts: Iterable[str]) -> None:
+        """Ask, and take the answers that are there."""
+        now = self._middleware.now()
+        for part in parts:
+            if part in self._asked:
+                self._take(part)
+            elif self._left.setdefault(part, TRIALS) and now >= self._next.get(part, -math.inf):
+                self._left[part] -= 1
+                self._next[part] = now + PAUSE
+                service = self._middleware.resolve(f"{part}/{GET_PARAMETERS}")
+                answer = self._middleware.request(service, GETTING, GetParameters(), ParametersReply, PAUSE)
+                self._asked[part] = answer
+
+    def forget(self, part: str) -> None:
+        """Let a part be asked again, since its parameters have changed."""
+        self._left[part] = TRIALS
+        self._next[part] = -math.inf
+
+    def _take(self, part: str) -> None:
+        if self._asked[part].done():
+            answer = self._asked.pop(part)
+            if answer.exception() is None:
+                self._left[part] = 0
+                self.known[part] = answer.result()

@@ -1,0 +1,133 @@
+"""The server for Foxglove, by a client of its websocket protocol."""
+
+import json
+import socket
+import struct
+from contextlib import closing, contextmanager
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
+pytest.importorskip("foxglove", reason="needs pip install -r requirements-view.txt")
+
+from support.page import opened_page  # noqa: E402
+from support.page_bench import PageBench  # noqa: E402
+from support.unit.upper_body import upper_body  # noqa: E402
+from websockets.sync.client import connect  # noqa: E402
+
+from solfer.transport.parameters import SetParameters  # noqa: E402
+
+pytestmark = pytest.mark.slow
+
+PROTOCOL = "foxglove.sdk.v1"
+
+
+class Client:
+    """A client, which subscribes to all channels."""
+
+    def __init__(self, connection):
+        self._connection = connection
+        self.topics, self.data, self.answers = {}, {}, {}
+        self.server = None
+
+    def send(self, **message):
+        self._connection.send(json.dumps(message))
+
+    def receive(self):
+        """Take what is there."""
+        while True:
+            try:
+                message = self._connection.recv(timeout=0.02)
+            except TimeoutError:
+                return
+            if isinstance(message, bytes):
+                kind, subscription = struct.unpack_from("<BI", message)
+                assert kind == 1
+                self.data[self.topics[subscription]] = message[13:]
+                continue
+            message = json.loads(message)
+            if message["op"] == "serverInfo":
+                self.server = message
+            elif message["op"] == "advertise":
+                for channel in message["channels"]:
+                    self.topics[channel["id"]] = channel["topic"]
+                    subscription = {"id": channel["id"], "channelId": channel["id"]}
+                    self.send(op="subscribe", subscriptions=[subscription])
+            elif message["op"] == "parameterValues":
+                values = {each["name"]: each["value"] for each in message["parameters"]}
+                self.answers[message.get("id")] = values
+
+
+@contextmanager
+def served(repository, control):
+    bench = PageBench(upper_body(repository), control, foxglove=0)
+    server = bench.page.foxglove
+    with closing(bench.server), closing(server), connect(server.address, subprotocols=[PROTOCOL]) as connection:
+        client = Client(connection)
+        bench.clients = [client_of(client)]
+        bench.run(20)
+        yield bench, client
+
+
+def client_of(client):
+    """Let the bench receive what is for the client."""
+
+    class _Receiver:
+        def receive(self, _):
+            client.receive()
+
+    return _Receiver()
+
+
+def test_channels_have_what_the_robot_publishes(repository):
+    with served(repository, False) as (bench, client):
+        bench.robot.command.position[:] = np.linspace(-0.3, 0.3, bench.robot.size)
+        bench.run(10)
+        assert client.server["name"] == "solfer" and "parameters" in client.server["capabilities"]
+        joints, frames = client.data["/joint_states"], client.data["/tf"]
+        for name, value in zip(bench.robot.dofs, bench.robot.command.position.tolist(), strict=True):
+            assert name.encode() in joints and struct.pack("<d", value) in joints
+        place = bench.state.measured["arm1_7"].position
+        assert b"arm1_7" in frames and all(struct.pack("<d", each) in frames for each in place.tolist())
+        columns = json.loads(client.data["/columns"])
+        assert columns["centre of mass/z [m]"] == pytest.approx(bench.state.center[2])
+        assert columns["hands/cycle p99 [ms]"] == 1.25
+
+
+def test_parameters_are_read_and_not_changed_without_control(repository):
+    with served(repository, False) as (bench, client):
+        client.send(op="getParameters", parameterNames=[], id="all")
+        bench.until(lambda: "all" in client.answers)
+        assert client.answers["all"] == {"hands.gain": 2.0}
+        client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.0}], id="set")
+        bench.until(lambda: "set" in client.answers)
+        bench.run(10)
+        assert client.answers["set"] == {"hands.gain": 2.0} and not bench.asked
+
+
+def test_parameters_change_with_control_while_no_page_commands(repository):
+    with served(repository, True) as (bench, client):
+        client.send(op="subscribeParameterUpdates", parameterNames=["hands.gain"])
+        client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.5}], id="set")
+        bench.until(lambda: bench.asked)
+        assert bench.asked == [SetParameters(("gain",), ("3.5",))]
+        bench.until(lambda: client.answers.get(None) == {"hands.gain": 3.5})
+        with opened_page(bench.server.address) as page:
+            bench.clients.append(page)
+            bench.until(lambda: page.is_known and "take control" in page.labels)
+            bench.run(4)
+            page.click("take control")
+            bench.until(lambda: "commands" in page.content and "no page" not in page.content)
+            client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 9.0}], id="late")
+            bench.until(lambda: "late" in client.answers)
+            bench.run(10)
+        assert len(bench.asked) == 1
+
+
+def test_only_this_machine_is_served(repository):
+    with served(repository, False) as (bench, _):
+        port = int(bench.page.foxglove.address.rpartition(":")[2])
+        for other in ("127.0.0.2", "::1"):
+            with pytest.raises(OSError):
+                socket.create_connection((other, port), timeout=1.0).close()
