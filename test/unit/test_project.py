@@ -19,6 +19,7 @@ PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 NAMES = {
     "distributed": "dask",
+    "foxglove": "foxglove-sdk",
     "pinocchio": "pin",
     "pybullet_data": "pybullet",
     "pydantic_core": "pydantic",

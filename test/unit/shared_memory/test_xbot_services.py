@@ -166,6 +166,15 @@ def test_segments_of_ended_clients_are_removed(world):
     assert list(calls.iterdir()) == []
 
 
+def test_a_client_that_comes_back_at_once_is_answered(world):
+    """Its server has not looked since the client of that name ended."""
+    world.serve(scale)
+    for _ in range(2):
+        client = world.node("client")
+        assert ask(client).success
+        client.close()
+
+
 def test_parameters_of_a_plugin_travel(world, tmp_path):
     """What is described and changed in shared memory is what a plugin has."""
     changed = tree("support.plugins.tuned:Tuned")

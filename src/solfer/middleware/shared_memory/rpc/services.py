@@ -113,7 +113,9 @@ class ServiceServer:
         for name in self._namespace.present(SERVICES, self.name, CALLS):
             path = self._namespace.path(SERVICES, self.name, CALLS, name)
             try:
-                channel = self._channels.get(name) or RpcChannel.join(path, self._interface)
+                channel = self._channels.get(name)
+                if channel is None or not channel.segment.owned():  # a client of the same name may be another one
+                    channel = RpcChannel.join(path, self._interface)
                 if channel.segment.owned():
                     found[name] = channel
                 else:
