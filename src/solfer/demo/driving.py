@@ -113,12 +113,12 @@ class Driving:
         begin = middleware.now()
         whole = course.left
         cycles = 0
-        told = ""
+        shown = ""
         robot_begin = robot_time(self._recorder)
         complaints = Complaints(middleware)
 
         def cycle(_: float, skipped: int) -> None:
-            nonlocal cycles, told
+            nonlocal cycles, shown
             navigation.cycle(skipped)
             waving.send(robot_time(self._recorder) - robot_begin)
             self._recorder.look()
@@ -126,9 +126,9 @@ class Driving:
                 check()
                 complaints.check()
                 title = f"waits for {navigation.waits}" if navigation.waits else TITLES.get(course.number, course.name)
-                if title != told:
+                if title != shown:
                     progress.end()
-                    told = title
+                    shown = title
                 progress(title, min(whole - course.left, NEARLY * whole), whole)
             cycles += 1
 
@@ -170,11 +170,11 @@ def wait_for_robot(
         MiddlewareError: It takes longer.
     """
     end = time.monotonic() + timeout
-    told = ""
+    shown = ""
     while middleware.running() and (missing := recorder.missing()):
-        if missing != told:
+        if missing != shown:
             print(f"waits for {missing}", flush=True)
-            told = missing
+            shown = missing
         if time.monotonic() > end:
             raise MiddlewareError(
                 f"not ready within {timeout:g} s: nothing came of {missing}",

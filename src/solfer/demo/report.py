@@ -101,8 +101,8 @@ def published(values: Mapping[str, float | str]) -> list[Row]:
         (f"age of {key.removesuffix(AGE)}", f"{float(age):.1f} ms") for key, age in values.items() if key.endswith(AGE)
     ]
     counts = {key.removeprefix(GATE): int(float(count)) for key, count in values.items() if key.startswith(GATE)}
-    told = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    return [*ages, ("held back by the gate", told)] if told else ages
+    listed = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    return [*ages, ("held back by the gate", listed)] if listed else ages
 
 
 def format_table(rows: list[Row]) -> str:

@@ -44,7 +44,7 @@ class Plots:
         clear.on_click(lambda _: requests.ask(self._clear))
 
     def update(self, now: float) -> None:
-        """Take a sample at some time [s]; where time goes back the plot begins anew."""
+        """Take a sample at some time [s]; where time goes back the plot begins again."""
         if self._times and now < self._times[-1]:
             self._empty()
         names = self._columns.names()

@@ -92,7 +92,7 @@ def put(world, name, **values):
 
 
 def built_with(kind, tags, name, rate):
-    """Make the component anew, with the tags that the changes have led to."""
+    """Make the component again, with the tags that the changes have led to."""
     elsewhere = World()
     configuration = load(CONFIG / "centauro.yaml", name)
     generator = Registry().find("joint_states", CASES[name][0] or f"{kind.__module__}:{kind.__name__}")

@@ -155,7 +155,7 @@ def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "Record
 
     begin = time.monotonic()
     end = begin + seconds if seconds is not None else float("inf")
-    told = False
+    is_reported = False
     warned = False
     with closing(ProcessEnd()) as ending:
         while True:
@@ -168,8 +168,8 @@ def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "Record
                     print(f"warning: {error}", file=sys.stderr, flush=True)
                 warned = True
             passed = time.monotonic() - begin
-            if not told and passed >= TRIED:
-                told = True
+            if not is_reported and passed >= TRIED:
+                is_reported = True
                 print(f"{writer.path}: about {3600e-9 * writer.size / passed:.2g} GB an hour", flush=True)
             if over:
                 return

@@ -72,12 +72,12 @@ def _fit(jacobian, world, weights, columns, least, factor, forces, rest):
 
 
 def _learn(
-    jacobian, world, weights, columns, least, first, share, decay, prior, factor, spread, needed, information, told,
+    jacobian, world, weights, columns, least, first, share, decay, prior, factor, spread, needed, information, learned,
     solved, offsets,
 ):  # fmt: skip
     """Add what a cycle tells of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     rows = len(jacobian)
-    size = len(told)
+    size = len(learned)
     _normal_matrix(jacobian, weights, columns, least, factor)
     for i in range(rows):
         needed[i] = 0.0
@@ -94,7 +94,7 @@ def _learn(
         left = weights[column] * world[column]
         for i in range(rows):
             left -= spread[a, i] * needed[i]
-        told[a] += -share * left - decay * told[a]
+        learned[a] += -share * left - decay * learned[a]
         for b in range(a + 1):
             left = weights[column] if a == b else 0.0
             for i in range(rows):
@@ -104,7 +104,7 @@ def _learn(
         solved[a, a] += prior
     _decompose(solved)
     for a in range(size):
-        offsets[a] = told[a]
+        offsets[a] = learned[a]
     _forward(solved, offsets)
     _backward(solved, offsets)
 

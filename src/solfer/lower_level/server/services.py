@@ -128,7 +128,7 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
     def gains(request: FileRequest) -> Gains:
         return read_gains(controller, request.file, folders, robot=robot)
 
-    def told(_request: NoFields) -> ControllerGains:
+    def reported(_request: NoFields) -> ControllerGains:
         gains = controller.default_gains
         return ControllerGains(
             names=controller.joints,
@@ -138,7 +138,7 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
 
     return (
         *services,
-        Service("get_gains", CONTROLLER_GAINS, NoFields, reply=ControllerGains, handler=told),
+        Service("get_gains", CONTROLLER_GAINS, NoFields, reply=ControllerGains, handler=reported),
         Service("set_ff_torque", SWITCH_FEED_FORWARD, Flag, reply=Answer, handler=answered(set_ff_torque)),
         Service(
             "load_gains",

@@ -64,7 +64,7 @@ class Bridge:
         self._outside = outside
         self._offers = offers
         self._topics = topics
-        self._wanted = wanted
+        self._requested = wanted
         self._beside = beside
         self.forwarding = ServiceForwarder(inside, outside)
         self._ways_in: list[OneWayTopic] = []
@@ -133,7 +133,7 @@ class Bridge:
         """Start forwarding topics and services that are new inside since the last search."""
         try:
             self._open(self._topics(self.crossings), self._inside, self._outside, ways=self._ways_out)
-            self._open(self._wanted(self.crossings), self._outside, self._inside, ways=self._ways_in)
+            self._open(self._requested(self.crossings), self._outside, self._inside, ways=self._ways_in)
             self.forwarding.offer(self._offers(self.forwarding.names))
         except SolferError as error:
             self._throttle.warning("look", "something is not forwarded: %s", error)
