@@ -15,12 +15,18 @@ CHROMIUM = shutil.which("chromium")
 FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
+def button(text):
+    """Return the script of the button or tab with a text."""
+    return f"[...document.querySelectorAll('button, [role=tab]')].find(e => e.innerText.trim() === {json.dumps(text)})"
+
+
 class Browser:
     """One page."""
 
     def __init__(self, address):
         self._connection = connect(address, max_size=None, origin=None)
         self._numbers = itertools.count(1)
+        self._place = (0.0, 0.0)
 
     def ask(self, method, **parameters):
         """Send a command, and return its result."""
@@ -44,11 +50,36 @@ class Browser:
 
     def click(self, text):
         """Click on the button with a text."""
-        script = (
-            f"[...document.querySelectorAll('button, [role=tab]')].find(e => e.innerText.trim() === {json.dumps(text)})"
-        )
+        script = button(text)
         self.wait(f"!!{script}")
         self.evaluate(f"{script}.click()")
+
+    def mouse(self, kind, place, pressed=True):
+        """Let the mouse do something at a pixel: `mouseMoved`, `mousePressed` or `mouseReleased`."""
+        self._place = x, y = place
+        button = "left" if pressed else "none"
+        self.ask(
+            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(pressed), clickCount=int(pressed)
+        )
+
+    @contextmanager
+    def pressed(self, place):
+        """Keep the mouse's button pressed, from a pixel on to where it has moved."""
+        self.mouse("mousePressed", place)
+        try:
+            yield
+        finally:
+            self.mouse("mouseReleased", self._place)
+
+    def key(self, key):
+        """Press a key that is named as in the browser, and release it."""
+        for kind in ("keyDown", "keyUp"):
+            self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+
+    def place(self, script):
+        """Return the pixel in the middle of an element, scrolled into sight; `script` is an expression of it."""
+        self.evaluate(f"{script}.scrollIntoView({{block: 'center'}})")
+        return self.evaluate(f"(r => [r.x + r.width / 2, r.y + r.height / 2])({script}.getBoundingClientRect())")
 
     def picture(self, path):
         """Write what is seen as PNG."""

@@ -1,5 +1,6 @@
 """The page: what is seen of a robot, and what belongs to it."""
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -22,8 +23,12 @@ from solfer.view.time_line import TimeLine
 if TYPE_CHECKING:
     from solfer.view.foxglove_server import FoxgloveServer
 
-CAMERA, LOOK = (2.1, -1.8, 1.4), (0.0, 0.0, 0.6)
+CAMERA = (2.1, -1.8, 1.4)
+LOOK = (0.0, 0.0, 0.6)
 """Where a page looks from at first, and where to [m]."""
+
+FIELD_OF_VIEW = math.radians(40.0)
+"""Vertical field of view of a page [rad]."""
 
 
 class Page:
@@ -59,6 +64,7 @@ class Page:
         gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.initial_camera.position = CAMERA
         self._viser.initial_camera.look_at = LOOK
+        self._viser.initial_camera.fov = FIELD_OF_VIEW
         self._freshness = Freshness(server)
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)

@@ -30,35 +30,6 @@ def test_a_study_drives_on_the_page(repository):
         page.until(lambda: re.search(r"page \d+ commands", page.content), "control")
 
 
-@pytest.mark.soak
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
-def test_chromium_draws_the_page(tmp_path):
-    with view("--run", "config/studies/robustness.yaml") as address:
-        with browser(tmp_path / "profile", address) as seen:
-            seen.wait("(document.getElementById('solfer-beat')?.dataset.count ?? 0) > 20")
-            seen.picture(tmp_path / "view.png")
-            assert share(tmp_path / "view.png", GREEN) > 1e-4, "no support polygon"
-            seen.click("EMERGENCY STOP")
-            seen.click("stop the robot now")
-            seen.wait("!document.body.innerText.includes('stop the robot now')")
-
-
-@pytest.mark.soak
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
-def test_chromium_keeps_control_however_slowly_it_draws(tmp_path):
-    """Without a graphics card it draws about one picture a second."""
-    commands = r"/page \d+ commands/.test(document.body.innerText)"
-    with view("--run", "config/studies/robustness.yaml", "--control") as address:
-        with browser(tmp_path / "profile", address) as seen:
-            seen.wait("(document.getElementById('solfer-beat')?.dataset.count ?? 0) > 20")
-            seen.click("take control")
-            seen.wait(commands)
-            end = time.monotonic() + 10.0
-            while time.monotonic() < end:
-                assert seen.evaluate(commands)
-                time.sleep(0.2)
-
-
 GREEN = (60, 190, 70)
 
 

@@ -1,0 +1,173 @@
+"""A person at the page: Debian's Chromium, by its mouse, on CENTAURO in lock-step with it."""
+
+import json
+import os
+import re
+import time
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
+
+from support.browser import CHROMIUM, browser, button  # noqa: E402
+from support.page import view  # noqa: E402
+
+from solfer import Robot  # noqa: E402
+from solfer.robot.shipped import robot_of  # noqa: E402
+from solfer.scene import LiveScene  # noqa: E402
+from solfer.study import SimulatedRun, read_study  # noqa: E402
+from solfer.view import Page, PageServer  # noqa: E402
+from solfer.view.page import CAMERA, FIELD_OF_VIEW, LOOK  # noqa: E402
+
+pytestmark = [pytest.mark.soak, pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")]
+
+REPOSITORY = Path(__file__).parents[3]
+PICTURE = "SOLFER_PICTURE"
+"""Variable with the file of the picture for the docs; not set: none is written."""
+
+STUDY = f"""
+configuration: {{file: {REPOSITORY}/config/centauro.yaml}}
+plugins: ["odometry3::odometry", wheeled_motion, manipulation]
+motion: {{function: "builtins:print"}}
+settle: 2.0
+duration: 600.0
+"""
+PERIOD = 0.2
+BEATS = "(document.getElementById('solfer-beat')?.dataset.count ?? 0)"
+HAND = "arm1_7"
+GAIN = "stack.tasks.left.gain"
+
+
+class Shown:
+    """A simulated CENTAURO, its page, and a browser in lock-step: the next picture comes when one has been drawn."""
+
+    def __init__(self, folder):
+        (folder / "study.yaml").write_text(STUDY)
+        self.run = SimulatedRun(read_study(folder / "study.yaml").record)
+        self.run.attend()
+        _, files = robot_of("centauro")
+        robot = Robot.load(files.urdf, files.srdf, files.floating_base, name="centauro", contacts=files.contacts)
+        node = self.run.node("view")
+        self.scene = LiveScene(robot, node)
+        self.server = PageServer(0)
+        self.page = Page(self.server, robot.description, node, control=True)
+        self.browser = None
+
+    def step(self, duration=PERIOD, period=PERIOD):
+        """Let a time pass [s], with a picture each `period`."""
+        for _ in range(round(duration / period)):
+            self.run.step(period)
+            assert not self.run.failure, self.run.failure
+            before = self.beats
+            self.page.update(self.scene.update())
+            end = time.monotonic() + 10.0
+            while self.beats == before and time.monotonic() < end:
+                time.sleep(0.05)
+
+    @property
+    def beats(self):
+        """Number of the pictures that the browser has received."""
+        return int(self.browser.evaluate(BEATS)) if self.browser else 0
+
+    @property
+    def text(self):
+        """Text of the page."""
+        return self.browser.evaluate("document.body.innerText")
+
+    def until(self, condition, what, patience=90.0):
+        """Let time pass until a condition holds."""
+        end = time.monotonic() + patience
+        while not condition():
+            assert time.monotonic() < end, f"{what}\n{self.text}"
+            self.step()
+
+    def position(self, link):
+        """Return where PyBullet has a link [m]."""
+        return self.run.simulation.state.now.position(link).copy()
+
+    def ask(self, service, **fields):
+        """Call a service."""
+        reply = self.run.bus.call(service, **fields)
+        self.step()
+        return reply.result(0)
+
+    def gain(self):
+        """Return the gain of the left hand's task."""
+        reply = self.ask("manipulation/get_parameters")
+        return float(dict(zip(reply.names, reply.values, strict=True))[GAIN])
+
+    def pixel(self, point):
+        """Return the pixel of a point [m] for the camera with which a page begins."""
+        width, height = self.browser.evaluate("(r => [r.width, r.height])(document.querySelector('canvas').getBoundingClientRect())")
+        back = np.subtract(CAMERA, LOOK)
+        back /= np.linalg.norm(back)
+        right = np.cross((0.0, 0.0, 1.0), back)
+        right /= np.linalg.norm(right)
+        seen = np.array((right, np.cross(back, right), back)) @ np.subtract(point, CAMERA)
+        scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / -seen[2]
+        return 0.5 * width + scale * seen[0], 0.5 * height - scale * seen[1]
+
+    def close(self):
+        self.server.close()
+        self.run.close()
+
+
+def labelled(label):
+    """Return the script of the slider with a label."""
+    return (
+        f"[...document.querySelectorAll('label, div')].filter(e => e.innerText?.trim() === {json.dumps(label)})"
+        ".at(-1).parentElement.parentElement.querySelector('[role=slider]')"
+    )
+
+
+def test_a_person_watches_drags_tunes_and_stops(tmp_path):
+    """The base drives while its button is pressed, the hand follows its handle, the gain its slider; then all stop."""
+    with closing(Shown(tmp_path)) as shown, browser(tmp_path / "profile", shown.server.address) as seen:
+        shown.browser = seen
+        shown.until(lambda: shown.beats > 3, "a page that is drawn")
+        seen.click("take control")
+        shown.until(lambda: re.search(r"page \d+ commands", shown.text), "control")
+        shown.until(lambda: "wheeled_motion" in shown.text, "a base to drive")
+        shown.until(lambda: "manipulation" in shown.text, "plugins that report")
+
+        begin = shown.position("pelvis")
+        with seen.pressed(seen.place(button("ahead"))):
+            shown.step(2.0)
+        shown.step(2.0, 0.5)
+        rest = shown.position("pelvis")
+        assert rest[0] - begin[0] > 0.1 and abs(rest[1] - begin[1]) < 0.01, "the base does not drive ahead"
+        shown.step(0.5, 0.5)
+        assert np.linalg.norm(shown.position("pelvis") - rest) < 1e-3, "the base does not rest"
+
+        hand = shown.position(HAND)
+        (reference,) = [each for each in shown.scene.update().references if each.task == "left"]
+        arrow = reference.reference.position + (0.0, 0.0, 0.15)
+        grip = shown.pixel(arrow)
+        goal = shown.pixel(arrow + (0.0, 0.0, 0.1))
+        seen.mouse("mouseMoved", grip, pressed=False)
+        shown.step()
+        with seen.pressed(grip):
+            for share in (0.25, 0.5, 0.75, 1.0):
+                seen.mouse("mouseMoved", tuple(np.add(grip, share * np.subtract(goal, grip))))
+                shown.step()
+            shown.step(2.0, 0.5)
+            moved = shown.position(HAND) - hand
+            np.testing.assert_allclose(moved, (0.0, 0.0, 0.1), atol=0.01)
+            if PICTURE in os.environ:
+                seen.wait("!document.body.innerText.includes('s old')")
+                seen.picture(Path(os.environ[PICTURE]))
+        shown.step(1.0, 0.5)
+        np.testing.assert_allclose(shown.position(HAND) - hand, moved, atol=2e-3)
+
+        before = shown.gain()
+        print(before)
+        seen.click("manipulation")
+        shown.step()
+        seen.click("parameters")
+        shown.step()
+        seen.picture(Path("/tmp/shots/c.png"))
+        Path("/tmp/shots/c.html").write_text(seen.evaluate("document.body.outerHTML"))
+        print(shown.text)
