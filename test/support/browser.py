@@ -15,9 +15,9 @@ CHROMIUM = shutil.which("chromium")
 FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-def button(text):
-    """Return the script of the button or tab with a text."""
-    return f"[...document.querySelectorAll('button, [role=tab]')].find(e => e.innerText.trim() === {json.dumps(text)})"
+def element(text):
+    """Return the script of the innermost element with a text."""
+    return f"[...document.querySelectorAll('*')].filter(e => e.textContent.trim() === {json.dumps(text)}).at(-1)"
 
 
 class Browser:
@@ -49,18 +49,17 @@ class Browser:
             time.sleep(0.2)
 
     def click(self, text):
-        """Click on the button with a text."""
-        script = button(text)
-        self.wait(f"!!{script}")
-        self.evaluate(f"{script}.click()")
+        """Click on what has a text."""
+        self.wait(f"!!{element(text)}")
+        with self.pressed(self.place(element(text))):
+            pass
 
     def mouse(self, kind, place, pressed=True):
         """Let the mouse do something at a pixel: `mouseMoved`, `mousePressed` or `mouseReleased`."""
         self._place = x, y = place
         button = "left" if pressed else "none"
-        self.ask(
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(pressed), clickCount=int(pressed)
-        )
+        clicks = int(pressed)
+        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=clicks, clickCount=clicks)
 
     @contextmanager
     def pressed(self, place):

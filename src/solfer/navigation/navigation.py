@@ -77,7 +77,7 @@ class Navigation:
         self._progress = middleware.writer(f"{name}/progress", PROGRESS)
         self._reported = -EVERY
         self._number = -1
-        self._asked: Future[Topics] | None = None
+        self._requested: Future[Topics] | None = None
         self._begin = self._went = middleware.now()
         self._is_received = False
         self._lacked = 0.0
@@ -110,7 +110,7 @@ class Navigation:
         self._inbox.apply()
         self.waits = self._missing_subscriber()
         # a course that asks others has its answers when it begins; one that measures begins with what is new then
-        if not self.waits or (self._course.asks and self.waits == CONNECTIONS):
+        if not self.waits or (self._course.has_dialogue and self.waits == CONNECTIONS):
             self.waits = self._course.awaits() or self.waits
         if self.waits:
             if self._middleware.now() - self._begin > SOON:
@@ -149,13 +149,13 @@ class Navigation:
         if self._is_received:
             return ""
         now = self._middleware.now()
-        if self._asked is None:
-            self._asked = self._middleware.topics()
+        if self._requested is None:
+            self._requested = self._middleware.topics()
             return "the topics of others"  # which answer in the next cycle at the earliest, on every middleware
-        if not self._asked.done():
+        if not self._requested.done():
             return "the topics of others"
-        topics = self._asked.result()
-        self._asked = None
+        topics = self._requested.result()
+        self._requested = None
         for writer in self._course.writers:
             missing = topics.missing_subscriber(writer.topic, writer.carries)
             if missing is None:

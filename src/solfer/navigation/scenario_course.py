@@ -42,7 +42,7 @@ class ScenarioCourse(Course):
             published.
     """
 
-    asks = True
+    has_dialogue = True
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class ScenarioCourse(Course):
         self._lift = f"{name}lift"
         self._contacts = tuple(contacts)
         self._grounded = player.grounded.copy()
-        self._asked = 0
+        self._requested = 0
         self._answer: Future[LiftReply] | None = None
         self._is_held = False
         self._moves = True
@@ -90,7 +90,7 @@ class ScenarioCourse(Course):
         self._answer = None
         if not answer.success:
             raise ComponentError(f"{self._lift} refuses: {answer.message}", expected="a contact that can change")
-        self._grounded[self._asked] = not self._grounded[self._asked]
+        self._grounded[self._requested] = not self._grounded[self._requested]
         return self._change_contact()
 
     def step(self, period: float, pace: float) -> bool:
@@ -140,8 +140,8 @@ class ScenarioCourse(Course):
         changed = np.flatnonzero(self._grounded != self._player.grounded)
         if not len(changed):
             return ""
-        self._asked = int(changed[0])
-        request = LiftContacts((self._contacts[self._asked],), bool(self._grounded[self._asked]))
+        self._requested = int(changed[0])
+        request = LiftContacts((self._contacts[self._requested],), bool(self._grounded[self._requested]))
         self._answer = self._middleware.request(self._lift, LIFT, request, LiftReply, PATIENCE)
         return f"an answer of {self._lift}"
 

@@ -44,12 +44,12 @@ class Plugin:
 
     The component starts as soon as every required feedback has arrived and the claim on its joints is granted. When a
     feedback times out that it cannot do without, or the lower level refuses its commands, the plugin holds: wheels at
-    zero, positions as they were sent last. After `Component.reset` it starts anew from the measured state when it has
-    both again. It also starts anew
+    zero, positions as they were sent last. After `Component.reset` it starts again from the measured state when it has
+    both again. It also starts again
 
-    - when the simulation begins anew, without a command in between,
+    - when the simulation begins again, without a command in between,
     - when its own loop stood still (a debugger, swap, a suspended laptop): earlier requests may be outdated,
-    - when a plugin that follows it starts anew.
+    - when a plugin that follows it starts again.
 
     Args:
         component: The algorithm.
@@ -62,7 +62,7 @@ class Plugin:
         claim: Its claim on the joints that it commands; None: it commands none.
         peers: Supervises the other ends of its pipes; None: they are not supervised.
         guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
-        stall: Lateness of its own loop at which it begins anew [s]; see `StartConditions`.
+        stall: Lateness of its own loop at which it begins again [s]; see `StartConditions`.
         limits: When its loop is overloaded; None: the defaults.
         jumps: Finds jumps of the base; None: its component has no references in the world.
         publish: Publish what the component declares, after each of its cycles.
@@ -170,7 +170,7 @@ class Plugin:
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._feedback_timeouts.read(now, self.outputs.way)
+        self._feedback_timeouts.read(now, self.outputs.distance)
         verdict = self._judge(now, life is RUNNING)
         end = clock()
         times[READ] = end - begin
@@ -320,7 +320,7 @@ class Plugin:
         """Judge what to do in this cycle, whose messages were read `now` [s]; ask for the claim when all is there."""
         verdict = self._conditions.judge(now, running)
         claim = self._claim
-        if claim is not None and not running and claim.begins_anew():
+        if claim is not None and not running and claim.restarts():
             return self._conditions.judge_claim(claim, running)
         if verdict is not WORK or claim is None:
             return verdict
@@ -337,14 +337,14 @@ class Plugin:
         elif verdict is FORGET:
             self.outputs.forget()
             self._forget(now)
-        self._begin_anew()
+        self._restart()
 
     def _awake(self, now: float) -> None:
         """Hold `now` [s], after the loop stood still, and drop messages and requests from before, also in the inbox."""
         if self.life is RUNNING:
             self._hold()
         self._forget(now)
-        self._begin_anew()
+        self._restart()
 
     def _give_back(self) -> None:
         """Release or lapse the claim, or damp, after the joints were brought to rest."""
@@ -365,7 +365,7 @@ class Plugin:
             self._claim.lapse()
         self._conditions.forgotten(now)
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         """Wait for what the plugin lacks, and reset a component that ran."""
         was_running = self.life is RUNNING
         self._wait()

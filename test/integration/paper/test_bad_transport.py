@@ -63,7 +63,7 @@ class Course:
 
             def look(waving):
                 rows.append(self._pose(world))
-                hands.append(np.array(list(world.hands().values())) - list(waving.wanted.values()))
+                hands.append(np.array(list(world.hands().values())) - list(waving.desired.values()))
 
             world.play(read_scenario(file), look)
             world.run(1.0)

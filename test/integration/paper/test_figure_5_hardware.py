@@ -24,8 +24,8 @@ def test_it_drives_while_the_hands_wave(tmp_path):
 
         def look(waving):
             base = (world.center_of_legs() - begin) - (references.position - reference)
-            hands = [place - waving.wanted[name] for name, place in world.hands().items()]
-            rows.append((base[:2], hands, waving.wanted["left"].copy()))
+            hands = [place - waving.desired[name] for name, place in world.hands().items()]
+            rows.append((base[:2], hands, waving.desired["left"].copy()))
 
         world.play(read_scenario(file), look)
         base, hands, wanted = (np.array(each) for each in zip(*rows, strict=True))

@@ -112,8 +112,8 @@ def test_it_drives_while_the_hands_wave(world, tmp_path):
         base = world.center_of_legs() - references.position
         base[2] = now.position("pelvis")[2] - references.position[2]
         vertices = world.footprint() - references.vertices[:, :2]
-        hands = [place - waving.wanted[name] for name, place in world.hands().items()]
-        rows.append((base, vertices, hands, world.center_of_mass() - center, waving.wanted["left"].copy()))
+        hands = [place - waving.desired[name] for name, place in world.hands().items()]
+        rows.append((base, vertices, hands, world.center_of_mass() - center, waving.desired["left"].copy()))
 
     world.play(read_scenario(file), look)
     base, vertices, hands, away, wanted = (np.array(each) for each in zip(*rows, strict=True))

@@ -12,8 +12,7 @@ import pytest
 
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
-from support.browser import CHROMIUM, browser, button  # noqa: E402
-from support.page import view  # noqa: E402
+from support.browser import CHROMIUM, browser, element  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.robot.shipped import robot_of  # noqa: E402
@@ -101,7 +100,9 @@ class Shown:
 
     def pixel(self, point):
         """Return the pixel of a point [m] for the camera with which a page begins."""
-        width, height = self.browser.evaluate("(r => [r.width, r.height])(document.querySelector('canvas').getBoundingClientRect())")
+        width, height = self.browser.evaluate(
+            "(r => [r.width, r.height])(document.querySelector('canvas').getBoundingClientRect())"
+        )
         back = np.subtract(CAMERA, LOOK)
         back /= np.linalg.norm(back)
         right = np.cross((0.0, 0.0, 1.0), back)
@@ -134,7 +135,7 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
         shown.until(lambda: "manipulation" in shown.text, "plugins that report")
 
         begin = shown.position("pelvis")
-        with seen.pressed(seen.place(button("ahead"))):
+        with seen.pressed(seen.place(element("ahead"))):
             shown.step(2.0)
         shown.step(2.0, 0.5)
         rest = shown.position("pelvis")

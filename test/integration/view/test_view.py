@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
-from support.browser import CHROMIUM, browser  # noqa: E402
 from support.page import opened_page, view  # noqa: E402
 
 

@@ -284,7 +284,7 @@ def test_an_action_of_the_layer_is_used_outside():
     """Goals, cancels, feedback and results cross the bridge both ways, also when a goal is preempted by the next."""
     inwards = [Route("abacus/count/goal", f"{COUNT}ActionGoal"), Route("abacus/count/cancel", GOAL_ID)]
     outwards = [Route(f"abacus/count/{part}", f"{COUNT}Action{part.title()}") for part in ("feedback", "result")]
-    sides = Sides(topics=lambda known: outwards, wanted=lambda known: inwards)
+    sides = Sides(topics=lambda known: outwards, requested=lambda known: inwards)
     node, client = CountingNode(sides.rt), counting_client(sides.nrt)
     sides.turn()
     first = client.send(CountGoal(1000))

@@ -14,13 +14,13 @@ def test_hands_are_mirror_images_half_a_turn_apart():
     reader = MemoryMiddleware(bus, "hands").reader("hands/left/reference", "geometry_msgs/PointStamped")
     waving = Waving(MemoryMiddleware(bus, "demo"), "hands", HANDS)
     waving.send(0.0)
-    assert all((waving.wanted[name] == place).all() for name, place in HANDS.items())
+    assert all((waving.desired[name] == place).all() for name, place in HANDS.items())
     ways = []
     for time in RAISE + TURN * np.linspace(0.0, 1.0, 41):
         waving.send(time)
-        ways.append([waving.wanted[name] - place for name, place in HANDS.items()])
+        ways.append([waving.desired[name] - place for name, place in HANDS.items()])
     left, right = np.swapaxes(ways, 0, 1)
-    assert reader.read() and reader.message.values == pytest.approx(waving.wanted["left"])
+    assert reader.read() and reader.message.values == pytest.approx(waving.desired["left"])
     assert left[:, 1:] - left[:, 1:].mean(axis=0) == pytest.approx(
         (right[:, 1:] - right[:, 1:].mean(axis=0)) * (1.0, -1.0), abs=0.01
     )

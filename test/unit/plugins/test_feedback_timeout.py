@@ -360,7 +360,7 @@ def test_a_feedback_whose_changes_are_not_known_does_not_freeze():
 def test_refusals_are_in_the_health_and_in_what_a_plugin_waits_for():
     """For half a second while others of its messages fit, then with the hold, also in the recording."""
     stage = Stage(timeout=0.1, strikes=4, on_timeout="hold")
-    stage.plugin.requests.wanted = True
+    stage.plugin.requests.enabled = True
     stage.cycles(10, speaks=True)
     stage.speak(math.nan)
     stage.cycles(1)

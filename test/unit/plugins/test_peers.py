@@ -144,11 +144,11 @@ def test_what_nobody_receives_is_warned_about(looking, caplog):
 def test_what_is_written_into_a_shared_robot_is_heard(looking):
     written = Written(looking.node.now)
     writer = NotedWriter(looking.node.writer("wanted", KIND), written)
-    assert not writer.heard
+    assert not writer.is_received
     WrittenReader("wanted", written)
-    assert writer.heard
+    assert writer.is_received
     space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
     shared = NotedWriter(SpaceMember("cart", space, looking.node).writer("wanted", KIND), Written(looking.node.now))
-    assert not shared.heard
+    assert not shared.is_received
     SpaceMember("other", space, looking.other).reader("wanted", KIND)
-    assert shared.heard
+    assert shared.is_received

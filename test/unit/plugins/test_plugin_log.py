@@ -102,7 +102,7 @@ def test_component_that_cannot_declare_is_named(tmp_path, monkeypatch):
 def test_reset_of_component_is_noted(tmp_path):
     fleet = Fleet(tmp_path, tree(), ("first",))
     plugin = fleet.plugins[0]
-    plugin.requests.wanted = True
+    plugin.requests.enabled = True
     for _ in range(3):
         fleet.cycle(**still())
     assert plugin.running and plugin.requests.notes == []

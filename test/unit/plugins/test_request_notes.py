@@ -33,7 +33,7 @@ def test_requests_are_noted_only_if_wanted():
     noted = notes.noted(plain)
     assert noted.handler(Ask(1.0)) == 2.0 and notes.notes == []
     notes.note("start", "early")
-    notes.wanted = True
+    notes.enabled = True
     notes.note("start", "late")
     assert noted.handler(Ask(3.0, ("a", "b"))) == 6.0
     assert notes.notes[0] == ("start", "late") and notes.notes[1][0] == REQUEST
@@ -47,7 +47,7 @@ def test_requests_are_noted_only_if_wanted():
 
 def test_what_is_prepared_is_noted_as_asked():
     notes, (prepared, got) = RequestNotes(), service(prepare=lambda request: request.number + 1.0)
-    notes.wanted, noted = True, notes.noted(prepared)
+    notes.enabled, noted = True, notes.noted(prepared)
     assert noted.handler(noted.prepare(Ask(4.0))) == 5.0
     assert got == [5.0] and json.loads(notes.notes[0][1]) == ["scale", {"number": 4.0, "names": []}]
     assert notes.repeated(notes.notes[0][1])() == 5.0

@@ -70,7 +70,7 @@ class Target:
         self._velocity, self._own_velocity, self._fed = task.velocity, task.velocity.copy(), np.zeros(task.rows)
         self._moves = not isinstance(task.point, LookAt)
         self.residual = np.zeros(2)
-        self.stays = self.is_unreachable = self.is_held = self._was_told = False
+        self.stays = self.is_unreachable = self.is_held = self._was_received = False
         self.reason = ""
         self._last = math.inf
         self._cycles = 0
@@ -297,7 +297,7 @@ class Target:
     def hold(self) -> None:
         """Follow the place where the point is now, until `let_go`; the distance stays what it is. Called in each cycle.
 
-        What is known of the point is a cycle old: it would go back for that. So its place is taken over anew at first.
+        What is known of the point is a cycle old: it would go back for that. So its place is taken over again at first.
         """
         self.is_held = True
         if self._takeovers:
@@ -355,8 +355,8 @@ class Target:
         self._last = distance
         self.stays = self._looks >= CHECKS
 
-    def look_anew(self) -> None:
-        """Look anew whether the task comes nearer to its reference; one that is held is held where it is now."""
+    def refresh(self) -> None:
+        """Look again whether the task comes nearer to its reference; one that is held is held where it is now."""
         self._last = math.inf
         self._cycles = 0
         self._looks = 0
@@ -366,19 +366,19 @@ class Target:
     def judge(self) -> str:
         """Note whether it has come to rest away from its reference; return what to say about it, once."""
         self.is_unreachable = bool((self.residual > self._tolerances).any())
-        if not self.is_unreachable or self._was_told:
+        if not self.is_unreachable or self._was_received:
             return ""
-        self._was_told = True
+        self._was_received = True
         far = [f"{self.residual[0]:.4g} m"] if len(self._place) else []
         return " and ".join(far + ([f"{self.residual[1]:.4g} rad"] if len(self._turn) else []))
 
     def _forget(self) -> None:
         """Forget how far the task has come with another reference."""
         self._forget_progress()
-        self._was_told = False
+        self._was_received = False
 
     def _forget_progress(self) -> None:
-        self.look_anew()
+        self.refresh()
         self.is_unreachable = False
         self._creep = CREEP
 

@@ -156,10 +156,10 @@ class TrajectoryFollower:
         """Make the arrays for so many joints."""
         self._dofs = self._joints[places]
         self._desired, self._speed, self._actual, self._turning = (np.zeros(len(places)) for _ in range(4))
-        self._ways = np.zeros((1, len(places)))
+        self._displacements = np.zeros((1, len(places)))
         self._slip = np.zeros(len(places))
         self._turn = self._turns[places]
-        self._away = self._error = self._ways[0]
+        self._away = self._error = self._displacements[0]
         self._beyond = np.zeros(len(places), dtype=bool)
 
     def _limits(self, goal: FollowGoal, names: tuple[str, ...]) -> _Limits:
@@ -185,7 +185,7 @@ class TrajectoryFollower:
         self._measure()
         np.subtract(self._desired, self._actual, out=self._away)
         np.subtract(self._speed, self._turning, out=self._slip)
-        self._shorten(self._ways, self._turn)
+        self._shorten(self._displacements, self._turn)
         for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
             np.abs(error, out=error)
             np.greater(error, tolerance, out=self._beyond)

@@ -232,7 +232,7 @@ class JointCommandPipe(CommandPipe):
         block: These values one below the other, shape (len(fields), n).
         dofs: The Robot's DoFs in the order of the message, shape (n,).
         standing: Stiffness and damping that the receiver's joints have without a command, by field, shape (n,) each;
-            those that the pipe carries, of a lower level that told them.
+            those that the pipe carries, of a lower level that published them.
     """
 
     def __init__(

@@ -38,7 +38,7 @@ class Outputs:
         controllers: The pipes with their gates.
         commanding: Those that command the lower level.
         blend: See above.
-        way: How far joints have been commanded to move so far, of each cycle that one which moves farthest [rad, m].
+        distance: Sum over all cycles of the largest commanded step of a joint [rad, m].
         following: See above.
         start_position: Where joints are at a start, shape (robot.size,) [rad, m]; live.
     """
@@ -74,7 +74,7 @@ class Outputs:
             (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if self._moves(pipe) else None))
             for pipe in joints
         ]
-        self.way = 0.0
+        self.distance = 0.0
         # joints that go to other plugins have no gate, but nobody shall follow what is not a number
         self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
         self._positions = [
@@ -140,9 +140,9 @@ class Outputs:
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        way = max([self._keep(*block) for block in self._blocks], default=0.0)
+        distance = max([self._keep(*block) for block in self._blocks], default=0.0)
         if self._sent:
-            self.way += way
+            self.distance += distance
         self._sent = self._are_followed = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
