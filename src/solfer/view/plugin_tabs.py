@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from viser import GuiApi, GuiCheckboxHandle, GuiEvent, GuiHtmlHandle, GuiSliderHandle, GuiTabGroupHandle, GuiTextHandle
+from viser import GuiApi, GuiCheckboxHandle, GuiEvent, GuiHtmlHandle, GuiSliderHandle, GuiTabHandle, GuiTextHandle
 
 from solfer.components.declaration import Accepted
 from solfer.transport.health import Health
@@ -51,36 +51,52 @@ class PluginTabs:
         """Show what is reported."""
         for name, report in reports.items():
             if name not in self._tabs:
+                tab = self._group.add_tab(name.rpartition("/")[2])
                 self._tabs[name] = _PluginTab(
-                    self._gui, self._group, name, requests=self._requests, control=self._control
+                    self._gui, tab, name, requests=self._requests, parameters=self._parameters, control=self._control
                 )
-            self._tabs[name].show(report, self._parameters.known.get(name))
+            self._tabs[name].show(report)
 
 
 class _PluginTab:
     """One plugin."""
 
     def __init__(
-        self, gui: GuiApi, group: GuiTabGroupHandle, name: str, requests: PageRequests, control: PageControl | None
+        self,
+        gui: GuiApi,
+        tab: GuiTabHandle,
+        name: str,
+        requests: PageRequests,
+        parameters: KnownParameters,
+        control: PageControl | None,
     ):
         self._gui = gui
+        self._tab = tab
         self._name = name
         self._requests = requests
+        self._parameters = parameters
         self._control = control
         self._report: HealthReport | None = None
-        self._tab = group.add_tab(name.rpartition("/")[2])
-        with self._tab:
+        self._reply: ParametersReply | None = None
+        self._controls: dict[str, Control] = {}
+        with tab:
             self._text: GuiHtmlHandle = gui.add_html("")
-        self._has_controls = False
 
-    def show(self, report: HealthReport, parameters: ParametersReply | None) -> None:
-        """Show a report, if it is new, and the parameters once they are known."""
+    def show(self, report: HealthReport) -> None:
+        """Show a report, if it is new, and the parameters as they are known."""
         if report is not self._report:
             self._report = report
             self._text.content = _table(report)
-        if parameters is not None and not self._has_controls:
-            self._has_controls = True
-            self._add_controls(parameters)
+        reply = self._parameters.known.get(self._name)
+        if reply is None or reply is self._reply:
+            return
+        if self._reply is None:
+            self._add_controls(reply)
+        for name, value in zip(reply.names, reply.values, strict=True):
+            control = self._controls[name]
+            known = value if isinstance(control, GuiTextHandle) else json.loads(value)
+            control.value = known  # type: ignore[misc]  # viser's own
+        self._reply = reply
 
     def _add_controls(self, reply: ParametersReply) -> None:
         """Add what only plugins have: they know their parameters."""
@@ -91,7 +107,7 @@ class _PluginTab:
                     reply.names, reply.types, reply.values, reply.defaults, reply.units, reply.minimums, reply.maximums,
                     reply.descriptions, strict=True,
                 ):  # fmt: skip
-                    self._add_parameter(*row)
+                    self._controls[row[0]] = self._make_control(*row)
 
         @buttons.on_click
         async def _(event: GuiEvent[Any]) -> None:
@@ -105,9 +121,9 @@ class _PluginTab:
         else:
             self._requests.call(f"{self._name}/switch", SWITCH_ONE, Flag(verb == "start"), Answer)
 
-    def _add_parameter(
+    def _make_control(
         self, name: str, kind: str, value: str, default: str, unit: str, low: str, high: str, description: str
-    ) -> None:
+    ) -> Control:
         label = f"{name} [{unit}]" if unit else name
         control: Control
         numbers = [_number(each) for each in (value, default, low, high)]
@@ -130,10 +146,13 @@ class _PluginTab:
                 text = control.value if isinstance(control.value, str) else json.dumps(control.value)
                 self._requests.submit(partial(self._set, event.client_id, name, text))
 
+        return control
+
     def _set(self, client: int | None, name: str, text: str) -> None:
         if self._control is not None and self._control.may_command(client):
             request = SetParameters((name,), (text,))
             self._requests.call(f"{self._name}/{SET_PARAMETERS}", SETTING, request, Accepted)
+            self._parameters.forget(self._name)
 
 
 def _number(text: str) -> float:

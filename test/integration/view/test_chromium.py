@@ -1,6 +1,5 @@
 """A person at the page: Debian's Chromium, by its mouse, on CENTAURO in lock-step with it."""
 
-import json
 import os
 import re
 import time
@@ -20,6 +19,7 @@ from solfer.scene import LiveScene  # noqa: E402
 from solfer.study import SimulatedRun, read_study  # noqa: E402
 from solfer.view import Page, PageServer  # noqa: E402
 from solfer.view.page import CAMERA, FIELD_OF_VIEW, LOOK  # noqa: E402
+from solfer.view.plugin_tabs import STEPS  # noqa: E402
 
 pytestmark = [pytest.mark.soak, pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")]
 
@@ -36,6 +36,13 @@ duration: 600.0
 """
 PERIOD = 0.2
 BEATS = "(document.getElementById('solfer-beat')?.dataset.count ?? 0)"
+TIDY = """
+document.querySelectorAll('.mantine-Notification-closeButton').forEach(each => each.click());
+document.getElementById('solfer-banner').style.visibility = 'hidden';
+[...document.querySelectorAll('*')].forEach(each => { each.scrollTop = 0; });
+"""
+"""Without a graphics card a screenshot takes seconds: the banner about it, and the browser's own, are not its subject."""
+
 HAND = "arm1_7"
 GAIN = "stack.tasks.left.gain"
 
@@ -59,7 +66,6 @@ class Shown:
         """Let a time pass [s], with a picture each `period`."""
         for _ in range(round(duration / period)):
             self.run.step(period)
-            assert not self.run.failure, self.run.failure
             before = self.beats
             self.page.update(self.scene.update())
             end = time.monotonic() + 10.0
@@ -116,11 +122,11 @@ class Shown:
         self.run.close()
 
 
-def labelled(label):
+def slider(label):
     """Return the script of the slider with a label."""
     return (
-        f"[...document.querySelectorAll('label, div')].filter(e => e.innerText?.trim() === {json.dumps(label)})"
-        ".at(-1).parentElement.parentElement.querySelector('[role=slider]')"
+        f"(e => {{ while (!e.querySelector('[role=slider]')) e = e.parentElement;"
+        f" return e.querySelector('[role=slider]'); }})({element(label)})"
     )
 
 
@@ -135,11 +141,11 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
         shown.until(lambda: "manipulation" in shown.text, "plugins that report")
 
         begin = shown.position("pelvis")
-        with seen.pressed(seen.place(element("ahead"))):
+        with seen.pressed(seen.place(element("back"))):
             shown.step(2.0)
         shown.step(2.0, 0.5)
         rest = shown.position("pelvis")
-        assert rest[0] - begin[0] > 0.1 and abs(rest[1] - begin[1]) < 0.01, "the base does not drive ahead"
+        assert rest[0] - begin[0] < -0.1 and abs(rest[1] - begin[1]) < 0.01, "the base does not drive back"
         shown.step(0.5, 0.5)
         assert np.linalg.norm(shown.position("pelvis") - rest) < 1e-3, "the base does not rest"
 
@@ -158,17 +164,31 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
             moved = shown.position(HAND) - hand
             np.testing.assert_allclose(moved, (0.0, 0.0, 0.1), atol=0.01)
             if PICTURE in os.environ:
-                seen.wait("!document.body.innerText.includes('s old')")
+                seen.evaluate(TIDY)
+                shown.step(3.0 * PERIOD)
                 seen.picture(Path(os.environ[PICTURE]))
         shown.step(1.0, 0.5)
         np.testing.assert_allclose(shown.position(HAND) - hand, moved, atol=2e-3)
 
         before = shown.gain()
-        print(before)
         seen.click("manipulation")
         shown.step()
         seen.click("parameters")
         shown.step()
-        seen.picture(Path("/tmp/shots/c.png"))
-        Path("/tmp/shots/c.html").write_text(seen.evaluate("document.body.outerHTML"))
-        print(shown.text)
+        seen.place(slider(f"{GAIN} [1/s]"))
+        seen.evaluate(f"{slider(f'{GAIN} [1/s]')}.focus()")
+        for _ in range(20):
+            seen.key("ArrowRight")
+        shown.step()
+        shown.until(lambda: shown.gain() > before, "a gain that is changed")
+        shown.step(1.0, 0.5)
+        assert shown.gain() == pytest.approx(before + 20 * 40.0 / STEPS, abs=0.2)
+
+        seen.click("EMERGENCY STOP")
+        seen.click("stop the robot now")
+        emergency = shown.run.simulation.lower_level.emergency
+        shown.until(lambda: emergency.reason, "a robot that is stopped")
+        shown.run.step(1.0)
+        stopped = shown.run.simulation.q.copy()
+        shown.run.step(1.0)
+        assert np.abs(shown.run.simulation.q - stopped).max() < 2e-3

@@ -1,4 +1,4 @@
-"""`solfer view` as a process: the commands of docs/view.md, with a page without a browser, and in Debian's Chromium."""
+"""`solfer view` as a process: the commands of docs/view.md, with a page without a browser."""
 
 import re
 import time
@@ -10,9 +10,13 @@ pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt"
 
 from support.page import opened_page, view  # noqa: E402
 
+TIME = 120.0
+"""Longest time from the command of the page of the docs to a changed gain [s]."""
+
 
 @pytest.mark.slow
-def test_a_study_drives_on_the_page(repository):
+def test_a_study_drives_and_is_tuned_on_the_page(repository):
+    begin = time.monotonic()
     (line,) = re.findall(
         r"^solfer view (--run \S+ --control)$", (repository / "docs/view.md").read_text(), re.MULTILINE
     )
@@ -27,6 +31,14 @@ def test_a_study_drives_on_the_page(repository):
         assert "wheeled_motion" in page.tabs and "running" in page.content
         page.click("take control")
         page.until(lambda: re.search(r"page \d+ commands", page.content), "control")
+        with opened_page(address) as other:
+            label = "stack.tasks.BASE.gain [1/s]"
+            page.until(lambda: label in page.labels, "parameters")
+            other.until(lambda: label in other.labels, "parameters")
+            gain = 0.5 * other.gui[other.find(label)]["value"]
+            page.change(label, gain)
+            other.until(lambda: page.receive() or other.gui[other.find(label)]["value"] == gain, "a changed gain")
+        assert time.monotonic() - begin < TIME
 
 
 GREEN = (60, 190, 70)

@@ -103,6 +103,16 @@ def test_parameters_change_from_the_page_that_commands(bench):
     assert bench.asked == [SetParameters(("gain",), ("4.0",))]
 
 
+def test_a_slider_shows_what_counts(bench):
+    """The plugin takes over another number than the one that was requested: all pages show that."""
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    command(bench)
+    bench.takes = "3.5"
+    bench.clients[0].change("gain [1/s]", 4.0)
+    for client in bench.clients:
+        bench.until(lambda: client.gui[client.find("gain [1/s]")].get("value") == 3.5)  # noqa: B023
+
+
 def test_the_pad_drives_while_it_is_pressed(bench):
     bench.run(30)  # until it is known who drives
     bench.clients[0].hold("ahead")
