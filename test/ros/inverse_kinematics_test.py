@@ -14,7 +14,7 @@ from tools import shown
 
 from solfer.srv import GetReference
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/inverse_kinematics.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs/reference/inverse_kinematics.md"
 NAVIGATION = PAGE.with_name("navigation.md")
 
 

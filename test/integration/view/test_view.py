@@ -1,4 +1,4 @@
-"""`solfer view` as a process: the commands of docs/view.md, with a page without a browser, and in Debian's Chromium."""
+"""`solfer view` as a process: the commands of docs/how-to/view.md, with a page without a browser, and in Debian's Chromium."""
 
 import re
 import time
@@ -15,7 +15,7 @@ from support.page import opened_page, view  # noqa: E402
 @pytest.mark.slow
 def test_a_study_drives_on_the_page(repository):
     (line,) = re.findall(
-        r"^solfer view (--run \S+ --control)$", (repository / "docs/view.md").read_text(), re.MULTILINE
+        r"^solfer view (--run \S+ --control)$", (repository / "docs/how-to/view.md").read_text(), re.MULTILINE
     )
     with view(*line.split()) as address, opened_page(address) as page:
         end = time.monotonic() + 60.0
@@ -70,5 +70,5 @@ def share(picture, color):
 
 
 def test_the_page_of_the_docs_has_the_picture(repository):
-    assert "](view.png)" in (repository / "docs/view.md").read_text()
-    assert share(repository / "docs/view.png", GREEN) > 1e-4
+    assert "](../pictures/view.png)" in (repository / "docs/how-to/view.md").read_text()
+    assert share(repository / "docs/pictures/view.png", GREEN) > 1e-4

@@ -121,7 +121,7 @@ test_file_of.__test__ = False
 @pytest.fixture(scope="module")
 def pages(repository):
     """Read the commands of each page."""
-    files = [repository / "README.md", repository / "CONTRIBUTING.md", *sorted((repository / "docs").glob("*.md"))]
+    files = [repository / "README.md", repository / "CONTRIBUTING.md", *sorted((repository / "docs").rglob("*.md"))]
     return {str(file.relative_to(repository)): commands(file.read_text()) for file in files}
 
 

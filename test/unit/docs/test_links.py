@@ -11,7 +11,7 @@ def anchors(text):
 
 
 def test_every_link_leads_somewhere(repository):
-    pages = [*repository.glob("*.md"), *(repository / "docs").glob("*.md")]
+    pages = [*repository.glob("*.md"), *(repository / "docs").rglob("*.md")]
     broken = []
     for page in pages:
         for path, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text()):
