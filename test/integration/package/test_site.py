@@ -11,8 +11,8 @@ FORMER = """
     api architecture bring_your_robot catkin_workspace commands compensation configuration dependencies dynamics faults
     figures first_component gallery ground_forces hardware inverse_dynamics inverse_kinematics live_parameters logs
     lower_level navigation odometry pipes points real_time recording robots_tried ros_tools rviz security shared_control
-    shared_plugin shared_robot studies support_shaping tasks trajectories transport_faults troubleshooting upgrading view
-    wheeled_motion
+    shared_plugin shared_robot studies support_shaping tasks trajectories transport_faults troubleshooting upgrading
+    view wheeled_motion
 """
 """Pages that lay in `docs/` itself until version 0.1."""
 

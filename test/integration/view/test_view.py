@@ -1,4 +1,4 @@
-"""`solfer view` as a process: the commands of docs/how-to/view.md, with a page without a browser, and in Debian's Chromium."""
+"""`solfer view` as a process: the commands of docs/how-to/view.md, without a browser, and in Debian's Chromium."""
 
 import re
 import time
