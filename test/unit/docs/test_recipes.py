@@ -1,4 +1,4 @@
-"""The recipes of CONTRIBUTING.md fit the code."""
+"""The recipes of docs/how-to/extend fit the code."""
 
 import re
 from contextlib import closing
@@ -14,7 +14,9 @@ from solfer.simulation import Simulation, read_bundle
 
 @pytest.fixture(scope="module")
 def page(repository):
-    return (repository / "CONTRIBUTING.md").read_text()
+    """Read the recipes, and what leads to them."""
+    recipes = sorted((repository / "docs/how-to/extend").glob("*.md"))
+    return "".join(path.read_text() for path in (repository / "CONTRIBUTING.md", *recipes))
 
 
 def rows(page):
@@ -44,14 +46,14 @@ def test_code_compiles(page):
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert len(blocks) >= 10
     for block in blocks:
-        compile(block, "CONTRIBUTING.md", "exec")
+        compile(block, "a recipe", "exec")
 
 
 def classes(page, name):
     """Return the block that defines a class."""
     (block,) = (block for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if f"\nclass {name}(" in block)
-    held = {"__name__": f"contributing_{name.lower()}"}
-    exec(compile(block, "CONTRIBUTING.md", "exec"), held)
+    held = {"__name__": f"recipe_{name.lower()}"}
+    exec(compile(block, "a recipe", "exec"), held)
     return held
 
 
