@@ -35,13 +35,13 @@ def test_scripts_and_options_of_the_commands_exist(sections, repository):
     form = (repository / "benchmark/form.py").read_text()
     wrong = []
     for command in commands:
-        script = re.match(r"\./run (?:exec python |test |(?=demo))([\w/.]+)", command)
+        script = re.match(r"\./run (?:exec python |test (?:-.* )?|(?=demo))([\w/]+(?:\.py)?)", command)
         file = repository / (script[1].replace("demo", "nodes/demo") if script else "none")
         if not file.is_file():
             wrong.append(command)
             continue
         text = form + file.read_text()
-        wrong += [f"{command}: {option}" for option in re.findall(r"--[\w-]+", command) if option not in text]
+        wrong += [f"{command}: {option}" for option in re.findall(r" (--[\w-]+)", command) if option not in text]
     assert len(commands) >= 15 and wrong == []
 
 
