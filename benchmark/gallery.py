@@ -2,12 +2,12 @@
 
     python benchmark/gallery.py [--robots NAME...] [--folder FOLDER]
 
-They are those of docs/gallery.md. Most robots move by their plugin `inverse_kinematics`, in memory: one with a floating
-base moves it above its feet, any other the tip of its longest chain of joints. Some only stand, with `joint_states`.
-Those on wheels are of `examples/wheeled_quadruped.py`, and drive. A line has the number of DoFs, the link that moved,
-its way, and how far this is from the desired one, by what the simulation measures. The exit code is 1 if that is more
-than 5 mm, or a base has tilted. The robots come with `pip install -r requirements-examples.txt` and PyBullet. The
-progress goes to stderr.
+They are those of docs/tutorials/gallery.md. Most robots move by their plugin `inverse_kinematics`, in memory: one with
+a floating base moves it above its feet, any other the tip of its longest chain of joints. Some only stand, with
+`joint_states`. Those on wheels are of `examples/wheeled_quadruped.py`, and drive. A line has the number of DoFs, the
+link that moved, its way, and how far this is from the desired one, by what the simulation measures. The exit code is 1
+if that is more than 5 mm, or a base has tilted. The robots come with `pip install -r requirements-examples.txt` and
+PyBullet. The progress goes to stderr.
 """
 
 import argparse

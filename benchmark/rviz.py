@@ -2,8 +2,8 @@
 
     python benchmark/rviz.py [FILE]
 
-The picture is that of docs/rviz.md. The simulation waits for the plugins, so that a slow drawing changes nothing. It
-needs RViz and Xvfb (Debian: `rviz`, `xvfb`). What the nodes say is in `out/rviz.log`.
+The picture is that of docs/how-to/rviz.md. The simulation waits for the plugins, so a slow drawing changes nothing.
+It needs RViz and Xvfb (Debian: `rviz`, `xvfb`). What the nodes say is in `out/rviz.log`.
 """
 
 import argparse

@@ -18,8 +18,8 @@ from solfer.simulation.mock_hardware.records import HardwareRecord
 from solfer.simulation.world.records import WorldRecord
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-LIVE = REPOSITORY / "docs/live_parameters.md"
-PAGE, SCHEMA = REPOSITORY / "docs/configuration.md", REPOSITORY / "config/schema/solfer.schema.json"
+LIVE = REPOSITORY / "docs/how-to/live_parameters.md"
+PAGE, SCHEMA = REPOSITORY / "docs/reference/configuration.md", REPOSITORY / "config/schema/solfer.schema.json"
 FILES = (
     ("Robot's bundle (`config/robots/centauro/robot.yaml`)", BundleRecord),
     ("Actuators of a robot (`actuators.yaml`), below the robot's name", ActuatorsRecord),

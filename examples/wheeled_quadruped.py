@@ -3,7 +3,7 @@
 python examples/wheeled_quadruped.py {anymal_c,go2} FOLDER [--fixed]
 
 It comes with `pip install -r requirements-examples.txt`. Wheels of anymal_c get a joint above them that steers; those
-of go2, and of any with --fixed, roll straight ahead only. `docs/bring_your_robot.md` tells what both do.
+of go2, and of any with --fixed, roll straight ahead only. `docs/how-to/wheels.md` says what both do.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """The improved law of wheeled motion in plain NumPy, one wheel and one equation after the other.
 
-It is written from the equations of docs/wheeled_motion.md, and shares with the component no more than tags and
-constants: state, references and Jacobians are given in each cycle. Vectors in the plane are complex numbers. The guard
-and the pace are not part of it; the pace is an input.
+It is written from the equations of docs/reference/wheeled_motion.md, and shares with the component no more than tags
+and constants: state, references and Jacobians are given in each cycle. Vectors in the plane are complex numbers. The
+guard and the pace are not part of it; the pace is an input.
 """
 
 import cmath

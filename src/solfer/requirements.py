@@ -21,7 +21,7 @@ if missing := [package for module, package in PACKAGES.items() if find_spec(modu
     error = MissingDependency(
         f"{sys.executable} has no {', '.join(missing)}",
         expected=f"`python3 -m pip install {' '.join(missing)}`, in the versions of requirements.txt, or the "
-        "environment that has them first on PATH; see docs/catkin_workspace.md",
+        "environment that has them first on PATH; see docs/how-to/catkin_workspace.md",
     )
     print(f"error: {error}", file=sys.stderr)
     sys.exit(error.exit_code)

@@ -29,7 +29,7 @@ MOTION = 300
 BLEND = 1000
 """Steps until a plugin that starts commands what it computes."""
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/compensation.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs/reference/compensation.md"
 
 
 class Sent:

@@ -21,7 +21,7 @@ from tools import shown
 from solfer.recording.reader import read
 from solfer.srv import MoveJoints
 
-PAGE = NODES.parent / "docs" / "shared_control.md"
+PAGE = NODES.parent / "docs/how-to/shared_control.md"
 PLUGINS = ("upper_body", "lower_body", "shared_compensation")
 WHEELS = {
     "joints": ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4"),

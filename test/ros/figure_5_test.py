@@ -17,7 +17,7 @@ from system import NODES, START, Robot, program, soak, started, wait_for
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.transport.fixed_rate import FixedRateLoop
 
-PAGE = NODES.parent / "docs" / "figures.md"
+PAGE = NODES.parent / "docs/tutorials/figures.md"
 
 
 class Figure5Test(unittest.TestCase):

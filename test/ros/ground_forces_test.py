@@ -13,7 +13,7 @@ import yaml
 from geometry_msgs.msg import WrenchStamped
 from system import NODES, START, numbers, wait_for
 
-PAGE = NODES.parent / "docs" / "ground_forces.md"
+PAGE = NODES.parent / "docs/reference/ground_forces.md"
 LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
 AGREES = 15.0
 """How far the truth and an estimate of a moment later may be from each other [N]."""

@@ -14,7 +14,7 @@ from tools import shown
 
 from solfer.srv import GetReference
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/inverse_kinematics.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs/reference/inverse_kinematics.md"
 NAVIGATION = PAGE.with_name("navigation.md")
 
 
@@ -51,7 +51,7 @@ class InverseKinematicsTest(unittest.TestCase):
         ask = self.asked()
         begin = {task: ask(task).values for task in ("left", "right")}
         farthest = dict.fromkeys(begin, 0.0)
-        with started(*program("navigation"), "reference", str(PAGE.parents[1] / file), *options) as process:
+        with started(*program("navigation"), "reference", str(PAGE.parents[2] / file), *options) as process:
 
             def has_ended():
                 for task, first in begin.items():
@@ -70,7 +70,7 @@ class InverseKinematicsTest(unittest.TestCase):
         rospy.init_node("inverse_kinematics_test")
         ask = self.asked()
         begin = ask("left").values
-        file = str(PAGE.parents[1] / "config/references/hands.yaml")
+        file = str(PAGE.parents[2] / "config/references/hands.yaml")
         with started(*program("navigation"), "reference", file, "--target", "manipulation") as process:
             wait_for(lambda: math.dist(begin, ask("left").values) > 0.02, START, "a reference that moves")
             process.kill()

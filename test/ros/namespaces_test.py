@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from system import NODES, START, end, started, wait_for
 from tools import shown
 
-PAGE = NODES.parent / "docs" / "figures.md"
+PAGE = NODES.parent / "docs/tutorials/figures.md"
 YAW = "torso_yaw"
 
 

@@ -18,7 +18,7 @@ from tools import shown
 
 from solfer.srv import ListControllers
 
-PAGE = NODES.parent / "docs" / "ros_tools.md"
+PAGE = NODES.parent / "docs/how-to/ros_tools.md"
 GOALS = {"red": (0.2, 0.0), "blue": (0.0, 0.15)}
 """Where the page sends the robots, x and y [m]."""
 

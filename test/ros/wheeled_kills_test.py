@@ -14,7 +14,7 @@ import rospy
 import rostest
 from system import NODES, START, Robot, started, wait_for
 
-PAGE = NODES.parent / "docs" / "wheeled_motion.md"
+PAGE = NODES.parent / "docs/reference/wheeled_motion.md"
 REST, WHEEL_REST = 0.004, 0.05
 """Speeds of the base and of a wheel that stand [m/s], [rad/s]."""
 

@@ -14,7 +14,7 @@ from system import NODES, START, Robot, program, soak, started, wait_for
 from solfer.msg import WheelsSupport
 from solfer.srv import LiftContacts
 
-PAGE = NODES.parent / "docs" / "wheeled_motion.md"
+PAGE = NODES.parent / "docs/reference/wheeled_motion.md"
 SPEED, ACCELERATION, PATIENCE = 0.2, 0.3, 0.55  # [m/s], [m/s2], [s], as the page has them
 REST = 0.002
 """Speed below which the base stands [m/s]."""

@@ -1,4 +1,4 @@
-"""Studies: many simulated runs of one configuration, on one machine or on many ([studies.md](docs/studies.md)).
+"""Studies: many simulated runs of one configuration, on one machine or on many ([studies.md](docs/how-to/studies.md)).
 
 `read_study` reads the file of a study, `run` makes one simulated run, and `SimulatedRun` is a run for a loop of one's
 own.

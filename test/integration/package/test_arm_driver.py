@@ -1,4 +1,4 @@
-"""The driver of docs/hardware.md: a plugin moves an arm whose lower level it is, on a mock of its electronics."""
+"""The driver of docs/how-to/hardware.md: a plugin moves an arm whose lower level it is, on mocked electronics."""
 
 import importlib.util
 import re
@@ -20,7 +20,7 @@ URDF = Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf"
 
 @pytest.fixture
 def page(repository):
-    return (repository / "docs/hardware.md").read_text()
+    return (repository / "docs/how-to/hardware.md").read_text()
 
 
 @pytest.fixture

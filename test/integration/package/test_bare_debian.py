@@ -112,7 +112,7 @@ class BareDebian:
 @pytest.fixture(scope="module")
 def page(repository):
     """Return the blocks of commands of the page: build, run, request, drive, overlay."""
-    return BLOCK.findall((repository / "docs/catkin_workspace.md").read_text())
+    return BLOCK.findall((repository / "docs/how-to/catkin_workspace.md").read_text())
 
 
 @pytest.fixture(scope="module", params=["bookworm", "trixie"])

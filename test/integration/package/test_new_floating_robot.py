@@ -68,7 +68,7 @@ def test_a_floating_base_follows_its_task(floating, served, repository):
     bus.run_until(bus.time + 1.0)
     assert plugin.life is PluginState.RUNNING
     start = simulation.body.position.copy()
-    page = (repository / "docs/bring_your_robot.md").read_text()
+    page = (repository / "docs/tutorials/bring_your_robot.md").read_text()
     (asked,) = re.findall(r'^rosservice call /inverse_kinematics/reference "(.*)"$', page, re.MULTILINE)
     request = yaml.safe_load(asked)
     reply = bus.call("inverse_kinematics/reference", **request)

@@ -31,7 +31,7 @@ RADIUS, TURN = 0.04, 4.0
 @pytest.fixture
 def commands(repository):
     """Return the lines of commands of the page."""
-    return (repository / "docs/bring_your_robot.md").read_text().splitlines()
+    return (repository / "docs/tutorials/bring_your_robot.md").read_text().splitlines()
 
 
 @contextmanager

@@ -45,7 +45,7 @@ def test_one_argument_moves_them_to_other_places():
 
 @pytest.mark.daily(1)
 @pytest.mark.parametrize(
-    ("page", "merging"), [("compensation", "shared_compensation"), ("shared_control", "whole_body")]
+    ("page", "merging"), [("reference/compensation", "shared_compensation"), ("how-to/shared_control", "whole_body")]
 )
 def test_figure_4_starts_with_the_merging_of_the_page(repository, page, merging):
     text = (repository / "docs" / f"{page}.md").read_text()

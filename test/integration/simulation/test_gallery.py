@@ -34,10 +34,10 @@ def test_an_arm_reaches_and_wheels_drive(tmp_path):
 
 
 def test_the_page_has_every_robot_once():
-    page = (REPOSITORY / "docs/gallery.md").read_text()
-    pictures = re.findall(r"\]\(gallery/(\S+)\.jpg\)", page)
+    page = (REPOSITORY / "docs/tutorials/gallery.md").read_text()
+    pictures = re.findall(r"\]\(\.\./pictures/gallery/(\S+)\.jpg\)", page)
     assert pictures == [line.split()[0] for line in page.split("```")[3].splitlines() if line]
-    files = list((REPOSITORY / "docs/gallery").iterdir())
+    files = list((REPOSITORY / "docs/pictures/gallery").iterdir())
     assert sorted(pictures) == sorted(path.stem for path in files)
     assert sum(path.stat().st_size for path in files) < 1_500_000
     assert len(pictures) >= 12

@@ -1,4 +1,4 @@
-"""Robots of two collections with their own SRDFs: what the table in docs/bring_your_robot.md says of each.
+"""Robots of two collections with their own SRDFs: what the table in docs/measurements/robots.md says of each.
 
 HyQ and two more by default, drawn by a seed; `pytest --robots all` takes all, `--robots 7` two others.
 """
@@ -35,7 +35,7 @@ def load():
 
 def rows():
     """Read the lines of the table by the robots' names."""
-    lines = (ROOT / "docs/bring_your_robot.md").read_text(encoding="utf-8").splitlines()
+    lines = (ROOT / "docs/measurements/robots.md").read_text(encoding="utf-8").splitlines()
     begin = next(number for number, line in enumerate(lines) if line.startswith("robot  "))
     end = lines.index("```", begin)
     return {line[:20].strip(): line[20:] for line in lines[begin + 1 : end]}

@@ -29,5 +29,5 @@ def test_rviz_draws_the_scene(tmp_path):
 
 
 def test_the_page_has_the_picture():
-    assert "](rviz.png)" in (REPOSITORY / "docs/rviz.md").read_text()
-    assert share(REPOSITORY / "docs/rviz.png", GREEN) > 5e-4
+    assert "](../pictures/rviz.png)" in (REPOSITORY / "docs/how-to/rviz.md").read_text()
+    assert share(REPOSITORY / "docs/pictures/rviz.png", GREEN) > 5e-4

@@ -226,7 +226,7 @@ def test_the_first_document_of_a_run_is_its_settings(undisturbed, tmp_path):
 
 
 def test_the_commands_of_the_page_run_on_a_study_of_this_size(repository, tmp_path):
-    """Those of docs/studies.md, with a study of a few short runs in place of the shipped one."""
+    """Those of docs/how-to/studies.md, with a study of a few short runs in place of the shipped one."""
     vary = {
         "friction": {"path": "simulation/friction/wheels", "grid": [0.3, 0.8]},
         "payload": {"path": "simulation/payload/mass", "grid": [0.0, 5.0]},
@@ -234,7 +234,7 @@ def test_the_commands_of_the_page_run_on_a_study_of_this_size(repository, tmp_pa
     measure = {"off": {"columns": "simulation/base/tilt"}}
     payload = {"payload": {"link": "torso_2", "mass": 0.0}}
     file = written(tmp_path, vary=vary, measure=measure, simulation=payload)
-    page = (repository / "docs/studies.md").read_text()
+    page = (repository / "docs/how-to/studies.md").read_text()
     lines = re.findall(r"^solfer study (.*)$", page, re.MULTILINE)
     assert len(lines) == 4
     for line in lines:
@@ -250,10 +250,10 @@ def test_the_commands_of_the_page_run_on_a_study_of_this_size(repository, tmp_pa
 def test_the_python_of_the_page_runs(repository, monkeypatch, number):
     monkeypatch.chdir(repository)
     blocks = re.findall(
-        r"^```python\n(.*?)^```", (repository / "docs/studies.md").read_text(), re.MULTILINE | re.DOTALL
+        r"^```python\n(.*?)^```", (repository / "docs/how-to/studies.md").read_text(), re.MULTILINE | re.DOTALL
     )
     assert len(blocks) == 2
-    exec(compile(blocks[number], "docs/studies.md", "exec"), {})
+    exec(compile(blocks[number], "docs/how-to/studies.md", "exec"), {})
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""`solfer view` as a process: the commands of docs/view.md, with a page without a browser."""
+"""`solfer view` as a process: the commands of docs/how-to/view.md, with a page without a browser."""
 
 import re
 import time
@@ -18,7 +18,7 @@ TIME = 120.0
 def test_a_study_drives_and_is_tuned_on_the_page(repository):
     begin = time.monotonic()
     (line,) = re.findall(
-        r"^solfer view (--run \S+ --control)$", (repository / "docs/view.md").read_text(), re.MULTILINE
+        r"^solfer view (--run \S+ --control)$", (repository / "docs/how-to/view.md").read_text(), re.MULTILINE
     )
     with view(*line.split()) as address, opened_page(address) as page:
         end = time.monotonic() + 60.0
@@ -52,5 +52,5 @@ def share(picture, color):
 
 
 def test_the_page_of_the_docs_has_the_picture(repository):
-    assert "](view.png)" in (repository / "docs/view.md").read_text()
-    assert share(repository / "docs/view.png", GREEN) > 1e-4
+    assert "](../pictures/view.png)" in (repository / "docs/how-to/view.md").read_text()
+    assert share(repository / "docs/pictures/view.png", GREEN) > 1e-4

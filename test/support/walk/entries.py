@@ -1,4 +1,4 @@
-"""For each tag of docs/configuration.md what is run, and a change of the tag that has to change what runs."""
+"""For each tag of docs/reference/configuration.md what is run, and a change of the tag that has to change what runs."""
 
 from pathlib import Path
 
@@ -346,7 +346,7 @@ RUNS: dict[str, dict[str, Change]] = {
         ),
     },
 }
-"""Changes by the section and the tag of docs/configuration.md."""
+"""Changes by the section and the tag of docs/reference/configuration.md."""
 
 REFUSED = {
     ("Tags of the component `inverse_dynamics`", "stack.tasks.NAME.damping"): OF_AN_INVERSE,

@@ -24,7 +24,7 @@ def test_each_step_has_time_place_and_way(repository, capsys):
 
 
 def test_the_page_shows_what_is_printed(repository, capsys):
-    page = (repository / "docs/navigation.md").read_text()
+    page = (repository / "docs/reference/navigation.md").read_text()
     assert main(["scenario", str(repository / "config/scenarios/shape_side.yaml")]) == 0
     assert f"```text\n{capsys.readouterr().out}```" in page
 

@@ -13,7 +13,7 @@ from support.walk.files import FILES, changed
 
 from solfer.errors import SolferError, SolferErrors
 
-PAGE = (Path(__file__).parents[3] / "docs/configuration.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs/reference/configuration.md").read_text()
 
 
 def tags() -> Iterator[tuple[str, str, str]]:

@@ -1,17 +1,17 @@
-"""The glossary of docs/architecture.md names what there is."""
+"""The glossary, the table of the original's packages and the cycle of the architecture name what there is."""
 
 import importlib
 import re
 
 import pytest
 
-GLOSSARY = re.compile(r"^\| word \|.*?\n\n", re.MULTILINE | re.DOTALL)
-PACKAGES = re.compile(r"^\| original \|.*?\n\n", re.MULTILINE | re.DOTALL)
+GLOSSARY = re.compile(r"^\| word \|.*\n(?:\|.*\n)+", re.MULTILINE)
+PACKAGES = re.compile(r"^\| original \|.*\n(?:\|.*\n)+", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
-def page(repository):
-    return (repository / "docs/architecture.md").read_text()
+def glossary(repository):
+    return (repository / "docs/reference/glossary.md").read_text()
 
 
 def cells(page, table, column):
@@ -29,20 +29,21 @@ def is_there(name):
         return False
 
 
-def test_dotted_names_of_the_glossary_exist(page):
-    names = re.findall(r"`([a-z_]+(?:\.\w+)+)`", "".join(cells(page, GLOSSARY, 2)))
+def test_dotted_names_of_the_glossary_exist(glossary):
+    names = re.findall(r"`([a-z_]+(?:\.\w+)+)`", "".join(cells(glossary, GLOSSARY, 2)))
     assert len(names) > 30
     assert [name for name in names if not is_there(name)] == []
 
 
 @pytest.mark.slow
-def test_class_names_of_the_glossary_exist(page, repository):
-    names = set(re.findall(r"`([A-Z]\w+)(?:\.\w+)?`", "".join(cells(page, GLOSSARY, 2))))
+def test_class_names_of_the_glossary_exist(glossary, repository):
+    names = set(re.findall(r"`([A-Z]\w+)(?:\.\w+)?`", "".join(cells(glossary, GLOSSARY, 2))))
     sources = "".join(path.read_text() for path in (repository / "src/solfer").rglob("*.py"))
     assert {name for name in names if not re.search(rf"^class {name}\b", sources, re.MULTILINE)} == set()
 
 
-def test_homes_of_the_originals_packages_exist(page, repository):
+def test_homes_of_the_originals_packages_exist(repository):
+    page = (repository / "docs/explanation/original.md").read_text()
     named = re.findall(r"`([\w./]+)`", "".join(cells(page, PACKAGES, 1)))
     roots = (repository, repository / "src/solfer")
     homes = [name for name in named if not name[0].isupper()]
@@ -50,7 +51,8 @@ def test_homes_of_the_originals_packages_exist(page, repository):
     assert [name for name in homes if not any((root / name).exists() for root in roots)] == []
 
 
-def test_modules_of_the_cycle_exist(page, repository):
+def test_modules_of_the_cycle_exist(repository):
+    page = (repository / "docs/explanation/architecture.md").read_text()
     block = page.split("## One control cycle")[1].split("```")[1]
     modules = re.findall(r" {2}([a-z_]+(?:/[a-z_]+)*)$", block, re.MULTILINE)
     assert len(modules) > 10

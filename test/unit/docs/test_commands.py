@@ -19,7 +19,7 @@ ELSEWHERE = {
     r"\./run test( .*)?": ("test/unit/docs/test_commands.py", "test_paths_of_tests_exist"),
     r"\./run exec python examples/.*": ("test/integration/paper/test_examples.py", "examples"),
     r"\./run exec python benchmark/gallery.py .*": ("test/integration/simulation/test_gallery.py", "gallery.py"),
-    r"\./run exec rosrun plugins plugin -p nod .*": ("test/unit/docs/test_contributing.py", '"Nod"'),
+    r"\./run exec rosrun plugins plugin -p nod .*": ("test/unit/docs/test_recipes.py", '"Nod"'),
     r"\./run exec solfer check config/centauro.yaml": ("test/unit/cli/test_cli_check.py", "CENTAURO"),
     r"(python3 -m venv|\. ~/|mkdir -p ~/|git clone URL|sudo apt-get|pip install -r|catkin_make -C ~/).*": (
         "test/integration/package/test_bare_debian.py",
@@ -121,7 +121,7 @@ test_file_of.__test__ = False
 @pytest.fixture(scope="module")
 def pages(repository):
     """Read the commands of each page."""
-    files = [repository / "README.md", repository / "CONTRIBUTING.md", *sorted((repository / "docs").glob("*.md"))]
+    files = [repository / "README.md", repository / "CONTRIBUTING.md", *sorted((repository / "docs").rglob("*.md"))]
     return {str(file.relative_to(repository)): commands(file.read_text()) for file in files}
 
 
@@ -143,7 +143,7 @@ def test_commands_of_solfer_run_in_order(pages, scratch, capsys):
             if line.startswith("solfer ") and not SYNOPSIS.search(line) and test_file_of(line) is None:
                 assert main(shlex.split(line)[1:]) == 0, (page, line, capsys.readouterr().err)
                 ran.append(line)
-        for path in scratch.iterdir():  # the next page begins anew
+        for path in scratch.iterdir():  # the next page begins without them
             if path.name not in made:
                 path.rename(scratch / f".{page.replace('/', '_')}_{path.name}")
         forget("swing_joint")

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-ROWS = [line for line in (ROOT / "docs" / "faults.md").read_text().splitlines() if line.startswith("| ")][1:]
+ROWS = [line for line in (ROOT / "docs/explanation/faults.md").read_text().splitlines() if line.startswith("| ")][1:]
 
 
 def named(row):

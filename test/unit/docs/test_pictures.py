@@ -12,14 +12,14 @@ PICTURE = re.compile(r"^solfer graph (.* -o (\S+\.png))$", re.MULTILINE)
 
 def commands(repository):
     """Return the arguments of all commands in pages that draw a picture, and the name of the picture."""
-    found = [PICTURE.findall(page.read_text()) for page in sorted((repository / "docs").glob("*.md"))]
+    found = [PICTURE.findall(page.read_text()) for page in sorted((repository / "docs").rglob("*.md"))]
     return [each for page in found for each in page]
 
 
 def test_pictures_of_commands_are_there(repository):
     names = [name for _, name in commands(repository)]
     assert {"inverse_kinematics.png", "figure_3.png", "figure_4.png"} <= set(names)
-    assert all((repository / "docs" / name).read_bytes().startswith(b"\x89PNG") for name in names)
+    assert all((repository / "docs/pictures" / name).read_bytes().startswith(b"\x89PNG") for name in names)
 
 
 @pytest.mark.parametrize("picture", ["inverse_kinematics.png", "figure_3.png"])

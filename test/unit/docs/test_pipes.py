@@ -1,4 +1,4 @@
-"""The examples of docs/pipes.md are pipes."""
+"""The examples of docs/reference/pipes.md are pipes."""
 
 import re
 
@@ -14,7 +14,7 @@ RECORDS = {"feedback": FeedbackRecord, "controller": ControllerRecord}
 
 @pytest.fixture(scope="module")
 def blocks(repository):
-    text = (repository / "docs/pipes.md").read_text()
+    text = (repository / "docs/reference/pipes.md").read_text()
     return [yaml.safe_load(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
 
 
@@ -42,7 +42,7 @@ def test_every_whole_pipe_is_accepted(blocks):
 
 
 def test_the_table_of_rows_names_tests(repository):
-    page = (repository / "docs/pipes.md").read_text()
+    page = (repository / "docs/reference/pipes.md").read_text()
     rows = re.findall(r"^\| (\d) .*`(test_table_1_row_\d_\w+)` \|$", page, re.MULTILINE)
     tests = re.findall(r"def (test_table_1_row_\d_\w+)", (repository / "test/support/table_1.py").read_text())
     assert [test for _, test in rows] == tests and [int(row) for row, _ in rows] == list(range(1, 8))

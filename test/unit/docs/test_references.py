@@ -40,7 +40,7 @@ def played(file):
 
 
 def test_the_stack_of_the_page_is_made(repository, beside, example):
-    text = example("inverse_kinematics.md")
+    text = example("reference/inverse_kinematics.md")
     levels = "  levels: [[com], [left, right, posture]]\n"
     file = beside / "stack.yaml"
     file.write_text("hands:\n stack:\n" + re.sub("^", "  ", text.rstrip(), flags=re.MULTILINE) + "\n" + levels)
@@ -53,7 +53,7 @@ def test_the_stack_of_the_page_is_made(repository, beside, example):
 
 def test_the_references_of_the_page_are_made(beside, example):
     file = beside / "references.yaml"
-    file.write_text(example("navigation.md"))
+    file.write_text(example("reference/navigation.md"))
     assert played(file) == 9.0
 
 

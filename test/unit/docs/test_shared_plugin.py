@@ -1,4 +1,4 @@
-"""The examples of docs/shared_plugin.md run."""
+"""The examples of docs/explanation/shared_plugin.md run."""
 
 import copy
 import re
@@ -34,7 +34,7 @@ class Listening(Generator):
 
 @pytest.fixture(scope="module")
 def page(repository):
-    return (repository / "docs/shared_plugin.md").read_text()
+    return (repository / "docs/explanation/shared_plugin.md").read_text()
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ def arm():
 
 def blocks(repository):
     """Return the first two examples of the page: what is made once, and a cycle."""
-    page = (repository / "docs/tasks.md").read_text()
+    page = (repository / "docs/reference/tasks.md").read_text()
     return [compile(block, "tasks.md", "exec") for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL)[:2]]
 
 

@@ -1,7 +1,7 @@
 """List, read, change and save parameters of plugins while they run.
 
 With `--namespace` of an RT layer in its shared memory, else under ROS. NAME and VALUE are those of
-docs/live_parameters.md, such as `stack.tasks.left.gain=8`; VALUE is YAML, and an empty one stands for the default.
+docs/how-to/live_parameters.md, such as `stack.tasks.left.gain=8`; VALUE is YAML, and an empty one is the default.
 """
 
 import argparse

@@ -7,7 +7,7 @@ try:
 except ModuleNotFoundError as error:
     raise MissingDependency(
         f"this needs ROS 1, and there is no module '{error.name}'",
-        expected="ROS 1 and a built workspace, as ./run makes it; see docs/dependencies.md",
+        expected="ROS 1 and a built workspace, as ./run makes it; see docs/reference/dependencies.md",
     ) from error
 
 from solfer.middleware.ros.middleware import RosMiddleware

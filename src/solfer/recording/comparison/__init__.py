@@ -1,4 +1,4 @@
-"""Comparison of two recordings of the same motion: which joint differs first, and how (docs/logs.md)."""
+"""Comparison of two recordings of the same motion: which joint differs first, and how (docs/reference/logs.md)."""
 
 from solfer.recording.comparison.compare import Comparison, compare
 from solfer.recording.comparison.verdict import Difference, JointVerdict
