@@ -4,6 +4,7 @@ import abc
 import logging
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,6 +28,24 @@ UNFIT = (PipeError, UnknownName, NotFinite)
 NAMING_DELAY = 0.2
 """Time within which a plugin receives that its robot was put into another state, and within which joints agree with
 their velocities again after an impact: a contradiction that is still there then is one of a sensor [s]."""
+
+
+@dataclass(frozen=True)
+class Reception:
+    """How a pipe receives numbers of a State.
+
+    Attributes:
+        required: Whether the plugin has to wait for the pipe before it starts.
+        low_pass: Makes the filter of one field; None: there is none.
+        measured: Whether the State is measured; else the newest message of any publisher counts.
+        history: Most messages of one cycle that are handed over, of a reader that keeps as many; 0: the newest alone.
+            Measured States only.
+    """
+
+    required: bool = True
+    low_pass: MakeFilter | None = None
+    measured: bool = False
+    history: int = 0
 
 
 class FeedbackPipe(abc.ABC):
@@ -239,11 +258,7 @@ class StateFeedbackPipe(FeedbackPipe):
         state: State that is written.
         fields: Fields of the pipe, which name the interfaces that are written.
         dofs: DoFs that are written, shape (k,).
-        required: Whether the plugin has to wait for this pipe before it starts.
-        low_pass: Makes the filter of one field; None: there is none.
-        measured: Whether the State is measured; else the newest message of any publisher counts.
-        history: Most messages of one cycle that are handed over, of a `reader` that keeps as many; 0: the newest alone.
-            Measured States only.
+        reception: How it receives.
 
     Attributes:
         state_fields: The interfaces that are written.
@@ -259,16 +274,14 @@ class StateFeedbackPipe(FeedbackPipe):
         state: State,
         fields: Sequence[str],
         dofs: np.ndarray,
-        required: bool,
-        low_pass: MakeFilter | None = None,
-        measured: bool = False,
-        history: int = 0,
+        reception: Reception,
     ):
-        super().__init__(name, reader, required)
+        super().__init__(name, reader, reception.required)
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import scatter
         from solfer.numerics.pointers import address
 
+        low_pass = reception.low_pass
         self._state = state
         self._filtered = low_pass is not None
         self._scatter = scatter
@@ -283,12 +296,12 @@ class StateFeedbackPipe(FeedbackPipe):
         self._live = np.array([address(state[each.interface]) for each in self.state_fields], dtype=np.int64)
         self._touched = _subsets([each.interface for each in self.state_fields])
         self.part: np.ndarray | None = None
-        self._precedence = Precedence(len(dofs)) if measured else None
+        self._precedence = Precedence(len(dofs)) if reception.measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
         self.history: History | None = None
-        if history:
-            self.history = History([each.interface for each in self.state_fields], dofs, history)
+        if reception.history:
+            self.history = History([each.interface for each in self.state_fields], dofs, reception.history)
             state.histories.append(self.history)
         self._dropped = 0
 
