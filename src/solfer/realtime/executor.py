@@ -51,6 +51,23 @@ class ExecutorRules:
     grace: int = 100
 
 
+@dataclass(frozen=True)
+class ExecutorTelemetry:
+    """What measures and records the cycles of an executor.
+
+    Attributes:
+        statistics: Memory of its statistics; None: private memory.
+        nanoseconds: Clock for durations [ns]; a virtual one makes every run the same to the bit.
+        black_box: Records each cycle; None: nothing is recorded.
+        interruptions: Measures how long cycles are kept from running: no overruns; None: they never are.
+    """
+
+    statistics: RuntimeStatistics | None = None
+    nanoseconds: Callable[[], int] = monotonic_ns
+    black_box: BlackBox | None = None
+    interruptions: Interruptions | None = None
+
+
 class Executor:
     """The RT layer: plugins in the order of their list, at one rate.
 
@@ -58,17 +75,14 @@ class Executor:
         plugins: The plugins, all at the layer's rate.
         middleware: Clock, and services that switch plugins.
         estop: The emergency stop.
-        statistics: Memory of its statistics; None: private memory.
         rules: Its limits.
-        nanoseconds: Clock for durations [ns]; a virtual one makes every run the same to the bit.
+        telemetry: What measures and records its cycles; None: private statistics.
         polls: Called at the beginning of each cycle: receive calls and replies for the plugins.
-        black_box: Records each cycle; None: nothing is recorded.
-        beside: Called by `run` ten times a second, when a cycle is done.
         requires: See `PluginSet`.
-        interruptions: Measures how long cycles are kept from running: no overruns; None: they never are.
 
     Attributes:
         statistics: Its statistics.
+        beside: Called by `run` ten times a second, when a cycle is done.
         switchboard: Starts and stops the plugins.
 
     Raises:
@@ -80,46 +94,42 @@ class Executor:
         plugins: Sequence[Plugin],
         middleware: Middleware,
         estop: EmergencyStopLatch,
-        statistics: RuntimeStatistics | None = None,
         rules: ExecutorRules | None = None,
-        nanoseconds: Callable[[], int] = monotonic_ns,
+        telemetry: ExecutorTelemetry | None = None,
         polls: Sequence[Callable[[], None]] = (),
-        black_box: BlackBox | None = None,
-        beside: Callable[[], None] = lambda: None,
         requires: Mapping[str, Sequence[str]] = NOTHING,
-        interruptions: Interruptions | None = None,
     ):
+        telemetry = telemetry or ExecutorTelemetry()
         self._rules = rules = rules or ExecutorRules()
-        self._beside = beside
-        self._ns = nanoseconds
+        self.beside: Callable[[], None] = lambda: None
+        self._ns = telemetry.nanoseconds
         self._middleware = middleware
         self.estop = estop
-        self.statistics = statistics or RuntimeStatistics(
+        self.statistics = telemetry.statistics or RuntimeStatistics(
             plugins[0].rate if plugins else 0.0, [plugin.name for plugin in plugins], STAGES
         )
         # one array for all durations of a cycle, in the rows of the statistics
         self._durations = np.zeros(len(self.statistics.histograms.rows), dtype=np.int64)
         budget = BudgetRules(rules.budget, rules.overruns, rules.grace)
-        self._interruptions = interruptions
+        self._interruptions = telemetry.interruptions
         self._was_interrupted = False
         self._set = PluginSet(
             plugins,
             budget,
             rules.blend,
-            nanoseconds=nanoseconds,
             polls=polls,
             admit=self._admit,
-            interrupted=self._interrupted,
-            times=self._durations[len(LoopTime) :],
             requires=requires,
         )
+        self._set.measure(telemetry.nanoseconds, self._durations[len(LoopTime) :])
+        self._set.interrupted = self._interrupted
         self.plugins = self._set.plugins
         self.switchboard = self._set.switchboard
         self.rate = self._set.rate
         self._seldom = max(1, round(SELDOM * self.rate))
         self._period = round(1e9 / self.rate)
         self._late = LeakyCounter(rules.overruns)
-        self._black_box = black_box
+        self._black_box = telemetry.black_box
         self._set.changed = self._note
         self._set.initialize()
         self._serve()
@@ -217,7 +227,7 @@ class Executor:
             for index, managed in enumerate(self.plugins):
                 self.statistics.put_computed(index, managed.plugin.robot.computations())
                 managed.plugin.tuning.log()
-            self._beside()
+            self.beside()
 
     def _overhang(self) -> int:
         """Compute how much longer the newest cycle lasted than to the next deadline [ns]."""
