@@ -38,12 +38,12 @@ class LowerLevel:
         kinematics: Model of the robot, with its floating base if it has one.
         controllers: Controllers that together have every actuated joint exactly once.
         record: Settings of its defences.
-        robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
         passive: Joints without a drive.
         actuators: Springs between motors and joints, see `Drives`.
         posture: Position for which those are made, see `Drives`.
 
     Attributes:
+        robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
         controllers: Controllers by name.
         claims: Leases on the joints.
         emergency: The emergency stop; tripped by `emergency_stop` only.
@@ -63,7 +63,6 @@ class LowerLevel:
         kinematics: Kinematics,
         controllers: Sequence[LowerLevelController],
         record: LowerLevelRecord | None = None,
-        robot: str = "",
         passive: Collection[str] = (),
         actuators: Actuators | None = None,
         posture: np.ndarray | None = None,
@@ -72,7 +71,9 @@ class LowerLevel:
         self.controllers = {controller.name: controller for controller in controllers}
         self.drives = Drives(kinematics, controllers, passive, actuators=actuators, posture=posture)
         record = record or LowerLevelRecord()
-        self.robot, self._silence, self.folders = robot, record.silence, Folders()
+        self.robot = ""
+        self._silence = record.silence
+        self.folders = Folders()
         self.ration = record.ration
         self.claims = Claims({controller.name: controller.joints for controller in controllers}, record.lease)
         self.emergency = EmergencyStop(record.fade)
