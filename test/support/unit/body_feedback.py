@@ -32,7 +32,7 @@ def truth(link, offset=None, turn=None):
     return kinematics.position(link) + lever, rotation if turn is None else rotation * turn, linear, velocity[3:]
 
 
-def make(
+def make(  # noqa: PLR0913, PLR0917 a test names what it changes
     message,
     link,
     fields=("position", "velocity"),

@@ -103,7 +103,17 @@ class ReferenceFollower(Component, abc.ABC):
     def actions(self) -> tuple[Action, ...]:
         """Offer the action `reach`."""
         parts = (ReachGoal, ReachFeedback, ReachResult)
-        return (Action("reach", "solfer/Reach", *parts, self._begin, self._outcome, self._report, self._cancel),)
+        return (
+            Action(
+                "reach",
+                "solfer/Reach",
+                *parts,
+                begin=self._begin,
+                outcome=self._outcome,
+                report=self._report,
+                cancel=self._cancel,
+            ),
+        )
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer how references move, and when a task has arrived."""

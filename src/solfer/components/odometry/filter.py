@@ -348,7 +348,13 @@ class FilteredOdometry:
         self.position += about_vertical(way, self.heading + 0.5 * turn)
         self.heading = base.heading + self._offset if base.fresh else self.heading + turn
         missing = self._map.missing_height(
-            wheels.arms, wheels.normal, self.position, self.heading, self._trusted, kalman.velocity, turn / period
+            wheels.arms,
+            wheels.normal,
+            self.position,
+            heading=self.heading,
+            weights=self._trusted,
+            velocity=kalman.velocity,
+            turn=turn / period,
         )
         most = RAISING * period
         raised = 0.0 if math.isnan(missing) else min(max(missing * period / (SETTLE + period), -most), most)

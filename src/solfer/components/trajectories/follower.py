@@ -90,7 +90,7 @@ class TrajectoryFollower:
         start = self._position[places]
         velocity = self._velocity[places]
         measured = self._state.position[self._joints[places]]
-        motion, elapsed = self._check.motion(trajectory, places, start, velocity, measured, now)
+        motion, elapsed = self._check.motion(trajectory, places, start, velocity=velocity, measured=measured, now=now)
         self.leave("another trajectory has taken over")
         self._motion = motion
         self._time = elapsed
