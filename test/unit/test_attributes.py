@@ -9,7 +9,6 @@ MOST = 15
 """Attributes that a class may assign to itself. Records of tags and compiled functions assign none."""
 
 MORE = {
-    "Target": 47,
     "FilteredOdometry": 44,
     "InverseDynamics": 39,
     "Body": 29,
