@@ -16,7 +16,6 @@ MORE = {
     "Kinematics": 26,
     "Streams": 26,
     "GeometricOdometry": 25,
-    "TrajectoryFollower": 25,
     "GroundForces": 24,
     "Odometry": 23,
     "Recursion": 23,
