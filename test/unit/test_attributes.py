@@ -11,10 +11,8 @@ MOST = 15
 MORE = {
     "FilteredOdometry": 44,
     "InverseDynamics": 39,
-    "Body": 29,
     "WholeBodyProblem": 27,
     "Kinematics": 26,
-    "Streams": 26,
     "GeometricOdometry": 25,
     "GroundForces": 24,
     "Odometry": 23,
