@@ -13,6 +13,7 @@ from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.life.budget import BudgetRules, LeakyCounter
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.plugin_set import NOTHING, PluginSet
+from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import Interruptions
@@ -83,7 +84,6 @@ class Executor:
     Attributes:
         statistics: Its statistics.
         beside: Called by `run` ten times a second, when a cycle is done.
-        switchboard: Starts and stops the plugins.
 
     Raises:
         MiddlewareError: There is no plugin, two have one name, or their rates differ.
@@ -123,9 +123,6 @@ class Executor:
         )
         self._set.measure(telemetry.nanoseconds, self._durations[len(LoopTime) :])
         self._set.interrupted = self._interrupted
-        self.plugins = self._set.plugins
-        self.switchboard = self._set.switchboard
-        self.rate = self._set.rate
         self._seldom = max(1, round(SELDOM * self.rate))
         self._period = round(1e9 / self.rate)
         self._late = LeakyCounter(rules.overruns)
@@ -133,6 +130,21 @@ class Executor:
         self._set.changed = self._note
         self._set.initialize()
         self._serve()
+
+    @property
+    def plugins(self) -> tuple[ManagedPlugin, ...]:
+        """The plugins with their lives."""
+        return self._set.plugins
+
+    @property
+    def switchboard(self) -> Switchboard:
+        """Starts and stops the plugins."""
+        return self._set.switchboard
+
+    @property
+    def rate(self) -> float:
+        """Cycles per second [Hz]."""
+        return self._set.rate
 
     def cycle(self, late: int = 0) -> None:
         """Run one cycle, which began `late` after its deadline [ns]. Errors of plugins are not raised."""
