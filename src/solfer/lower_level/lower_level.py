@@ -13,6 +13,7 @@ from solfer.lower_level.claims.refusals import Refusals
 from solfer.lower_level.emergency_stop import EmergencyStop
 from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.laws.drives import Drives
+from solfer.lower_level.laws.measured_turns import MeasuredPosition
 from solfer.lower_level.records import LowerLevelRecord
 from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.actuators import Actuators
@@ -81,17 +82,8 @@ class LowerLevel:
         self.refusals = Refusals()
         self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
-        self._measured = np.zeros(kinematics.size)
+        self._measured = MeasuredPosition(kinematics.turns)
         self.starts = 0
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import keep_turns, unwrap
-
-        self._unwrap = unwrap
-        self._keep_turns = keep_turns
-        self._turns = kinematics.turns
-        self._added = np.zeros(kinematics.size)
-        self._turning = np.flatnonzero(self._turns)
-        self._before = np.zeros((3, kinematics.size))  # see the kernel
 
     @property
     def refused(self) -> int:
@@ -227,7 +219,7 @@ class LowerLevel:
         if self.emergency:
             logger.warning("the emergency stop is reset")
             self.emergency.reset()
-            self._restart(self._measured)
+            self._restart(self._measured.value)
 
     def start(self, q: np.ndarray) -> None:
         """Begin with a robot that was put into the position q of the model's DoFs, shape (model size,)."""
@@ -240,9 +232,7 @@ class LowerLevel:
         Owners of claims have to claim anew: their commands were meant for another position. An owner without a name
         commands from within this process, and knows of the start.
         """
-        self._measured[:] = q
-        self._before[:] = q
-        self._added[:] = 0.0
+        self._measured.start(q)
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:
@@ -258,11 +248,7 @@ class LowerLevel:
         Returns:
             `Drives.torque` and `Drives.speed`.
         """
-        self._measured[:] = q
-        if self._turning.size:  # encoders may count within a turn
-            self._unwrap(self._measured, self._turning, self._before, self._turns, self._added)
-            self._keep_turns(self._measured, self._turning, self._before, self._added)
-            q = self._measured
+        q = self._measured.measure(q)
         for ended in self.claims.advance(dt):
             self._expire(ended)
         if wrong := self.safeguard.advance(q, v, dt):
@@ -328,7 +314,7 @@ class LowerLevel:
         logger.error("the robot holds and refuses all commands: %s", reason)
         self.release_all(reason)
         for controller in self.controllers.values():
-            controller.start(self._measured[controller.dofs])
+            controller.start(self._measured.value[controller.dofs])
 
     def _expire(self, ended: LeaseEnded) -> None:
         """Handle a lease that has timed out.
@@ -356,7 +342,7 @@ class LowerLevel:
     def _rest(self, controller: LowerLevelController, joints: np.ndarray) -> None:
         """Hold joints of a controller, indices, in the fields that have no owner."""
         free = {field: self.claims.unclaimed(controller.name, field, joints) for field in JOINT_FIELDS}
-        if unsprung := controller.hold(self._measured[controller.dofs], free):
+        if unsprung := controller.hold(self._measured.value[controller.dofs], free):
             logger.warning(
                 "%s: no commands any longer, and no spring to hold them; their dampers brake them", ", ".join(unsprung)
             )
