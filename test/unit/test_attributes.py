@@ -21,7 +21,6 @@ MORE = {
     "SimulatedRun": 21,
     "Simulation": 21,
     "WheelInertialFilter": 21,
-    "SimulationServer": 20,
     "PageControl": 19,
     "RosReader": 16,
 }
