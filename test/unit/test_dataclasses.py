@@ -14,7 +14,7 @@ CHANGED = {
     "demo/story.py": {"Show"},
     "middleware/memory/bus.py": {"_Entry"},
     "middleware/ros/topic_publisher.py": {"SendBacklog"},
-    "middleware/shared_memory/rpc/calls.py": {"_Asked"},
+    "middleware/shared_memory/rpc/calls.py": {"_PendingCall"},
     "middleware/shared_memory/rpc/services.py": {"_Call"},
     "numerics/solvers/qp.py": {"Problem"},
     "realtime/schedule.py": {"Schedule"},

@@ -115,7 +115,7 @@ def declared_by(configuration: Configuration) -> tuple[Declared, ...]:
 
 
 def known_declarations(configuration: Configuration) -> tuple[Declared, ...]:
-    """List the same where it can be told, with a warning where it cannot."""
+    """List the same where it is known, with a warning where it is not."""
     try:
         return declared_by(configuration)
     except SolferError as error:

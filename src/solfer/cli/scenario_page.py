@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.cli.tables.scenario import ScenarioTrace
-from solfer.recording.pictures.canvas import FIRST, SECOND, WANTED, draw, dress, new_figure, outline
+from solfer.recording.pictures.canvas import FIRST, SECOND, DESIRED, draw, dress, new_figure, outline
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ def scenario_page(trace: ScenarioTrace) -> "Figure":
     for leg in range(trace.scenario.legs):
         along = trace.vertices[:, leg, 0]
         across = trace.vertices[:, leg, 1]
-        above.plot(x + cos * along - sin * across, y + sin * along + cos * across, color=WANTED, linewidth=0.7)
+        above.plot(x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED, linewidth=0.7)
     above.plot(x, y, color=FIRST)
     ends = np.cumsum((0, *trace.scenario.periods))
     above.plot(x[ends], y[ends], "o", color=SECOND, markersize=3)

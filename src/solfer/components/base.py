@@ -30,7 +30,7 @@ class Component:
         Tags: Record (a pydantic model) of the component's own tags in the configuration.
         kinematics: Whether the Robot's kinematics are brought up to date before each `update`.
         dynamics: Whether `model.dynamics` is, too: what is subscribed there is computed before each `update`.
-        modify: Whether it writes the measured state that it reads; who reads it next computes kinematics anew.
+        modify: Whether it writes the measured state that it reads; who reads it next computes kinematics again.
         period: Time of one control cycle [s]; 0 before `set_rate`.
         passed: Time that has passed for the robot since the cycle before [s]: `period`, or several of them where a loop
             that was late left some out; less where the robot is slower than the clock, as in a slow simulation.
@@ -104,9 +104,9 @@ class Component:
     def reset(self) -> None:
         """Forget past states and requests.
 
-        Called once, between two cycles, when a component that runs has to begin anew: the plugin holds because a
-        feedback timed out or its joints are not its own, its loop stood still, or the simulation began anew. Nothing is
-        sent until everything required has been received again; then `init` follows.
+        Called once, between two cycles, when a component that runs has to begin again: the plugin holds because
+        a feedback timed out or its joints are not its own, its loop stood still, or the simulation began again. Nothing
+        is sent until everything required has been received again; then `init` follows.
         """
 
     def stop(self) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
-from solfer.components.wanted_positions import WantedPositions
+from solfer.components.desired_positions import DesiredPositions
 from solfer.config import NameOf, Record
 from solfer.errors import ComponentError, UnknownName
 from solfer.robot import Robot
@@ -24,10 +24,10 @@ class ComplianceTags(Record):
 
 
 class ComplianceCompensation(Component):
-    """Commands the motors of series elastic joints further than the links are wanted, by the deflection of the springs.
+    """Moves the motors of series elastic joints beyond the desired links, by the deflection of the springs.
 
     A spring of stiffness K that carries the torque tau is turned by tau / K: motors at q + tau / K hold the links at q.
-    q and tau are the wanted positions and efforts that the pipes of the configuration write into the desired State, as
+    q and tau are the desired positions and efforts that the pipes of the configuration write into the desired State, as
     of a plugin that compensates gravity. Joints without a spring get q. The result follows from these alone, and does
     not add up over cycles.
     """
@@ -38,32 +38,32 @@ class ComplianceCompensation(Component):
         super().__init__(robot, tags or ComplianceTags(), name or "compliance_compensation")
         self.kinematics = False
         self._compliance = _compliance(robot, self.tags)
-        self._wanted = WantedPositions(robot)
+        self._desired_positions = DesiredPositions(robot)
         self._position = np.zeros(robot.size)
         self._deflection = np.zeros(robot.size)
 
     def init(self) -> None:
         """Start with the joints that nobody else moves where they are."""
-        self._wanted.start()
+        self._desired_positions.start()
 
     def update(self) -> None:
         """Compute where the motors have to be."""
-        self._wanted.read()
+        self._desired_positions.read()
         np.multiply(self.model.command.torque, self._compliance, out=self._position)
-        self._position += self._wanted.values
+        self._position += self._desired_positions.values
 
     def send(self) -> None:
         """Write positions of the motors; velocities and efforts stay those that others want."""
-        self._wanted.send(self._position)
+        self._desired_positions.send(self._position)
 
     def start_log(self, logger: Any) -> None:
         """Declare how far the motors are commanded beyond the links, and where the links are to be."""
         logger.add("deflection", self._deflection, self.model.dofs)
-        logger.add("reference", self._wanted.values, self.model.dofs)
+        logger.add("reference", self._desired_positions.values, self.model.dofs)
 
     def log(self, logger: Any, time: float) -> None:
         """See `Component.log`: the deflection of the springs."""
-        np.subtract(self._position, self._wanted.values, out=self._deflection)
+        np.subtract(self._position, self._desired_positions.values, out=self._deflection)
 
 
 def _compliance(robot: Robot, tags: ComplianceTags) -> np.ndarray:

@@ -131,8 +131,8 @@ class Action:
     """A goal that takes many cycles, with feedback, a result, cancelling and preemption; one goal at a time.
 
     A new goal preempts the present one as soon as `begin` has taken it over; if `begin` refuses it the present one goes
-    on. When the plugin holds, starts anew or stops, the goal is aborted; the component learns of that by its `reset` or
-    `stop`. The default of every field of `result` stands for a goal that did not come to its end.
+    on. When the plugin holds, starts again or stops, the goal is aborted, and the component's `reset` or `stop` is
+    called. The default of every field of `result` stands for a goal that did not come to its end.
 
     Attributes:
         name: Its name, see above.

@@ -1,4 +1,4 @@
-"""Messages that tell how things are, with the fields of `diagnostic_msgs`."""
+"""Messages that report how things are, with the fields of `diagnostic_msgs`."""
 
 from dataclasses import dataclass, field
 

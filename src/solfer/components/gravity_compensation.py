@@ -10,7 +10,7 @@ from pydantic import Field
 from solfer.components.base import Component
 from solfer.components.declaration import LiveParameter, Service
 from solfer.components.gains import GainsOfGroup, configured_gains, live_gains
-from solfer.components.wanted_positions import WantedPositions
+from solfer.components.desired_positions import DesiredPositions
 from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.dynamics import BIAS, CarryingTorques
@@ -90,7 +90,7 @@ class GravityCompensation(Component):
         self._torque = np.zeros(robot.size)
         self._left = 0.0
         self._fade = self.tags.fade
-        self._wanted = WantedPositions(robot)
+        self._desired_positions = DesiredPositions(robot)
         self._springs = np.zeros(robot.size)
 
     def _tracked(self) -> dict[str, Point]:
@@ -109,12 +109,12 @@ class GravityCompensation(Component):
 
     def init(self) -> None:
         """Start with the joints that nobody else moves where they are."""
-        self._wanted.start()
+        self._desired_positions.start()
         self._left = 0.0
 
     def update(self) -> None:
         """Compute the torques of this cycle."""
-        self._wanted.read()
+        self._desired_positions.read()
         jacobian = self._none
         if len(self._rows):
             self._rows.update()
@@ -131,7 +131,7 @@ class GravityCompensation(Component):
         """Write torques, and the gains that are configured; positions and velocities are those that others want."""
         command = self.model.command
         command.torque[:] = self._torque
-        self._wanted.send(self._wanted.values)
+        self._desired_positions.send(self._desired_positions.values)
         for values, dofs, numbers in self._gains:
             values[dofs] = numbers
 
@@ -140,7 +140,7 @@ class GravityCompensation(Component):
         dofs = self.model.dofs
         logger.add("torque", self._torque, dofs)
         logger.add("spring_torque", self._springs, dofs)
-        logger.add("reference", self._wanted.values, dofs)
+        logger.add("reference", self._desired_positions.values, dofs)
 
     def log(self, logger: Any, time: float) -> None:
         """See `Component.log`: what the joints measure beyond the torques."""

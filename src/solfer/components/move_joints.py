@@ -210,8 +210,8 @@ def _check_values(joints: Sequence[str], what: str, values: Sequence[float]) -> 
         raise NotFinite(f"{what} of joint '{joint}' is not a finite number")
 
 
-def _value(joint: str, index: int, wanted: str, values: tuple[float, ...], others: tuple[float, ...]) -> float:
-    """Return the value of a joint that obeys a `wanted` kind of number; the other kind may only be zero."""
+def _value(joint: str, index: int, kind: str, values: tuple[float, ...], others: tuple[float, ...]) -> float:
+    """Return the value of a joint that obeys a `kind` kind of number; the other kind may only be zero."""
     if not values or (others and others[index] != 0.0):
-        raise ComponentError(f"joint '{joint}' obeys a {wanted}", expected=f"a {wanted} for it, and nothing else")
+        raise ComponentError(f"joint '{joint}' obeys a {kind}", expected=f"a {kind} for it, and nothing else")
     return values[index]

@@ -63,11 +63,11 @@ class Progress:
             self._open = False
 
 
-def tell(
+def demonstrate(
     show: story.Show,
     steps: Callable[[Robot, MotionRecorder], list[story.StoryStep]],
     plugin: str,
-    asked: tuple[str, ...],
+    services: tuple[str, ...],
 ) -> int:
     """Carry out a story, print the table and draw the pictures; return the exit code.
 
@@ -75,14 +75,14 @@ def tell(
         show: The demonstration.
         steps: Makes the story for a Robot and what has been received of it.
         plugin: The plugin that commands the robot.
-        asked: Plugins that get the requests.
+        services: Plugins that get the requests.
 
     Raises:
         SolferError: The robot does not start, or a plugin refuses.
     """
     middleware = show.middleware
     recorder = MotionRecorder(show.robot)
-    storyteller = story.StoryTeller(middleware, recorder, Progress(), plugins=asked)
+    storyteller = story.StoryTeller(middleware, recorder, Progress(), plugins=services)
     storyteller.wait_for_robot(60.0, show.check)
     if not middleware.running():
         return INTERRUPTED

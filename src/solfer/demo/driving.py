@@ -76,7 +76,7 @@ class Complaints:
 
 
 class Driving:
-    """Third parties of Fig. 5: navigation, and who tells the hands where to go.
+    """Third parties of Fig. 5: navigation, and who reports the hands where to go.
 
     Args:
         middleware: Middleware of robot and plugins.
@@ -157,7 +157,7 @@ class Driving:
 def wait_for_robot(
     middleware: Middleware, recorder: DrivingRecorder, started: float, check: Callable[[], None], timeout: float = 60.0
 ) -> Driving | None:
-    """Wait until the robot is received, commanded and located; tell what it waits for. None if the middleware ends.
+    """Wait until the robot is received, commanded and located; report what it waits for. None if the middleware ends.
 
     Args:
         middleware: Middleware of simulator and plugins.

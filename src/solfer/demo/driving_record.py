@@ -1,4 +1,4 @@
-"""What happens in the demonstration of Fig. 5, as its topics tell it."""
+"""What happens in the demonstration of Fig. 5, as its topics report it."""
 
 from solfer.demo.record import ArrivalClock
 from solfer.transport import BodyMessage, JointMessage, Middleware
@@ -25,7 +25,7 @@ class DrivingRecorder:
         middleware: Middleware of the topics.
 
     Attributes:
-        clock: Tells the time on the clock of recordings; stamps are of the wall clock, or of simulated time.
+        clock: Reads the time on the clock of recordings; stamps are of the wall clock, or of simulated time.
     """
 
     def __init__(self, middleware: Middleware):

@@ -1,4 +1,4 @@
-"""Figures of the demonstration of Fig. 5: what the robot truly did, against what its recording says was wanted."""
+"""Figures of the demonstration of Fig. 5: what the robot truly did, against what its recording says was desired."""
 
 import math
 from collections.abc import Mapping
@@ -113,7 +113,7 @@ def _at(channel: Channel, times: np.ndarray, columns: tuple[str, ...]) -> np.nda
 
 
 def _size(errors: np.ndarray) -> str:
-    """Tell RMS and largest of distances [m]."""
+    """Format RMS and largest of distances [m]."""
     return f"{1e3 * math.sqrt(float(np.mean(errors**2))):.1f} mm RMS, {1e3 * float(errors.max()):.1f} mm at most"
 
 
@@ -126,11 +126,11 @@ def table(
         robot: The Robot, for its weight.
         recorder: What was seen.
         seen: What the robot did.
-        recording: What plugins wanted.
+        recording: What plugins desired.
         reports: Health of the nodes.
     """
     times = recorder.clock.times(seen.time)
-    way = float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
+    distance = float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
     wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
     base = np.linalg.norm(wanted - wanted[0] - (seen.tracked - seen.tracked[0]), axis=1)
@@ -141,7 +141,7 @@ def table(
     moved = np.linalg.norm(seen.center - seen.center[0], axis=1)
     width = seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]
     lean = math.degrees(float(np.abs(seen.position[:, 3:5]).max()))
-    driven = f"{way:.2f} m, turned by {turned:.0f} degrees"
+    driven = f"{distance:.2f} m, turned by {turned:.0f} degrees"
     rows = [
         ("driven", driven + bounded(lean, TILT, "degrees of lean: it fell")),
         ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
@@ -149,21 +149,21 @@ def table(
         ("vertices", _size(np.linalg.norm(vertices, axis=2))),
         ("hands", _size(off := np.linalg.norm(hands, axis=2)) + bounded(1e3 * float(off.max()), HANDS, "mm")),
         ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),
-        ("odometry against truth", _drift(recorder, seen, way)),
+        ("odometry against truth", _drift(recorder, seen, distance)),
         ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),
         ("forces of the ground", _forces(robot, recorder)),
     ]
     return rows + _health(reports) + layer(reports)
 
 
-def _drift(recorder: DrivingRecorder, seen: Seen, way: float) -> str:
-    """Tell how far the estimate of the base is off at the end; the robot rests there, so that stamps do not count."""
+def _drift(recorder: DrivingRecorder, seen: Seen, distance: float) -> str:
+    """Report how far the estimate of the base is off at the end; the robot rests there, so that stamps do not count."""
     estimates = recorder.messages("odometry")
     poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in estimates])
     x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
     off = math.hypot(x, y)
     turned = math.degrees(math.remainder(heading, math.tau))
-    part = 100.0 * off / way if way > 0.1 else 0.0
+    part = 100.0 * off / distance if distance > 0.1 else 0.0
     share = f", {part:.2f} % of the way" if part else ""
     figure = f"{1e3 * off:.1f} mm{share}, {turned:.2f} degrees at the end"
     return figure + bounded(part, DRIFT, "%") + bounded(abs(turned), HEADING, "degrees")
@@ -213,7 +213,7 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
 
 
 def _forces(robot: Robot, recorder: DrivingRecorder) -> str:
-    """Tell how much of the weight the estimated forces carry."""
+    """Report how much of the weight the estimated forces carry."""
     weight = 9.81 * robot.kinematics.mass
     sums = np.array([each.values[:, 2].sum() for each in recorder.messages("forces")]) / weight
     return f"carry {100.0 * float(sums.mean()):.1f} % of the weight, {100.0 * float(sums.std()):.1f} % RMS about it"

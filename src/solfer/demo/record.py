@@ -11,7 +11,7 @@ WINDOW = 0.5
 
 
 class ArrivalClock:
-    """Tells when messages arrived, by stamps of a clock that may run more slowly, or have begun at another time."""
+    """Reports when messages arrived, by stamps of a clock that may run more slowly, or have begun at another time."""
 
     def __init__(self) -> None:
         self._stamps: list[float] = []

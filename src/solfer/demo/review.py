@@ -1,4 +1,4 @@
-"""What is told of Fig. 5 once everything has ended: table, pictures, and a film."""
+"""Presents Fig. 5 once everything has ended: table, pictures, and a film."""
 
 from collections.abc import Mapping
 from contextlib import closing
@@ -51,7 +51,7 @@ class DrivingFindings:
     waited: bool = False
 
 
-def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
+def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
     """Print the table, and draw pictures and, by `films`, a GIF into the folder `output`.
 
     Returns:

@@ -48,7 +48,7 @@ def drive(show: story.Show) -> int:
     found = review.DrivingFindings(
         begin.robot, begin.legs, recorder, reports=show.middleware.reports(), taken=begin.taken, waited=show.waits
     )
-    show.review = lambda file, films: review.tell(found, file, show.output, films=films)
+    show.review = lambda file, films: review.present(found, file, show.output, films=films)
     return code
 
 
@@ -107,12 +107,12 @@ def carry(show: story.Show) -> int:
         story.StoryStep("legs up", {ONE: MoveJoints(state=centauro.HIGH, speed=0.5)}),
         story.StoryStep("legs down", {ONE: MoveJoints(state=centauro.LOW, speed=0.5)}),
     ]
-    return centauro.tell(show, lambda *_: steps, "gravity_compensation", asked=(ONE,))
+    return centauro.demonstrate(show, lambda *_: steps, "gravity_compensation", services=(ONE,))
 
 
 def joints(plugin: str) -> Callable[[story.Show], int]:
-    """Fig. 4: upper and lower body move at once; `plugin` merges what is wanted."""
-    return lambda show: centauro.tell(show, centauro.steps_of, plugin, asked=(story.UPPER, story.LOWER))
+    """Fig. 4: upper and lower body move at once; `plugin` merges what is desired."""
+    return lambda show: centauro.demonstrate(show, centauro.steps_of, plugin, services=(story.UPPER, story.LOWER))
 
 
 SCHEMES = {

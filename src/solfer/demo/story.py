@@ -91,9 +91,9 @@ def drive(distance: float, radius: float, forward: dict[str, float], speed: floa
     speed = min(speed, float(np.sqrt(angle * ACCELERATION)))
     joints = tuple(forward)
     turn = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
-    way = "forward" if distance > 0.0 else "back"
+    direction = "forward" if distance > 0.0 else "back"
     return [
-        StoryStep(f"{abs(distance):g} m {way}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed),
+        StoryStep(f"{abs(distance):g} m {direction}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed),
         StoryStep("wheels stop", {LOWER: MoveJoints(joints=joints, velocities=(0.0,) * len(joints))}),
     ]
 
@@ -175,7 +175,7 @@ class StoryTeller:
         if self._recorder.newest("desired") is None:
             return "no plugin commands the robot"
         try:
-            replies = [self._ask(plugin, MoveJoints(state="reset")) for plugin in self._plugins]
+            replies = [self._request(plugin, MoveJoints(state="reset")) for plugin in self._plugins]
         except MiddlewareError as error:
             return str(error)
         return "; ".join(reply.message for reply in replies if not reply.success)
@@ -183,13 +183,13 @@ class StoryTeller:
     def _insist(self, plugin: str, request: MoveJoints) -> Reply:
         """Ask until the plugin agrees, or time is up; return its last reply."""
         end = self._middleware.now() + PATIENCE
-        while not (reply := self._ask(plugin, request)).success:
+        while not (reply := self._request(plugin, request)).success:
             if self._middleware.now() >= end or not self._middleware.running():
                 break
             self._pass(self._middleware.now() + 0.1)
         return reply
 
-    def _ask(self, plugin: str, request: MoveJoints) -> Reply:
+    def _request(self, plugin: str, request: MoveJoints) -> Reply:
         return self._middleware.call(f"{plugin}/trajectory", INTERFACE, request, Reply, timeout=3.0)
 
     def _pass(self, end: float) -> None:

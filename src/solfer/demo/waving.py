@@ -1,4 +1,4 @@
-"""Waves with both hands: a third party that tells inverse kinematics where they go."""
+"""Waves with both hands: a third party that publishes references of inverse kinematics."""
 
 import math
 from collections.abc import Mapping
@@ -32,13 +32,13 @@ class Waving:
         begin: Where the hands are, as seen from the base, by task, each of shape (3,) [m].
 
     Attributes:
-        wanted: What was published last, by task, each of shape (3,) [m].
+        desired: What was published last, by task, each of shape (3,) [m].
     """
 
     def __init__(self, middleware: Middleware, target: str, begin: Mapping[str, np.ndarray]):
         self._begin = dict(begin)
-        self.wanted = {name: np.array(place, float) for name, place in begin.items()}
-        self._messages = {name: VectorMessage(BASE, self.wanted[name]) for name in begin}
+        self.desired = {name: np.array(place, float) for name, place in begin.items()}
+        self._messages = {name: VectorMessage(BASE, self.desired[name]) for name in begin}
         self._writers = {
             name: middleware.writer(f"{target}/{name}/reference", "geometry_msgs/PointStamped") for name in begin
         }
@@ -53,7 +53,7 @@ class Waving:
             ahead, outward, up = LIFT
             circle = (0.0, RADIUS * math.sin(angle), side * RADIUS * math.cos(angle))
             offset = np.array((ahead, side * outward, up)) + circle
-            self.wanted[name][:] = begin + share * offset
+            self.desired[name][:] = begin + share * offset
             self._messages[name].stamp = self._now()
             self._writers[name].write(self._messages[name])
 

@@ -26,7 +26,7 @@ class CarryingTorques:
         tau = h - Q x,   x next to Q^T h of all that satisfy B x = h_free
 
     This is tau = (A without its columns `free`)^+ A h, with the null space A of J (A J^T = 0), for which no matrix of
-    the size of the robot is needed. The eigenvalues of B B^T, from 0 to 1, tell how well the contacts hold `free`; in
+    the size of the robot is needed. The eigenvalues of B B^T, from 0 to 1, report how well the contacts hold `free`; in
     directions with less than WEAK the share s counts as s / WEAK^2 instead of 1 / s. See Mistry, Buchli, Schaal (2010),
     "Inverse dynamics control of floating base systems using orthogonal decomposition". Where no torques carry the
     robot, as on contacts in one line, they carry what they can.

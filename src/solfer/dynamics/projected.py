@@ -39,7 +39,7 @@ class ProjectedDynamics(Elements):
         self._vector = np.zeros(size)
         self._turned = np.zeros((size, size), order="F")
         self._square = np.zeros((size, size), order="F")
-        # one block of memory each, that is cut anew when the rank changes
+        # one block of memory each, that is cut again when the rank changes
         self._factors = np.zeros(size * size)
         self._solutions = np.zeros(size * size)
         self._fit()

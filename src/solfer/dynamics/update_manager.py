@@ -42,7 +42,7 @@ class UpdateManager:
 
     def __init__(self) -> None:
         self._elements: dict[str, _Element] = {}
-        self._wanted: tuple[_Element, ...] = ()
+        self._required: tuple[_Element, ...] = ()
 
     def add(self, name: str, compute: Callable[[], None], stamp: Callable[[], Hashable]) -> None:
         """Add an element.
@@ -91,7 +91,7 @@ class UpdateManager:
 
     def update(self) -> None:
         """Compute what is subscribed and stale, and fill the call counters."""
-        for element in self._wanted:
+        for element in self._required:
             element.refresh()
             element.left = element.subscribed
 
@@ -138,7 +138,7 @@ class UpdateManager:
         return [(element, count) for _, element, count in counted]
 
     def _choose(self) -> None:
-        self._wanted = tuple(element for element in self._elements.values() if element.subscribed)
+        self._required = tuple(element for element in self._elements.values() if element.subscribed)
 
 
 def _as_counts(calls: Calls) -> dict[str, int]:

@@ -128,7 +128,7 @@ class LowerLevel:
         """Grant joints to an owner, all or none; see `Claims.claim`. Fields without an owner return to the default.
 
         Returns:
-            Whether the owner had commanded before. Then it begins anew, and so must the publishers of the topics that
+            Whether the owner had commanded before. Then it begins again, and so must the publishers of the topics that
             it `follows`: the refusals inform them.
 
         Raises:
@@ -152,7 +152,7 @@ class LowerLevel:
                 self.refusals.publish(
                     f"{TOPIC}{topic}",
                     Suspended(
-                        f"'{owner}', which follows it, begins anew",
+                        f"'{owner}', which follows it, begins again",
                         expected="commands that begin at the measured state",
                     ),
                 )
@@ -166,7 +166,7 @@ class LowerLevel:
             self.claims.bar(owner, "it has released its joints")
 
     def release_all(self, reason: str) -> tuple[str, ...]:
-        """End all leases as `release` does; their owners are refused with the `reason`, and have to claim anew.
+        """End all leases as `release` does; their owners are refused with the `reason`, and have to claim again.
 
         Returns:
             The owners.
@@ -215,7 +215,7 @@ class LowerLevel:
             controller.rest()
 
     def reset_emergency_stop(self) -> None:
-        """Hold the measured position again, with the default gains. Earlier owners have to claim anew."""
+        """Hold the measured position again, with the default gains. Earlier owners have to claim again."""
         if self.emergency:
             logger.warning("the emergency stop is reset")
             self.emergency.reset()
@@ -229,14 +229,14 @@ class LowerLevel:
     def _restart(self, q: np.ndarray) -> None:
         """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,).
 
-        Owners of claims have to claim anew: their commands were meant for another position. An owner without a name
+        Owners of claims have to claim again: their commands were meant for another position. An owner without a name
         commands from within this process, and knows of the start.
         """
         self._measured.start(q)
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:
-                self.claims.bar(owner, "the controllers have started anew")
+                self.claims.bar(owner, "the controllers have started again")
         for controller in self.controllers.values():
             controller.start(q[controller.dofs])
         self.drives.rest()

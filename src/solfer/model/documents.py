@@ -77,8 +77,8 @@ def _expanded(path: str | Path, kind: str) -> str:
     try:
         done = subprocess.run([program, str(path)], capture_output=True, timeout=EXPANSION, check=True)
     except (OSError, subprocess.SubprocessError) as error:
-        said = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
-        reason = said[-1] if said else str(error)
+        output = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
+        reason = output[-1] if output else str(error)
         raise ModelError(f"xacro cannot expand the {kind}: {reason}", where=str(path), expected=expected) from error
     return _decoded(done.stdout, str(path), kind)
 

@@ -8,7 +8,7 @@ import numpy as np
 class History:
     """All messages that a feedback accepted since the last cycle, oldest first; the State has the newest alone.
 
-    The arrays are live, and filled anew in each cycle: only their first `count` rows are of this one. Numbers are as
+    The arrays are live, and filled again in each cycle: only their first `count` rows are of this one. Numbers are as
     measured: filters do not act on them.
 
     Args:

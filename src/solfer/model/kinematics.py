@@ -82,7 +82,7 @@ class Kinematics:
         self.tree = _tree(self._model, self._data, self.followers)
         self._velocity = self.tree.velocity
         self._velocity_memory = memoryview(self._velocity)
-        if self._folds:  # Pinocchio's own array is not folded: it does not write all of it anew
+        if self._folds:  # Pinocchio's own array is not folded: it does not write all of it again
             self._com_jacobian = np.zeros((3, self.size))
         self._rest = np.zeros(self.size)
         self.update(self._rest)
@@ -204,7 +204,7 @@ class Kinematics:
     def _dynamics(self) -> tuple[pin.Data, np.ndarray, np.ndarray]:
         """Data of the dynamics with M and h, which are not at the state of the kinematics.
 
-        M and h are views; where joints follow others, copies, as Pinocchio does not write all of its own anew.
+        M and h are views; where joints follow others, copies, as Pinocchio does not write all of its own again.
         """
         data = working_data(self._model)
         if self._folds:

@@ -65,8 +65,8 @@ class BidirectionalMap:
 
     def select(self, robot_indices: Sequence[int] | np.ndarray, name: str | None = None) -> "BidirectionalMap":
         """Return the map of some of the Robot's DoFs only: the outside order stays, names of other DoFs drop out."""
-        wanted = {int(index) for index in robot_indices}
-        names = [self.robot_names[index] for index in self.robot_indices if int(index) in wanted]
+        selected = {int(index) for index in robot_indices}
+        names = [self.robot_names[index] for index in self.robot_indices if int(index) in selected]
         return BidirectionalMap(self.name if name is None else name, self.robot_names, names)
 
     def __repr__(self) -> str:

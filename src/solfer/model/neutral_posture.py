@@ -46,23 +46,23 @@ def _bent_chains(kinematics: Kinematics, posture: np.ndarray) -> tuple[list[str]
     for link in description.subtree(kinematics.base_link):
         if link in parents:
             continue
-        chain = [dofs.index(joint) for joint in _way(kinematics, link)]
+        chain = [dofs.index(joint) for joint in _path(kinematics, link)]
         if posture[chain].any():
             tips.append(link)
             free[chain] = posture[chain] == 0.0
     return tips, free
 
 
-def _way(kinematics: Kinematics, link: str) -> list[str]:
+def _path(kinematics: Kinematics, link: str) -> list[str]:
     """Return the moving joints between a link and the floating base."""
     description = kinematics.description
-    way = []
+    path = []
     while link != kinematics.base_link:
         joint = description.joints[description.links[link].parent]
         if joint.moving:
-            way.append(joint.name)
+            path.append(joint.name)
         link = joint.parent
-    return way
+    return path
 
 
 def _ground_plan(kinematics: Kinematics, links: list[str]) -> np.ndarray:

@@ -66,7 +66,7 @@ class State:
     def window(self) -> "State":
         """Return the same State for another user: both have one memory, with all that is ever added, and one version.
 
-        Only `add` tells them apart: each user may add an interface of the same name and size, and both get one array.
+        Only `add` distinguishes them: each user may add an interface of the same name and size, and both get one array.
         """
         other = State.__new__(State)
         other.dofs = self.dofs

@@ -33,10 +33,10 @@ class Course(abc.ABC):
         count: How many steps or way-points there are.
         share: Share of what is published with which the robot goes on, and with it the clock of the motion.
         most: Largest pace that it can go on at.
-        asks: Whether others answer it before it begins.
+        has_dialogue: Whether others answer it before it begins.
     """
 
-    asks = False
+    has_dialogue = False
 
     writers: Sequence[Writer] = ()
     count: int = 0

@@ -156,7 +156,7 @@ class Navigation:
         self._inbox.apply()
         self.waits = self._subscribers.missing()
         # a course that asks others has its answers when it begins; one that measures begins with what is new then
-        if not self.waits or (self._course.asks and self.waits == CONNECTIONS):
+        if not self.waits or (self._course.has_dialogue and self.waits == CONNECTIONS):
             self.waits = self._course.awaits() or self.waits
         if self.waits:
             if self._middleware.now() - self._subscribers.begin > SOON:

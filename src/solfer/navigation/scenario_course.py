@@ -89,7 +89,7 @@ class ScenarioCourse(Course):
             published.
     """
 
-    asks = True
+    has_dialogue = True
 
     def __init__(
         self,

@@ -165,7 +165,7 @@ class ScenarioPositions(ScenarioMotion):
         if missing := self._pose.awaits():
             return missing
         for task in (BASE_PORT, VERTICES_PORT):
-            if task not in self._begin and (missing := self._ask(task)):
+            if task not in self._begin and (missing := self._request(task)):
                 return missing
         self._move_with_odometry()
         return ""
@@ -195,7 +195,7 @@ class ScenarioPositions(ScenarioMotion):
         self._ended += period
         return self._ended < ARRIVING or self._pose.still < STANDING
 
-    def _ask(self, task: str) -> str:
+    def _request(self, task: str) -> str:
         """Ask where a reference begins; returns what is missing."""
         if self._answer is None:
             self._answer = self._middleware.request(self._service, GET, GetReference(task), ReferenceReply, PATIENCE)

@@ -30,7 +30,7 @@ class LoadingCache(FunctionCache):
 
 
 def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[str] = False) -> Callable[..., Any]:
-    """Compile a function, or load it from the cache on disk; without a place for a cache it is compiled anew.
+    """Compile a function, or load it from the cache on disk; without a place for a cache it is compiled again.
 
     Args:
         signature: Types of result and arguments in numba's notation: nothing else is ever compiled.

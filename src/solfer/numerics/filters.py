@@ -85,6 +85,6 @@ class LowPass:
     def step(self, values: np.ndarray) -> None:
         """Replace the newest values, shape (n,), by the filtered ones. Allocates nothing.
 
-        Values that are not finite pass unchanged, and the filter starts anew after them.
+        Values that are not finite pass unchanged, and the filter starts again after them.
         """
         self._started = filter_values(values, self._first, self._second, self.factors, self._started)

@@ -98,9 +98,9 @@ def _collect(arrays, dofs, out):
 
 
 @part
-def _wrapped(way, turn):
+def _wrapped(displacement, turn):
     """Return a way without whole turns; a turn of 0 is none."""
-    return way - turn * math.floor(way / turn + 0.5) if turn else way
+    return displacement - turn * math.floor(displacement / turn + 0.5) if turn else displacement
 
 
 def _unwrap(position, part, before, turns, added):
@@ -136,14 +136,14 @@ def _keep_turns(position, part, before, added):
 keep_turns = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1])", _keep_turns)
 
 
-def _shorten(ways, turns):
+def _shorten(displacements, turns):
     """Remove whole turns from ways, in place; a turn of 0 is none.
 
     Args:
-        ways: Differences of positions, one row at a time.
+        displacements: Differences of positions, one row at a time.
         turns: What positions may jump by, one of each column.
     """
-    for row in ways:
+    for row in displacements:
         for k in range(len(turns)):
             row[k] = _wrapped(row[k], turns[k])
 
@@ -460,15 +460,15 @@ def _keep(block, kept, steps):
         steps: For each row the time that makes a way of its numbers, which are velocities [s]; 0: these are places;
             negative: they do not count.
     """
-    way = 0.0
+    displacement = 0.0
     for row in range(len(block)):
         step = steps[row]
         for index in range(len(block[row])):
             number = block[row, index]
             if step >= 0.0:
-                way = max(way, abs(number - kept[row, index]) if step == 0.0 else step * abs(number))
+                displacement = max(displacement, abs(number - kept[row, index]) if step == 0.0 else step * abs(number))
             kept[row, index] = number
-    return way
+    return displacement
 
 
 keep = cached("float64(float64[:, ::1], float64[:, ::1], float64[::1])", _keep)

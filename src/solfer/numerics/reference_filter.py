@@ -199,7 +199,7 @@ def _limited(vector, most):
 
 
 @part
-def _approach(error, stream, rate, speed, acceleration, period, wanted):
+def _approach(error, stream, rate, speed, acceleration, period, desired):
     """Change a velocity towards a target at the distance `error` that moves with the velocity `stream`."""
     distance = _norm(error)
     fast = min(speed, distance / period)
@@ -207,14 +207,14 @@ def _approach(error, stream, rate, speed, acceleration, period, wanted):
         step = 0.5 * acceleration * period
         fast = min(fast, math.sqrt(step * step + 2.0 * acceleration * distance) - step)
     for k in range(3):
-        wanted[k] = stream[k] + (fast * error[k] / distance if distance > 0.0 else 0.0)
-    _limited(wanted, speed)
+        desired[k] = stream[k] + (fast * error[k] / distance if distance > 0.0 else 0.0)
+    _limited(desired, speed)
     for k in range(3):
-        wanted[k] -= rate[k]
+        desired[k] -= rate[k]
     if acceleration < math.inf:
-        _limited(wanted, acceleration * period)
+        _limited(desired, acceleration * period)
     for k in range(3):
-        rate[k] += wanted[k]
+        rate[k] += desired[k]
 
 
 def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, gap, still, work):
@@ -255,7 +255,7 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
 def _follow_all(target, stream, age, gap, value, rate, limits, period, still, work):
     """See `ReferenceFilter.update`; return whether all are still."""
     error = work[0]
-    wanted = work[1]
+    desired = work[1]
     aim = work[2]
     all_still = True
     for i in range(len(target)):
@@ -269,9 +269,9 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
         for k in range(3):
             error[k] = aim[k] - value[i, k]
         distance = _norm(error)
-        _approach(error, stream[i, :3], rate[i, :3], limits[i, 0], limits[i, 1], period, wanted)
+        _approach(error, stream[i, :3], rate[i, :3], limits[i, 0], limits[i, 1], period, desired)
         _turn_to(aim, value[i], error)
-        _approach(error, stream[i, 3:], rate[i, 3:], limits[i, 2], limits[i, 3], period, wanted)
+        _approach(error, stream[i, 3:], rate[i, 3:], limits[i, 2], limits[i, 3], period, desired)
         for k in range(3):
             value[i, k] += period * rate[i, k]
         _turn_by(value[i], rate[i], period)
@@ -281,18 +281,18 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
     return all_still
 
 
-def _halt_at(target, value, rate, limits, period, way):
+def _halt_at(target, value, rate, limits, period, displacement):
     """See `ReferenceFilter.halt`."""
     for first in (0, 3):
         speed = _norm(rate[first : first + 3])
         acceleration = limits[2 * first // 3 + 1]
         time = 0.5 * (speed / acceleration - period) if acceleration < math.inf else 0.0
         for k in range(first, first + 3):
-            way[k] = rate[k] * max(time, 0.0)
+            displacement[k] = rate[k] * max(time, 0.0)
     target[:] = value
     for k in range(3):
-        target[k] += way[k]
-    _turn_by(target, way, 1.0)
+        target[k] += displacement[k]
+    _turn_by(target, displacement, 1.0)
 
 
 _ROW = "float64[::1]"

@@ -15,7 +15,7 @@ class CommandPipe(abc.ABC):
     Args:
         name: Name of the pipe in the configuration.
         writer: Publishes the messages.
-        sent: The message, filled anew in every cycle.
+        sent: The message, filled again in every cycle.
 
     Attributes:
         sent: The message as the receiver gets it.

@@ -61,13 +61,13 @@ class PipeContext:
         Raises:
             ConfigError: The cut-off is at or above half of the rate.
         """
-        wanted = record.filter
-        if wanted is None or not wanted.run:
+        settings = record.filter
+        if settings is None or not settings.run:
             return None
-        where = wanted.where("frequency")
+        where = settings.where("frequency")
 
         def make(size: int) -> LowPass:
-            return LowPass(size, wanted.frequency, wanted.damping, rate=self.rate, where=where)
+            return LowPass(size, settings.frequency, settings.damping, rate=self.rate, where=where)
 
         make(0)  # raises for a wrong filter here, even if none is made later
         return make

@@ -167,7 +167,7 @@ class FeedbackPipe(abc.ABC):
         """
 
     def restart(self) -> None:
-        """Begin anew: discard what was received so far. Written values stay."""
+        """Begin again: discard what was received so far. Written values stay."""
         self.received = False
         self.arrival = math.inf
         if self._doubt is not None:

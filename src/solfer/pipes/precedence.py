@@ -107,8 +107,8 @@ class Precedence:
 
     def _owners_of(self, name: str, part: np.ndarray | None) -> tuple[Owner, ...]:
         """Return other publishers of some of these DoFs."""
-        wanted = slice(None) if part is None else part
-        return tuple(owner for owner in self._owners.values() if owner.name != name and owner.dofs[wanted].any())
+        selected = slice(None) if part is None else part
+        return tuple(owner for owner in self._owners.values() if owner.name != name and owner.dofs[selected].any())
 
     def _outlasts(self, owner: Owner, arrival: float) -> bool:
         """Return whether an owner has timed out when a message of another publisher arrived at `arrival` [s]."""

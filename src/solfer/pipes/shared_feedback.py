@@ -29,7 +29,7 @@ class Turns:
 class Source:
     """A feedback that is read by the first of its pipes in each turn.
 
-    It begins anew (filters, alignment, which joints have been received) when all of its pipes that are in use do.
+    It begins again (filters, alignment, which joints have been received) when all of its pipes that are in use do.
 
     Args:
         pipe: The feedback.
@@ -56,7 +56,7 @@ class Source:
         return share
 
     def restart(self) -> None:
-        """Begin anew if nobody goes on with what was received before."""
+        """Begin again if nobody goes on with what was received before."""
         recent = self.turns.number - 1
         if not any(share.received and share.turn >= recent for share in self._shares):
             self.pipe.restart()
@@ -197,14 +197,14 @@ class Written:
     Attributes:
         count: Number of times that it was published.
         time: When it was published last, in the pipe's own clock [s]; minus infinity before.
-        heard: Whether another plugin counts on it.
+        is_received: Whether another plugin counts on it.
     """
 
     def __init__(self, now: Callable[[], float]):
         self.count = 0
         self.time = -math.inf
         self._now = now
-        self.heard = False
+        self.is_received = False
 
     def note(self) -> None:
         """Note that it was published."""
@@ -231,9 +231,9 @@ class NotedWriter(Writer):
         self._written = written
 
     @property
-    def heard(self) -> bool:  # type: ignore[override]
-        """See `Writer.heard`."""
-        return self._written.heard or self._writer.heard
+    def is_received(self) -> bool:  # type: ignore[override]
+        """See `Writer.received`."""
+        return self._written.is_received or self._writer.is_received
 
     def prepare(self, message: Message) -> None:
         """See `Writer.prepare`."""
@@ -257,7 +257,7 @@ class WrittenReader(Reader):
         self.topic = topic
         self._written = written
         self._seen = 0
-        written.heard = True
+        written.is_received = True
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""

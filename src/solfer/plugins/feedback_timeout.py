@@ -90,14 +90,14 @@ class FeedbackTimeout:
             where=record.where("source"),
         )
 
-    def read(self, now: float, way: float = 0.0) -> bool:
+    def read(self, now: float, distance: float = 0.0) -> bool:
         """Read the newest message at the time `now` [s]; return whether nothing is missing or late.
 
-        If not, `serves` tells what that means.
+        If not, `serves` reports what that means.
 
         Args:
             now: The time [s].
-            way: How far joints have been commanded to move so far [rad, m].
+            distance: How far joints have been commanded to move so far [rad, m].
         """
         feedback = self.feedback
         status = feedback.run()
@@ -105,10 +105,10 @@ class FeedbackTimeout:
         if feedback.changed != self._changed:
             self._changed = feedback.changed
             self._stamp = feedback.stamp
-            self._moved = way
+            self._moved = distance
         # in a simulation that pauses the stamps stay, too
         stays = self._changed < math.inf and feedback.stamp - self._stamp > FROZEN
-        frozen = stays and way - self._moved > STEPS and feedback.measures
+        frozen = stays and distance - self._moved > STEPS and feedback.measures
         late = late or frozen
         self._handed_over = handed_over = feedback.handovers != self._handovers
         if handed_over:  # another publisher measures another start
@@ -142,7 +142,7 @@ class FeedbackTimeout:
         return received or not feedback.required
 
     def restart(self) -> None:
-        """Begin anew: discard all that was received so far."""
+        """Begin again: discard all that was received so far."""
         self.feedback.restart()
         self._count = 0
         self.timed_out = False
@@ -221,11 +221,11 @@ class FeedbackTimeouts:
         self.feedbacks = tuple(watch.feedback for watch in watches)
         self.complete = False
 
-    def read(self, now: float, way: float = 0.0) -> None:
+    def read(self, now: float, distance: float = 0.0) -> None:
         """Read the newest messages, each pipe into its State or the component's input; see `FeedbackTimeout.read`."""
         complete = True
         for watch in self._feedback_timeouts:
-            if not watch.read(now, way):
+            if not watch.read(now, distance):
                 complete = False
         self.complete = complete
 
@@ -254,7 +254,7 @@ class FeedbackTimeouts:
         return min((watch.timeout for watch in self._feedback_timeouts), default=math.inf)
 
     def restart(self) -> None:
-        """Begin anew: discard all that was received so far."""
+        """Begin again: discard all that was received so far."""
         for watch in self._feedback_timeouts:
             watch.restart()
 

@@ -42,7 +42,7 @@ IGNORED = 0.1
 """Time after a claim in which refusals are ignored: they concern earlier commands; later ones are repeated [s]."""
 
 SETTLE = 0.15
-"""Time for publishers to begin anew, before the plugin that follows them does [s]; shorter than a lease."""
+"""Time for publishers to begin again, before the plugin that follows them does [s]; shorter than a lease."""
 
 
 class JointClaim:
@@ -55,14 +55,14 @@ class JointClaim:
         pipes: Its pipes to the lower level.
         middleware: Carries the requests.
         follows: Topics of other plugins that its commands follow.
-        publishes: Topics that it publishes to other plugins; the lower level reports when these begin anew.
+        publishes: Topics that it publishes to other plugins; the lower level reports when these begin again.
         position: Where the Robot's joints are measured, NaN: they are not, shape (robot.size,) [rad, m]; called at
             each claim. None: nothing is measured.
 
     Attributes:
         reason: Why the joints are not ours at present, in one line; empty without such a refusal.
         is_taken: Whether that is because others, or the lower level itself, have moved the joints since.
-        began_anew: Whether that is because the robot was put into another state: all plugins have to begin anew.
+        restarted: Whether that is because the robot was put into another state: all plugins have to begin again.
         refused: How often the lower level reported that it refuses our commands.
         note: Called with kind and text of the event when the joints become ours, are lost, or are given back.
     """
@@ -99,11 +99,11 @@ class JointClaim:
         self._next = -math.inf
         self._settled = -math.inf
         self._refusals = middleware.queue(REFUSED, REFUSALS)
-        self.began_anew = False
+        self.restarted = False
         self.is_taken = False
         self.refused = 0
         self.note: Callable[[str, str], None] = lambda kind, text: None
-        self._told = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
+        self._description = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
         self._complaint = ""
         self._throttle = Throttle(logger)
 
@@ -117,7 +117,7 @@ class JointClaim:
             self.reason = ""
             return self._middleware.now() >= self._settled
         if self._answer is None:
-            self._ask()
+            self._request()
         if self._answer is None or not self._answer.done():
             return False
         answer = self._reply(self._answer)
@@ -133,7 +133,7 @@ class JointClaim:
         self._since = now
         self.reason = ""
         self.is_taken = False
-        self.note(CLAIMED, self._told)
+        self.note(CLAIMED, self._description)
         self._settled = now + SETTLE if answer.again and self._claim.follows else now
         return now >= self._settled
 
@@ -150,14 +150,14 @@ class JointClaim:
                 self.note(LOST, self.reason)
         return bool(self.reason)
 
-    def begins_anew(self) -> bool:
-        """Return whether the robot was put into another state while the plugin waits; see `began_anew`."""
+    def restarts(self) -> bool:
+        """Return whether the robot was put into another state while the plugin waits; see `restarted`."""
         if self._refusals.waits:
             for message in self._refusals.drain():
                 if ALL_OWNERS in message.owners:
                     self.reason = message.reasons[message.owners.index(ALL_OWNERS)]
-                    self.began_anew = True
-        return self.began_anew
+                    self.restarted = True
+        return self.restarted
 
     def complaint(self) -> str:
         """Return what was wrong with commands since the last call; empty: nothing."""
@@ -172,7 +172,7 @@ class JointClaim:
 
     def lapse(self) -> None:
         """Give up the claim without a request, since nothing is sent for a while; it has to be requested again."""
-        self.began_anew = False
+        self.restarted = False
         if self._commands:
             self._granted = False
             self._answer = None
@@ -185,13 +185,13 @@ class JointClaim:
     def release(self) -> None:
         """Release the joints; does not wait for the answer."""
         if self._commands and (self._granted or self._answer is not None):
-            self.note(RELEASED, self._told)
+            self.note(RELEASED, self._description)
             self._release = self._middleware.request(
                 f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._claim.owner), Answer, PATIENCE
             )
         self.lapse()
 
-    def _ask(self) -> None:
+    def _request(self) -> None:
         """Request the claim, but only after a release has been answered: it must not end the new claim."""
         if self._middleware.now() < self._next or not self.released:
             return
@@ -223,14 +223,14 @@ class JointClaim:
         for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
             if owner == ALL_OWNERS:
                 self.reason = reason
-                self.began_anew = True
+                self.restarted = True
             elif owner in self._topics:
                 self.reason = self.reason or reason
             if owner != self._claim.owner:
                 continue
             self.refused += 1
             if claim:
-                self.reason = self.reason if self.began_anew else reason
+                self.reason = self.reason if self.restarted else reason
                 self.is_taken = True
             else:
                 self._complaint = f"the lower level refuses a command: {reason}"

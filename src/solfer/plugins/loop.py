@@ -244,7 +244,7 @@ class PluginLoop:
         if isinstance(failure, ClaimRefused | ReceiveTimeout | OutOfLimits):
             raise failure
         names = "', '".join(managed.name for managed in self.plugins.plugins)
-        said = f"plugins '{names}'" if len(self.plugins.plugins) > 1 else f"plugin '{names}'"
-        error = ComponentError(f"{said} failed, the robot holds: {located(failure, lines=True)}")
+        subject = f"plugins '{names}'" if len(self.plugins.plugins) > 1 else f"plugin '{names}'"
+        error = ComponentError(f"{subject} failed, the robot holds: {located(failure, lines=True)}")
         error.exit_code = 1
         raise error from failure

@@ -50,7 +50,7 @@ class Peer:
     @property
     def open(self) -> bool:
         """Whether to go on looking: the peer is missing, and is needed or was not warned about yet."""
-        if self._end.arrival > -math.inf if self._receives else self._end.heard:
+        if self._end.arrival > -math.inf if self._receives else self._end.is_received:
             self.found = True
         return not self.found and (self.needed or not self.fault)
 
@@ -84,13 +84,13 @@ class Peers:
         self._middleware = middleware
         self._begin = middleware.now()
         self._next = -math.inf
-        self._asked = False
+        self._has_called = False
         self._trouble = ""
 
     def look(self) -> None:
         """Ask for the topics of other nodes, if that is due; to be called about once a second. Does not block."""
         now = self._middleware.now()
-        if self._asked or now < self._next:
+        if self._has_called or now < self._next:
             return
         self._next = now + LOOK
         missing = [peer for peer in self._peers if peer.open]
@@ -98,7 +98,7 @@ class Peers:
             self._next = math.inf
         due = [peer for peer in missing if now >= self._begin + (NEEDED if peer.needed else OPTIONAL)]
         if due:
-            self._asked = True
+            self._has_called = True
             self._middleware.topics().add_done_callback(lambda answer: self._receive(answer, due, now))
 
     @property
@@ -122,7 +122,7 @@ class Peers:
             for peer in due:
                 self._judge(peer, topics, now)
         finally:
-            self._asked = False
+            self._has_called = False
 
     def _judge(self, peer: Peer, topics: Topics, now: float) -> None:
         before = peer.fault

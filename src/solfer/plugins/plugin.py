@@ -56,7 +56,7 @@ class PluginParts:
         middleware: The clock of the pipes.
         claim: Its claim on the joints that it commands; None: it commands none.
         peers: Supervises the other ends of its pipes; None: they are not supervised.
-        stall: Lateness of its own loop at which it begins anew [s]; see `StartConditions`.
+        stall: Lateness of its own loop at which it begins again [s]; see `StartConditions`.
         limits: When its loop is overloaded; None: the defaults.
         jumps: Finds jumps of the base; None: its component has no references in the world.
         guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
@@ -90,12 +90,12 @@ class Plugin:
 
     The component starts as soon as every required feedback has arrived and the claim on its joints is granted. When a
     feedback times out that it cannot do without, or the lower level refuses its commands, the plugin holds: wheels at
-    zero, positions as they were sent last. After `Component.reset` it starts anew from the measured state when it has
-    both again. It also starts anew
+    zero, positions as they were sent last. After `Component.reset` it starts again from the measured state when it has
+    both again. It also starts again
 
-    - when the simulation begins anew, without a command in between,
+    - when the simulation begins again, without a command in between,
     - when its own loop stood still (a debugger, swap, a suspended laptop): earlier requests may be outdated,
-    - when a plugin that follows it starts anew.
+    - when a plugin that follows it starts again.
 
     Args:
         parts: What it is made of.
@@ -186,7 +186,7 @@ class Plugin:
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._readiness.feedbacks.read(now, self.outputs.way)
+        self._readiness.feedbacks.read(now, self.outputs.distance)
         verdict = self._readiness.judge(now, life is RUNNING)
         end = clock()
         times[READ] = end - begin
@@ -317,16 +317,16 @@ class Plugin:
         elif verdict is FORGET:
             self.outputs.forget()
             self._readiness.forget(now)
-        self._begin_anew()
+        self._restart()
 
     def _awake(self, now: float) -> None:
         """Hold `now` [s], after the loop stood still, and drop messages and requests from before, also in the inbox."""
         if self.life is RUNNING:
             self._hold()
         self._readiness.forget(now)
-        self._begin_anew()
+        self._restart()
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         """Wait for what the plugin lacks, and reset a component that ran."""
         was_running = self.life is RUNNING
         self._wait()

@@ -29,7 +29,7 @@ _STATES = {"position": "position", "velocity": "velocity", "effort": "torque"}
 """Fields of a message of joints, and the interfaces of a State that they carry."""
 
 _UNITS = {"velocity": "m/s", "acceleration": "m/s2", "force": "N", "torque": "Nm"}
-"""Units of the quantities whose message does not tell."""
+"""Units of the quantities whose message does not contain them."""
 
 _FORMS = {
     "position": "{}",
@@ -46,7 +46,7 @@ _FORMS = {
 class PluginLog:
     """The live arrays of a plugin for a recording, as channels `<plugin>/<what>`.
 
-    `measured/<field>` and `wanted/<field>` are the States of its Robot, `feedback/<pipe>/...` the newest numbers of
+    `measured/<field>` and `desired/<field>` are the States of its Robot, `feedback/<pipe>/...` the newest numbers of
     each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets them, `timing` the
     stages of the cycle, `life` its state, how long commands blend in at least and the time that passed for the robot,
     `gate` how many values were held back, and `log/...` what the component declares.

@@ -63,7 +63,7 @@ class Readiness:
         """Judge what to do in this cycle, whose messages were read `now` [s]; claim the joints when all is there."""
         verdict = self._conditions.judge(now, running)
         claim = self._claim
-        if claim is not None and not running and claim.begins_anew():
+        if claim is not None and not running and claim.restarts():
             return self._conditions.judge_claim(claim, running)
         if verdict is not WORK or claim is None:
             return verdict
@@ -102,7 +102,7 @@ class Readiness:
         self._conditions.forgotten(now)
 
     def restart(self) -> None:
-        """Begin anew, as before the first cycle."""
+        """Begin again, as before the first cycle."""
         self.feedbacks.restart()
         self._conditions.restart()
 

@@ -15,19 +15,19 @@ class RequestNotes:
     """Notes requests, messages of declared topics and goals when they are carried out, in the order of the cycle.
 
     Attributes:
-        wanted: Whether somebody takes the notes.
+        enabled: Whether somebody takes the notes.
         notes: What happened since they were taken last: kind and text of an event. That of a request has name and
             fields, as JSON.
     """
 
     def __init__(self) -> None:
-        self.wanted = False
+        self.enabled = False
         self.notes: list[tuple[str, str]] = []
         self._calls: dict[str, Callable[[Mapping[str, Any]], Callable[[], Any]]] = {}
 
     def note(self, kind: str, text: str) -> None:
         """Note an event."""
-        if self.wanted:
+        if self.enabled:
             self.notes.append((kind, text))
 
     def noted(self, declaration: Declaration) -> Declaration:
@@ -77,7 +77,7 @@ class RequestNotes:
         )
 
     def _note(self, name: str, value: Any, handler: Callable[[Any], Any]) -> Any:
-        if self.wanted:
+        if self.enabled:
             self.notes.append((REQUEST, json.dumps([name, plain(value)], default=str)))
         return handler(value)
 

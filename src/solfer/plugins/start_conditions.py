@@ -19,7 +19,7 @@ FIRST = 60.0
 """Longest wait for the first messages of all required feedbacks [s]."""
 
 SETTLE = 0.1
-"""Time after a simulation began anew until received messages are certain to be new [s]."""
+"""Time after a simulation began again until received messages are certain to be new [s]."""
 
 STALL = 0.2
 """Default of the lateness of a plugin's own loop at which it starts again [s]. After less a component goes on, by the
@@ -56,7 +56,7 @@ class StartConditions:
         middleware: The clock of the pipes.
         claim: Its claim on the joints that it commands; None: it commands none.
         period: Time from one of its cycles to the next [s].
-        stall: Lateness of its loop at which it begins anew [s]; None: STALL or PERIODS, whichever is longer. It is
+        stall: Lateness of its loop at which it begins again [s]; None: STALL or PERIODS, whichever is longer. It is
             capped at the shortest timeout of a feedback, after which other plugins would hold, too.
 
     Attributes:
@@ -118,7 +118,7 @@ class StartConditions:
 
     def judge_claim(self, claim: JointClaim, running: bool) -> CycleVerdict:
         """Judge what a plugin does whose joints are not its own at present; see `judge`."""
-        if claim.began_anew:
+        if claim.restarted:
             self._past = f"after {claim.reason}"
             return FORGET
         self.lacks = f"for its joints: {claim.reason or 'not answered yet'}"

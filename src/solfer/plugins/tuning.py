@@ -65,18 +65,18 @@ class _Motion:
         self.goal: _Goal | None = None
         self._write = write
         self._begin = numbers
-        self._way = np.zeros_like(numbers)
+        self._ramp = np.zeros_like(numbers)
         self._is_finite = bool(np.isfinite(numbers).all())
 
     def go_on(self, time: float) -> bool:
         """Let the numbers be where they are to be at some time [s]; return whether they are still on their way."""
         if self.goal is not None:
             (goal, is_finite), begin, self.goal = self.goal, self.numbers, None
-            has_way = self._is_finite and is_finite
-            self._begin, self._way = (begin, goal - begin) if has_way else (goal, np.zeros_like(goal))
+            has_ramp = self._is_finite and is_finite
+            self._begin, self._ramp = (begin, goal - begin) if has_ramp else (goal, np.zeros_like(goal))
             self._is_finite = is_finite
         share = (time - self.since) / RAMP
-        self.numbers = self._begin + min(share, 1.0) * self._way
+        self.numbers = self._begin + min(share, 1.0) * self._ramp
         self._write(self.numbers)
         return share < 1.0
 

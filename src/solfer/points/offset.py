@@ -176,17 +176,17 @@ def finite(values: ArrayLike, size: int, what: str) -> np.ndarray:
 
 def chosen(
     kind: str,
-    wanted: Sequence[str | int] | None,
+    selected: Sequence[str | int] | None,
     count: int,
     names: Sequence[str],
     where: str,
     error: type[SolferError],
 ) -> np.ndarray:
-    """Convert wanted rows or DoFs to their indices, shape (m,), in the order in which they are wanted.
+    """Convert desired rows or DoFs to their indices, shape (m,), in the order in which they are desired.
 
     Args:
         kind: `row` or `DoF`, for errors.
-        wanted: Names or numbers, or a single one; None for all.
+        selected: Names or numbers, or a single one; None for all.
         count: How many there are.
         names: Their names, if they have any.
         where: Place of errors.
@@ -195,12 +195,12 @@ def chosen(
     Raises:
         UnknownName: There is no such name.
     """
-    if wanted is None:
+    if selected is None:
         return np.arange(count, dtype=np.int64)
     item: Any
     indices = []
     expected = "" if names else f"a number of a {kind}"
-    for item in [wanted] if np.isscalar(wanted) else wanted:
+    for item in [selected] if np.isscalar(selected) else selected:
         if isinstance(item, str) and item not in names:
             raise UnknownName(kind, item, names, where=where, expected=expected)
         index = names.index(item) if isinstance(item, str) else item

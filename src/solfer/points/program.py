@@ -114,7 +114,7 @@ def folded(point: Point, carried: np.ndarray, *instructions: Instruction) -> tup
 class Program:
     """Updates points in their order: compiled ones together by one call of the kernel, others by their own `update`.
 
-    It grows by instructions at its end. When an array has moved that it names, it is made anew.
+    It grows by instructions at its end. When an array has moved that it names, it is made again.
 
     Attributes:
         steps: What to call, each with whether Jacobians are computed.
@@ -129,7 +129,7 @@ class Program:
         self._count, self._watched = 0, set[int]()
 
     def expire(self) -> None:
-        """Take it that an array has moved: all is made anew by the next `complete`."""
+        """Take it that an array has moved: all is made again by the next `complete`."""
         self.is_current = False
         self._is_expired = True
 

@@ -9,7 +9,7 @@ from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.namespaces import STATISTICS
 
 LOOK = 0.05
-"""Time between two looks for a process that is missing, or has begun anew [s]."""
+"""Time between two looks for a process that is missing, or has begun again [s]."""
 
 
 class Heartbeat:

@@ -28,12 +28,12 @@ class ProcessEnd:
     `close` restores the earlier handlers.
 
     Args:
-        asked: Called at the request.
+        on_request: Called at the request.
     """
 
-    def __init__(self, asked: Callable[[], None] = lambda: None):
+    def __init__(self, on_request: Callable[[], None] = lambda: None):
         self._requested = False
-        self._asked = asked
+        self._on_request = on_request
         self._process = os.getpid()
         self._next_look = -float("inf")
         self._handler = self._on_signal  # one object, to be recognised
@@ -69,7 +69,7 @@ class ProcessEnd:
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self._requested = True
-        self._asked()
+        self._on_request()
         for each in SIGNALS:
             signal.signal(each, signal.SIG_DFL)
 

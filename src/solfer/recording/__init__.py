@@ -1,1 +1,1 @@
-"""Recordings: what a run measured, wanted and sent, and the MCAP file that holds it."""
+"""Recordings: what a run measured, desired and sent, and the MCAP file that holds it."""

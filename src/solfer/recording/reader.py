@@ -51,7 +51,7 @@ def read(path: Path) -> Recording:
         path: The file.
 
     Returns:
-        What it holds; where its writer came to no end, `missing` tells it, and rows that were lost on the way count.
+        What it holds; where its writer came to no end, `missing` reports it, and rows that were lost on the way count.
 
     Raises:
         RecordingError: There is no such file, or it is no recording.
@@ -239,7 +239,7 @@ def _gaps(sequence: np.ndarray) -> int:
     """Count the rows that lack between the first and the last one."""
     if len(sequence) < 2:
         return 0
-    steps = np.diff(sequence)  # of 32 bits, as the numbers are: they may begin anew
+    steps = np.diff(sequence)  # of 32 bits, as the numbers are: they may begin again
     return int(np.sum(steps, dtype=np.int64)) - len(steps) if np.all(steps > 0) else 0
 
 

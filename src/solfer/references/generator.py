@@ -104,14 +104,14 @@ class Swing(OffsetReference):
     def __init__(
         self, size: int, rates: int, cosine: np.ndarray, sine: np.ndarray, *, period: float, turns: float | None
     ):
-        way = math.inf if turns is None else turns * period
-        self._fade = min(0.25 * period, way)
-        self._way = way
+        phase_time = math.inf if turns is None else turns * period
+        self._fade = min(0.25 * period, phase_time)
+        self._duration = phase_time
         self._period = period
         self._cosine = cosine
         self._sine = sine
         self._frequency = math.tau / period
-        super().__init__(size, rates, len(cosine), duration=way + self._fade)
+        super().__init__(size, rates, len(cosine), duration=phase_time + self._fade)
         self._work = np.zeros(len(cosine))
 
     def looks(self) -> np.ndarray:
@@ -124,12 +124,12 @@ class Swing(OffsetReference):
         share = min(time, left, fade) / fade
         faded = fade * share**3 * (1.0 - 0.5 * share)
         if share == 1.0:
-            way = time - 0.5 * fade
+            phase_time = time - 0.5 * fade
         elif time <= left:
-            way = faded
+            phase_time = faded
         else:
-            way = self._way - faded
-        phase = self._frequency * way
+            phase_time = self._duration - faded
+        phase = self._frequency * phase_time
         cos = math.cos(phase)
         sin = math.sin(phase)
         rate = self._frequency * share * share * (3.0 - 2.0 * share)
@@ -174,7 +174,7 @@ class LineReference(OffsetReference):
         self._speed = speed
         self._given = duration
         self._back = back
-        self._way = to.copy()
+        self._duration = to.copy()
         self._time = 1.0
         self.start(self.origin.copy())
 
@@ -182,8 +182,8 @@ class LineReference(OffsetReference):
         """See `ReferenceGenerator.start`."""
         super().start(origin)
         if self._is_absolute:
-            np.subtract(self._to, self.origin[: len(self._to)], out=self._way)
-        length = float(np.linalg.norm(self._way))
+            np.subtract(self._to, self.origin[: len(self._to)], out=self._duration)
+        length = float(np.linalg.norm(self._duration))
         time = self._given if self._speed is None else self.PEAK * length / self._speed
         self._time = max(time or 0.0, 1e-3)
         self.duration = 2.0 * self._time if self._back else self._time
@@ -198,8 +198,8 @@ class LineReference(OffsetReference):
             time = 2.0 * self._time - time
             sign = -1.0
         u = time / self._time
-        np.multiply(self._way, u**3 * (10.0 + u * (6.0 * u - 15.0)), out=self._offset)
-        np.multiply(self._way, sign * 30.0 * (u * (1.0 - u)) ** 2 / self._time, out=self._rate)
+        np.multiply(self._duration, u**3 * (10.0 + u * (6.0 * u - 15.0)), out=self._offset)
+        np.multiply(self._duration, sign * 30.0 * (u * (1.0 - u)) ** 2 / self._time, out=self._rate)
 
 
 def turned_by(by: np.ndarray, quaternion: np.ndarray) -> tuple[float, ...]:

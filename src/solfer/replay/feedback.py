@@ -19,7 +19,7 @@ SAME = 1e-7
 class RecordedFeedbackPipe(FeedbackPipe):
     """Stands in for a pipe: writes the numbers that it had received in each cycle, and filters them as it does.
 
-    A pipe that the recording does not have takes what was measured, or wanted, of its DoFs.
+    A pipe that the recording does not have takes what was measured, or desired, of its DoFs.
 
     Args:
         pipe: The pipe.

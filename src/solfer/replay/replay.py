@@ -53,7 +53,7 @@ class Replay:
     unrepeated: list[str] = field(init=False, default_factory=list)
     commands: dict[str, Channel] = field(init=False, default_factory=dict)
     work: Callable[[], None] = field(init=False)
-    _asked: dict[int, list[str]] = field(init=False, default_factory=dict)
+    _requests: dict[int, list[str]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.work = self.plugin.cycle
@@ -74,7 +74,7 @@ class Replay:
             for pipe, _ in self.plugin.outputs.controllers
             if isinstance(pipe, JointCommandPipe)
         }
-        self._asked = rows.requests()
+        self._requests = rows.requests()
         self.running = np.zeros(len(rows.times), dtype=bool)
         for row, time in enumerate(rows.times):
             self.middleware.time = float(time)
@@ -120,7 +120,7 @@ class Replay:
         if isinstance(plugin.robot_time, RecordedTime):
             plugin.robot_time.row = row
         self.claim.ours = bool(state == PluginState.RUNNING)
-        for note in self._asked.pop(row, ()):
+        for note in self._requests.pop(row, ()):
             self._repeat(note)
         plugin.blend_in(float(self.rows.blends[row]))
         try:
@@ -151,8 +151,8 @@ class Replay:
         """Count positions, shape (T, n) [rad, m], as the recorded driver did; a replay receives the Robot's count."""
         recorded = self.rows.channel(channel.name.partition("/")[2])
         if recorded is not None and set(channel.columns) <= set(recorded.columns):
-            ways = numbers - self.rows.values(recorded, channel.columns)
-            numbers -= whole_turns(np.nan_to_num(ways), turns)
+            differences = numbers - self.rows.values(recorded, channel.columns)
+            numbers -= whole_turns(np.nan_to_num(differences), turns)
 
     def _keep(self, row: int, sources: list[LogSource], values: list[np.ndarray]) -> None:
         for source, numbers in zip(sources, values, strict=True):

@@ -51,7 +51,7 @@ def build(
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
     for each lower-level controller that the plugin commands, and `LOWER_LEVEL` for all of them together; and
     `FEEDBACK`, the order of the first feedback of the measured joints. In a real-time layer `XBOT` is the order in
-    which the lower level tells its joints, or is told them. A predefined map that no pipe uses is left out
+    which the lower level publishes and receives its joints. A predefined map that no pipe uses is left out
     if its source is not there. In mode `idle`, which sends no command, all actuated DoFs in the Robot's order replace
     the joints of a controller that does not answer.
 
@@ -82,7 +82,7 @@ class _Builder:
         self._goes_on = goes_on
         self.faults: list[SolferError] = []
         self._patience = TIMEOUT
-        self._asks = True
+        self._waits = True
 
     def robot(self, beside: Robot | None) -> Robot:
         models = dict(self._models())
@@ -93,7 +93,7 @@ class _Builder:
             check_names(self._configuration, RobotNames.of_robot(robot, others), problems)
             self.faults += problems.errors
         self._raise()
-        self._asks = not self.faults
+        self._waits = not self.faults
         for name, model in models.items():
             self._add_model(robot, name, model)
         self._add_topic_maps(robot)
@@ -163,7 +163,7 @@ class _Builder:
         return None
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
-        if not self._asks:
+        if not self._waits:
             self._add(robot, name, robot.dofs, where=where)
             return
         message = record.travels_as if isinstance(record, FeedbackRecord) else record.message
@@ -175,7 +175,7 @@ class _Builder:
             self._add(robot, name, self._with_base(robot, name, order), where=where)
 
     def _with_base(self, robot: Robot, name: str, order: tuple[str, ...]) -> tuple[str, ...]:
-        """Add the floating base's DoFs to an order that a robot tells, where a pipe carries them in it.
+        """Add the floating base's DoFs to the order of a robot, where a pipe carries them in it.
 
         No robot measures or drives its base like a joint: orders from outside lack it (Listing 14 of the paper).
         """
@@ -204,7 +204,7 @@ class _Builder:
         joints: dict[str, None] = {}
         idle = self._configuration.module.mode == "idle"
         for record in self._lower_level():
-            if not self._asks:
+            if not self._waits:
                 order = _actuated(robot)
             elif idle:
                 order = self._try(partial(self._idle_joints, record, robot))
@@ -256,10 +256,10 @@ class _Builder:
     def _add(self, robot: Robot, name: str, external: tuple[str, ...], where: str) -> None:
         self._try(lambda: robot.maps.add(BidirectionalMap(name, robot.dofs, external)), where)
 
-    def _wait(self, ask: Callable[[float], Any]) -> Any:
-        """Call like `_try`, where an answer may be missing; `ask` gets the time that it may wait [s]."""
+    def _wait(self, query: Callable[[float], Any]) -> Any:
+        """Call like `_try`, where an answer may be missing; `query` gets the time that it may wait [s]."""
         faults = len(self.faults)
-        answer = self._try(lambda: ask(self._patience))
+        answer = self._try(lambda: query(self._patience))
         if len(self.faults) > faults:
             self._patience = SHORT_TIMEOUT
         return answer

@@ -81,7 +81,7 @@ def _pattern(node: YamlNode, problems: Problems) -> list[Step]:
         problems.add(pattern.mark, f"expected a map of numbered steps, got {pattern.kind}", "1: and a step, 2: ...")
         return []
     steps = []
-    wanted = 1
+    expected = 1
     ended = False
     for key, child in pattern.items():
         if not (key.isascii() and key.isdecimal()) or key != str(int(key)):
@@ -91,13 +91,13 @@ def _pattern(node: YamlNode, problems: Problems) -> list[Step]:
         number = int(key)
         if number == 0:
             problems.warn(child.head, "step 0 is never reached: steps begin at 1")
-        elif number == wanted and not ended:
+        elif number == expected and not ended:
             steps += [step] if step is not None else []
-            wanted += 1
+            expected += 1
         elif not ended:
             ended = True
-            problems.warn(child.head, f"step {number} and all below it are never reached: here should be {wanted}")
-    if wanted == 1 and not problems:
+            problems.warn(child.head, f"step {number} and all below it are never reached: here should be {expected}")
+    if expected == 1 and not problems:
         problems.add(pattern.head, "the pattern does not begin with step 1", "steps that are numbered from 1 on")
     return steps
 

@@ -124,9 +124,9 @@ class _Move(PlayedStep):
 
     def longest(self, script: Script) -> float:
         far = np.abs(self._base - script.base)
-        ways = np.where(far <= self._base_near, 0.0, far).tolist()
+        distances = np.where(far <= self._base_near, 0.0, far).tolist()
         speeds = script.base_speed.tolist()
-        base = max(_straight(way, speed * script.period) for way, speed in zip(ways, speeds, strict=True))
+        base = max(_straight(distance, speed * script.period) for distance, speed in zip(distances, speeds, strict=True))
         left = np.abs(self._vertices - script.vertices).ravel().tolist()
         shares = script.vertex_speed.ravel().tolist()
         return max(base, *(_exponential(*each, script.period) for each in zip(left, shares, strict=True)))

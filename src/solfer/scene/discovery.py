@@ -31,22 +31,22 @@ class DiscoveredTopics:
         self._messages = messages
         self._space = middleware.resolve("x")[:-1]
         self._readers: dict[str, dict[str, Reader]] = {name: {} for name in messages}
-        self._asked: Future[Topics] | None = None
+        self._pending: Future[Topics] | None = None
         self._next = 0.0
         self._throttle = Throttle(logger, 5.0)
 
     def update(self) -> None:
         """Ask for topics now and then, and subscribe what is new."""
         now = self._middleware.now()
-        if self._asked is None and now >= self._next:
-            self._asked = self._middleware.topics()
+        if self._pending is None and now >= self._next:
+            self._pending = self._middleware.topics()
             self._next = now + EVERY
-        if self._asked is None or not self._asked.done():
+        if self._pending is None or not self._pending.done():
             return
-        asked = self._asked
-        self._asked = None
+        pending = self._pending
+        self._pending = None
         try:
-            published = asked.result().published
+            published = pending.result().published
         except MiddlewareError as error:  # it is asked again
             self._throttle.warning("topics", "topics are not known: %s", error.line)
             return

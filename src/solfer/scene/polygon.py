@@ -16,9 +16,9 @@ def hull(points: np.ndarray) -> list[int]:
     """
     order = sorted(range(len(points)), key=lambda index: (points[index, 0], points[index, 1]))
     half: list[int] = []
-    for way in (order, order[::-1]):
+    for side in (order, order[::-1]):
         start = len(half)
-        for index in way:
+        for index in side:
             while len(half) - start >= 2 and _turn(points, half[-2], half[-1], third=index) <= 0.0:
                 half.pop()
             half.append(index)

@@ -159,7 +159,7 @@ class Simulation:
     def reset(self, state: str | None = None, placement: StartPlacement = ORIGIN, seed: int | None = None) -> None:
         """Begin again at rest in a named state (default: the start), upright on the ground below the robot.
 
-        Commands and pushes are forgotten, movable parts of the world are where they were, noise begins anew. Time goes
+        Commands and pushes are forgotten, movable parts of the world are where they were, noise begins again. Time goes
         on, and friction stays as it was set. What follows is bitwise what follows the same reset at any other time.
 
         Args:

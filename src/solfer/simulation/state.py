@@ -101,7 +101,7 @@ class SimulationState:
         now: What it does after the newest step.
         before: What it did at the beginning of that step.
         contact_points: Lists the points at which the world pushed the robot in that step.
-        clock: Tells the simulated time [s].
+        clock: Reads the simulated time [s].
         motors: The motors behind springs; None: no joint has a spring.
     """
 

@@ -54,7 +54,7 @@ def search(
                 if (result := folder.result(run)) is not None:
                     _report(study, waiting.pop(run.id), record, result=result)
             while len(waiting) < workers and len(folder.runs) < record.trials:
-                run = _asked(study, folder, record)
+                run = _search(study, folder, record)
                 waiting[run.id] = run.index
             progress.look()
             progress.show()
@@ -71,7 +71,7 @@ def search(
     return folder.write_table()
 
 
-def _asked(study: Any, folder: StudyFolder, record: SearchRecord) -> PlannedRun:
+def _search(study: Any, folder: StudyFolder, record: SearchRecord) -> PlannedRun:
     """Add the run of a new trial to the plan; a trial that a killed search has left without a run is used first."""
     number = len(folder.runs)
     trial = study.ask() if len(study.trials) <= number else _resumed(study, number)

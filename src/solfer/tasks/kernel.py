@@ -168,7 +168,7 @@ def _complete(basis, start, free, work):
     """Write orthonormal columns F that span what the first `start` rows of the basis leave; return how many there are.
 
     Each begins as the unit vector of which most is left, as in a Cholesky decomposition of the projector
-    F F' = 1 - W' W with pivoting, whose diagonal tells that.
+    F F' = 1 - W' W with pivoting, whose diagonal reports that.
     """
     cols = basis.shape[1]
     total = _dimensions(basis, start)

@@ -33,7 +33,7 @@ class Policy(enum.Enum):
     STOP = "stop"
     """`QpFailed` is raised: the plugin stops, and its joints hold."""
     RELAX = "relax"
-    """The first level is solved anew with slacks for constraints; where that fails, and for others, `HOLD`."""
+    """The first level is solved again with slacks for constraints; where that fails, and for others, `HOLD`."""
 
 
 class QpFailed(TaskError):
@@ -111,8 +111,8 @@ class QpHierarchy:
         ]
         self._relaxed_level: QpLevel | None = None
         if self.policy is Policy.RELAX and self._inequalities.rows:
-            gives_way = np.isinf(weights) & _named(self._inequalities.names, relax)
-            weights = np.where(gives_way, RELAXATION, weights)
+            yields = np.isinf(weights) & _named(self._inequalities.names, relax)
+            weights = np.where(yields, RELAXATION, weights)
             self._relaxed_level = QpLevel(
                 self.stack, 0, bounds, inequalities=self._inequalities, weights=weights, basis=basis
             )
@@ -222,12 +222,12 @@ class QpHierarchy:
             yield task.name, float(np.linalg.norm(left))
 
 
-def _named(names: np.ndarray, wanted: Sequence[str] | None) -> np.ndarray:
-    """Return which rows are of the wanted constraints, of all if there are none."""
-    for name in wanted or ():
+def _named(names: np.ndarray, selected: Sequence[str] | None) -> np.ndarray:
+    """Return which rows are of the desired constraints, of all if there are none."""
+    for name in selected or ():
         if name not in names:
             raise UnknownName("constraint", name, dict.fromkeys(names))
-    return np.full(len(names), True) if wanted is None else np.isin(names.astype(str), list(wanted))
+    return np.full(len(names), True) if selected is None else np.isin(names.astype(str), list(selected))
 
 
 def _policy(policy: Policy | str) -> Policy:

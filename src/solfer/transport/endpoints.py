@@ -134,12 +134,12 @@ class Writer(abc.ABC):
     Attributes:
         topic: Resolved name of the topic.
         carries: Type of its messages, by the middleware's name; empty: no other node can be on this topic.
-        heard: Whether a plugin of the same process receives it, which no other node sees.
+        is_received: Whether a plugin of the same process receives it, which no other node sees.
     """
 
     topic: str
     carries: str = ""
-    heard: bool = False
+    is_received: bool = False
 
     def prepare(self, message: Message) -> None:  # noqa: B027 most have nothing to do
         """Do ahead what would make the first `write` of such a message slow; sends nothing."""

@@ -41,7 +41,7 @@ class FixedRateLoop:
         self._begin = self.deadline = clock.now()
 
     def restart(self) -> None:
-        """Begin anew: the next cycle is due now."""
+        """Begin again: the next cycle is due now."""
         self._turn, self._begin = 0, self._now()
         self.deadline = self._begin
 

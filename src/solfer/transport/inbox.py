@@ -25,8 +25,8 @@ class Inbox:
         refused: Calls refused because too many others were waiting.
         most: The largest number of calls, urgent ones left out, that a cycle has run.
         sources: Called with the `refusal` before the queued calls: they receive what comes in by topics.
-        mail: Tells whether anything may wait in these topics; without it the sources are not called, unless there is a
-            `refusal`.
+        mail: Reports whether anything may wait in these topics; without it the sources are called only
+            where there is a `refusal`.
     """
 
     def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING) -> None:

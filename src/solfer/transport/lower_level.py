@@ -28,7 +28,7 @@ ALL_OWNERS = "*"
 requests have no meaning any more."""
 
 TOPIC = "topic "
-"""Prefix of an owner in a refusal that names a topic: the plugin that follows the topic begins anew, and so must the
+"""Prefix of an owner in a refusal that names a topic: the plugin that follows the topic begins again, and so must the
 plugin that publishes it."""
 
 
@@ -65,7 +65,7 @@ class ClaimRequest:
         joints: The joints of those controllers that are claimed; empty: all of them.
         positions: Where the owner measures each of `joints` [rad, m], NaN: it does not; empty: it measures none.
         follows: Topics of other plugins that the commands follow. Their publishers are informed when the owner begins
-            anew: the robot has held meanwhile, so what was asked of them before is not wanted any more.
+            again: the robot has held meanwhile, so what was asked of them before is not desired any more.
     """
 
     owner: str
@@ -103,7 +103,7 @@ class ClaimAnswer:
     """Whether a claim is granted, and if not why.
 
     Attributes:
-        again: The owner had commanded before: the publishers of the topics that it follows have to begin anew.
+        again: The owner had commanded before: the publishers of the topics that it follows have to begin again.
         later: The refusal is temporary: no other plugin commands these joints at present.
     """
 

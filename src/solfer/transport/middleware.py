@@ -179,7 +179,7 @@ class Middleware(abc.ABC):
         return self.writer(topic, message)
 
     def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
-        """Return a function that tells whether messages may wait in any of these queues, as `Queue.waits` does."""
+        """Return a function that reports whether messages may wait in any of these queues, as `Queue.waits` does."""
         return partial(any, [queue.waits for queue in queues])
 
     def require_fields(self, interface: str, message: type) -> None:  # noqa: B027 most have no types
@@ -267,7 +267,7 @@ class Middleware(abc.ABC):
             )
         except MiddlewareError as error:
             raise MiddlewareError(
-                f"lower-level controller '{controller}' does not tell its gains: {error.what}",
+                f"lower-level controller '{controller}' does not report its gains: {error.what}",
                 where=where,
                 expected="an impedance controller, or a pipe without stiffness and damping",
             ) from error

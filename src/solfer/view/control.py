@@ -31,7 +31,7 @@ TURN = 2.0
 CMD_VEL = "cmd_vel"
 TWIST = "geometry_msgs/Twist"
 
-WAYS = {
+DIRECTIONS = {
     "ahead": (1.0, 0.0, 0.0),
     "back": (-1.0, 0.0, 0.0),
     "left": (0.0, 1.0, 0.0),
@@ -71,7 +71,7 @@ class PageControl:
         self._frames: Mapping[str, ScenePose] = {}
         self._moved: set[str] = set()
         self._writers: dict[str, Writer] = {}
-        self._way = (0.0, 0.0, 0.0)
+        self._direction = (0.0, 0.0, 0.0)
         self._pressed = -math.inf
         self._drives = False
         self._topics: Future[Topics] | None = None
@@ -83,22 +83,22 @@ class PageControl:
             give = gui.add_button("give it back")
             self._module = gui.add_dropdown("base", ("",))
             self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
-            pads = {name: gui.add_button(name) for name in WAYS}
+            pads = {name: gui.add_button(name) for name in DIRECTIONS}
 
         @take.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            requests.ask(partial(self._take, event.client_id))
+            requests.submit(partial(self._take, event.client_id))
 
         @give.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            requests.ask(partial(self._give, event.client_id))
+            requests.submit(partial(self._give, event.client_id))
 
         for name, button in pads.items():
-            self._connect(button, WAYS[name])
+            self._connect(button, DIRECTIONS[name])
 
         @viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:
-            requests.ask(partial(self._give, client.client_id))
+            requests.submit(partial(self._give, client.client_id))
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is commanded; without a scene, None, nothing is."""
@@ -183,14 +183,14 @@ class PageControl:
         self._holder = None
         self._state.content = FREE
 
-    def _connect(self, button: GuiButtonHandle, way: tuple[float, float, float]) -> None:
+    def _connect(self, button: GuiButtonHandle, direction: tuple[float, float, float]) -> None:
         @button.on_hold(callback_hz=10.0)
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            self._requests.ask(partial(self._press, event.client_id, way))
+            self._requests.submit(partial(self._press, event.client_id, direction))
 
-    def _press(self, client: int | None, way: tuple[float, float, float]) -> None:
+    def _press(self, client: int | None, direction: tuple[float, float, float]) -> None:
         if self._is_holder(client):
-            self._way, self._pressed = way, self._middleware.now()
+            self._direction, self._pressed = direction, self._middleware.now()
 
     def _drive(self, now: float) -> None:
         """Publish the velocity while a button is pressed, then zero once."""
@@ -199,7 +199,7 @@ class PageControl:
         if not module or not (pressed or self._drives):
             return
         speed = float(self._speed.value) if pressed else 0.0
-        x, y, turn = (speed * each for each in self._way)
+        x, y, turn = (speed * each for each in self._direction)
         if module not in self._writers:
             topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
             self._writers[module] = self._middleware.declared_writer(topic, TWIST)
@@ -235,7 +235,7 @@ class PageControl:
         async def moved(event: TransformControlsEvent) -> None:
             place = handle.position.copy()
             turn = handle.wxyz.copy()
-            self._requests.ask(partial(self._drag, name, event.client_id, event.phase, position=place, turn=turn))
+            self._requests.submit(partial(self._drag, name, event.client_id, event.phase, position=place, turn=turn))
 
         handle.on_update(moved)
         return handle

@@ -36,7 +36,7 @@ class EmergencyStopButton:
 
         def stop(_: object) -> None:
             modal.close()
-            self._requests.ask(self._stop)
+            self._requests.submit(self._stop)
 
         confirm.on_click(stop)
         cancel.on_click(lambda _: modal.close())

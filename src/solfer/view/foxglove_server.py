@@ -152,7 +152,7 @@ class FoxgloveServer(ServerListener):
     ) -> list[Parameter]:
         """Let parameters change; their present values are returned, and the new ones published once they count."""
         for each in parameters:
-            self._requests.ask(partial(self._set, each.name, each.get_value()))
+            self._requests.submit(partial(self._set, each.name, each.get_value()))
         return self.on_get_parameters(client, [each.name for each in parameters])
 
     def _set(self, name: str, value: Any) -> None:

@@ -24,7 +24,7 @@ class KnownParameters:
     def __init__(self, middleware: Middleware):
         self._middleware = middleware
         self.known: dict[str, ParametersReply] = {}
-        self._asked: dict[str, Future[ParametersReply]] = {}
+        self._pending: dict[str, Future[ParametersReply]] = {}
         self._left: dict[str, int] = {}
         self._next: dict[str, float] = {}
 
@@ -32,14 +32,14 @@ class KnownParameters:
         """Ask, and take the answers that are there."""
         now = self._middleware.now()
         for part in parts:
-            if part in self._asked:
+            if part in self._pending:
                 self._take(part)
             elif self._left.setdefault(part, TRIALS) and now >= self._next.get(part, -math.inf):
                 self._left[part] -= 1
                 self._next[part] = now + PAUSE
                 service = self._middleware.resolve(f"{part}/{GET_PARAMETERS}")
                 answer = self._middleware.request(service, GETTING, GetParameters(), ParametersReply, PAUSE)
-                self._asked[part] = answer
+                self._pending[part] = answer
 
     def forget(self, part: str) -> None:
         """Let a part be asked again, since its parameters have changed."""
@@ -47,8 +47,8 @@ class KnownParameters:
         self._next[part] = -math.inf
 
     def _take(self, part: str) -> None:
-        if self._asked[part].done():
-            answer = self._asked.pop(part)
+        if self._pending[part].done():
+            answer = self._pending.pop(part)
             if answer.exception() is None:
                 self._left[part] = 0
                 self.known[part] = answer.result()

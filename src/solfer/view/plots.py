@@ -40,8 +40,8 @@ class Plots:
             self._choice = gui.add_dropdown("column", (NOTHING,))
             add = gui.add_button("add")
             clear = gui.add_button("clear")
-        add.on_click(lambda _: requests.ask(self._add))
-        clear.on_click(lambda _: requests.ask(self._clear))
+        add.on_click(lambda _: requests.submit(self._add))
+        clear.on_click(lambda _: requests.submit(self._clear))
 
     def update(self, now: float) -> None:
         """Take a sample at some time [s]; where time goes back the plot begins again."""

@@ -92,7 +92,7 @@ class _PluginTab:
 
         @buttons.on_click
         async def _(event: GuiEvent[Any]) -> None:
-            self._requests.ask(partial(self._switch, event.client_id, buttons.value))
+            self._requests.submit(partial(self._switch, event.client_id, buttons.value))
 
     def _switch(self, client: int | None, verb: str) -> None:
         if self._control is None or not self._control.may_command(client):
@@ -128,7 +128,7 @@ class _PluginTab:
         async def _(event: GuiEvent[Any]) -> None:
             if event.client is not None:
                 text = control.value if isinstance(control.value, str) else json.dumps(control.value)
-                self._requests.ask(partial(self._set, event.client_id, name, text))
+                self._requests.submit(partial(self._set, event.client_id, name, text))
 
     def _set(self, client: int | None, name: str, text: str) -> None:
         if self._control is not None and self._control.may_command(client):

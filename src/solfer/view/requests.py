@@ -31,12 +31,12 @@ class PageRequests:
     def __init__(self, middleware: Middleware, viser: ViserServer):
         self.middleware = middleware
         self._viser = viser
-        self._asked = SimpleQueue[Callable[[], None]]()
+        self._pending = SimpleQueue[Callable[[], None]]()
         self._answers: list[tuple[Future[Any], str, Callable[[Any], None]]] = []
 
-    def ask(self, work: Callable[[], None]) -> None:
+    def submit(self, work: Callable[[], None]) -> None:
         """Let the loop do some work; from any thread."""
-        self._asked.put(work)
+        self._pending.put(work)
 
     def call(
         self, service: str, interface: str, request: Any, reply: type, done: Callable[[Any], None] = lambda _: None
@@ -49,7 +49,7 @@ class PageRequests:
         """Carry out what is there."""
         while True:
             try:
-                work = self._asked.get_nowait()
+                work = self._pending.get_nowait()
             except Empty:
                 break
             work()

@@ -29,18 +29,18 @@ class TimeLine:
         self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, STEP, 0.0)
         self._button: GuiButtonHandle = gui.add_button("pause")
         speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
-        self._button.on_click(lambda _: requests.ask(self._toggle))
+        self._button.on_click(lambda _: requests.submit(self._toggle))
 
         @self._slider.on_update
         async def _(event: object) -> None:
             time = self._slider.value
             if event.client is not None:  # type: ignore[attr-defined]
-                requests.ask(lambda: self._scrub(time))
+                requests.submit(lambda: self._scrub(time))
 
         @speed.on_update
         async def _(_: object) -> None:
             factor = float(speed.value)
-            requests.ask(lambda: setattr(playback, "speed", factor))
+            requests.submit(lambda: setattr(playback, "speed", factor))
 
     def update(self) -> None:
         """Show the present time."""

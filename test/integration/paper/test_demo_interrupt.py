@@ -20,7 +20,7 @@ DRIVES = 0.5
 """Speed of a wheel at which the robot is under way [rad/s]."""
 LOOK = 0.5
 """Time between two looks at the recording, which grows [s]."""
-MEASURED, WANTED = "full_compensation/measured/velocity", "full_compensation/wanted/velocity"
+MEASURED, DESIRED = "full_compensation/measured/velocity", "full_compensation/wanted/velocity"
 
 
 def speeds(folder: Path, channel: str) -> np.ndarray:
@@ -77,5 +77,5 @@ def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
     assert "Traceback" not in log.read_text() + (tmp_path / "out" / "roslaunch.log").read_text()
     until(lambda: not named(str(tmp_path)), lambda: f"the end of {named(str(tmp_path))}")
     if later is None:
-        assert np.abs(speeds(tmp_path, WANTED)[-1]).max() < ROCKS
+        assert np.abs(speeds(tmp_path, DESIRED)[-1]).max() < ROCKS
         assert np.abs(speeds(tmp_path, MEASURED)[-20:]).mean(axis=0).max() < ROCKS

@@ -32,7 +32,7 @@ def test_the_page_shows_what_is_printed(repository, capsys):
 def test_the_constant_velocity_belongs_to_the_way(tmp_path):
     trace = ScenarioTrace(made(tmp_path, [{"type": "wait", "steps": 200}], base_const_vel=[0.3, 0.4, 0.0, 0.1]))
     np.testing.assert_allclose(trace.base[-1], (0.6, 0.8, 0.0, 0.2), atol=1e-12)
-    assert trace.way[-1] == pytest.approx(1.0) and trace.times[-1] == pytest.approx(2.0)
+    assert trace.distance[-1] == pytest.approx(1.0) and trace.times[-1] == pytest.approx(2.0)
 
 
 @pytest.mark.slow
@@ -61,4 +61,4 @@ def test_the_rows_of_a_long_file_add_up(repository):
     rows = list(trace.rows())[1:]
     assert len(rows) == 18
     assert sum(float(row[3]) for row in rows) == pytest.approx(trace.scenario.duration)
-    assert sum(float(row[8]) for row in rows) == pytest.approx(trace.way[-1], abs=0.01)
+    assert sum(float(row[8]) for row in rows) == pytest.approx(trace.distance[-1], abs=0.01)

@@ -58,15 +58,15 @@ class Sensors:
         """Let a cycle pass; what arrives in it stands in the histories, and the newest in the State."""
         self.time += CYCLE
         for which, (history, period) in enumerate(((self.joints, JOINTS), (self.imu, IMU))):
-            under_way, history.count = self._under_way[which], 0
+            in_progress, history.count = self._under_way[which], 0
             while self._next[which] <= self.time + 1e-9:
                 stamp, self._next[which] = self._next[which], self._next[which] + period
                 delay = self._random.uniform(0.0, self._late[which])
                 if self._random.uniform() >= self._lost[which]:
-                    under_way.append((stamp + delay, stamp))
-            for arrival, stamp in sorted(each for each in under_way if each[0] <= self.time):
+                    in_progress.append((stamp + delay, stamp))
+            for arrival, stamp in sorted(each for each in in_progress if each[0] <= self.time):
                 history.add(CLOCK + stamp - which * self._behind, arrival, self.numbers(which, stamp))
-            self._under_way[which] = [each for each in under_way if each[0] > self.time]
+            self._under_way[which] = [each for each in in_progress if each[0] > self.time]
             if history.count:
                 newest = history.values[history.count - 1]
                 self.robot.state.position[history.dofs], self.robot.state.velocity[history.dofs] = newest

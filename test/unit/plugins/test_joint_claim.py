@@ -115,11 +115,11 @@ def test_a_robot_in_another_state_is_known_while_waiting():
     claim, _, bus = meet(ClaimAnswer())
     refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
     refusals.write(RefusalMessage(("cart", "other"), (True, True), ("early", "else")))
-    assert not claim.begins_anew()
+    assert not claim.restarts()
     refusals.write(RefusalMessage(("other", ALL_OWNERS), (True, True), ("else", "another state")))
-    assert claim.begins_anew() and claim.reason == "another state"
+    assert claim.restarts() and claim.reason == "another state"
     claim.lapse()
-    assert not claim.begins_anew()
+    assert not claim.restarts()
 
 
 def test_a_component_claims_and_releases_in_its_name():
@@ -176,11 +176,11 @@ def test_refusals_of_earlier_commands_are_ignored():
     assert not claim.lost() and claim.refused == 0
     bus.run_until(IGNORED)
     refusals.write(RefusalMessage(("cart", "other"), (True, True), ("fallen", "else")))
-    assert claim.lost() and (claim.reason, claim.refused, claim.began_anew) == ("fallen", 1, False)
+    assert claim.lost() and (claim.reason, claim.refused, claim.restarted) == ("fallen", 1, False)
     refusals.write(RefusalMessage((ALL_OWNERS, "cart"), (True, True), ("another state", "void")))
-    assert claim.lost() and (claim.reason, claim.refused, claim.began_anew) == ("another state", 2, True)
+    assert claim.lost() and (claim.reason, claim.refused, claim.restarted) == ("another state", 2, True)
     claim.lapse()
-    assert not claim.began_anew
+    assert not claim.restarted
 
 
 def test_a_wrong_command_is_a_complaint(caplog):

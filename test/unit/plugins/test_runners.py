@@ -106,8 +106,8 @@ def test_requires_of_a_lone_plugin_is_logged(write, caplog, shared):
     caplog.set_level(logging.INFO, "solfer")
     file = write(("chain: all             #", "requires: [odometry]\n      chain: all             #"))
     require_ros(load(file, "joint_states"), str, shared=shared)
-    told = [text for text in caplog.messages if text.endswith("has no effect: 'joint_states' runs alone")]
-    assert [text.startswith(f"main.yaml:{LINE + 7}:") for text in told] == ([] if shared else [True])
+    explanation = [text for text in caplog.messages if text.endswith("has no effect: 'joint_states' runs alone")]
+    assert [text.startswith(f"main.yaml:{LINE + 7}:") for text in explanation] == ([] if shared else [True])
 
 
 def test_a_layer_refuses_plugins_for_ros_alone(write):

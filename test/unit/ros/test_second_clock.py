@@ -17,7 +17,7 @@ def test_the_first_living_publisher_is_named(monkeypatch, answer, lives, registe
         return answer
 
     monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": registered}, {}, {}))
-    monkeypatch.setattr(master, "ask_master", lambda method, node: f"http://{node}")
+    monkeypatch.setattr(master, "call_master", lambda method, node: f"http://{node}")
     monkeypatch.setattr(master, "ask", ask)
     if own == "/first" or not lives:
         master.refuse_second("/clock", own)
@@ -27,9 +27,9 @@ def test_the_first_living_publisher_is_named(monkeypatch, answer, lives, registe
 
 
 def test_a_publisher_that_the_master_forgets_is_none(monkeypatch):
-    def ask_master(method, node):
+    def call_master(method, node):
         raise rosgraph.MasterError("unknown node")
 
     monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": ["/first"]}, {}, {}))
-    monkeypatch.setattr(master, "ask_master", ask_master)
+    monkeypatch.setattr(master, "call_master", call_master)
     master.refuse_second("/clock", "/second")

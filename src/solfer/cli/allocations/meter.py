@@ -65,7 +65,7 @@ class LineCost:
 class LineMeter:
     """Attributes memory to lines.
 
-    Temporary memory is the peak of what Python has allocated since the line before, as `tracemalloc` tells it. A trace
+    Temporary memory is the peak of what Python has allocated since the line before, as `tracemalloc` reports. A trace
     that is set in C, unlike one of `sys.settrace`, hardly allocates, and what it does is measured and left out.
 
     Args:

@@ -28,7 +28,7 @@ class CodeOwner(IntEnum):
 
 
 class Ownership:
-    """Tells whose files are.
+    """Finds the owners of files.
 
     Args:
         component: The component's module.

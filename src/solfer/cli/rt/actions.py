@@ -23,7 +23,7 @@ PATIENCE = 2.0  # [s]
 def switch(options: argparse.Namespace, namespace: Namespace) -> None:
     """Start and stop plugins."""
     request = SwitchRequest(tuple(options.start), tuple(options.stop))
-    _ask(namespace, f"{EXECUTOR}/switch", SWITCH, request=request)
+    _call(namespace, f"{EXECUTOR}/switch", SWITCH, request=request)
 
 
 def state(options: argparse.Namespace, namespace: Namespace) -> None:
@@ -39,12 +39,12 @@ def state(options: argparse.Namespace, namespace: Namespace) -> None:
 def abort(options: argparse.Namespace, namespace: Namespace) -> None:
     """Abort a plugin."""
     _require(options.name, RuntimeStatistics.attach(namespace.folder).plugins)
-    _ask(namespace, f"{options.name}/abort", TRIGGER, request=NoFields())
+    _call(namespace, f"{options.name}/abort", TRIGGER, request=NoFields())
 
 
 def clear_stop(options: argparse.Namespace, namespace: Namespace) -> None:
     """Clear the emergency stop."""
-    _ask(namespace, f"{EXECUTOR}/estop_clear", TRIGGER, request=NoFields())
+    _call(namespace, f"{EXECUTOR}/estop_clear", TRIGGER, request=NoFields())
 
 
 ACTIONS = {"top": top_of_layer, "record": record, "switch": switch, "state": state, "abort": abort, "estop": clear_stop}
@@ -55,7 +55,7 @@ def _require(name: str, plugins: Sequence[str]) -> None:
         raise UnknownName("plugin", name, plugins)
 
 
-def _ask(namespace: Namespace, service: str, interface: str, request: Any) -> None:
+def _call(namespace: Namespace, service: str, interface: str, request: Any) -> None:
     """Call a service of the RT layer.
 
     Raises:

@@ -38,7 +38,7 @@ class ScenarioTrace:
         return np.arange(len(self.base)) * self.scenario.period
 
     @property
-    def way(self) -> np.ndarray:
+    def distance(self) -> np.ndarray:
         """Way of the base on the ground, shape (T + 1,) [m]."""
         steps = np.linalg.norm(np.diff(self.base[:, :2], axis=0), axis=1)
         return np.concatenate(([0.0], np.cumsum(steps)))
@@ -47,11 +47,11 @@ class ScenarioTrace:
         """Yield the head, and a row for each step: what it is, where the base is at its end, and how far all moves."""
         yield HEAD
         begin = 0
-        way = self.way
+        distance = self.distance
         for number, (step, count) in enumerate(zip(self.scenario.pattern, self.scenario.periods, strict=True), 1):
             end = begin + count
             moved = np.linalg.norm(self.vertices[end] - self.vertices[begin], axis=1).max()
-            numbers = (*self.base[end], way[end] - way[begin], moved)
+            numbers = (*self.base[end], distance[end] - distance[begin], moved)
             times = (begin * self.scenario.period, count * self.scenario.period)
             yield (str(number), step.type, *(f"{each:.2f}" for each in times), *(f"{each:.3f}" for each in numbers))
             begin = end
@@ -61,6 +61,6 @@ class ScenarioTrace:
         scenario = self.scenario
         kind = "absolute" if scenario.is_absolute else "relative"
         return (
-            f"{len(scenario.pattern)} steps, {scenario.duration:.2f} s, {self.way[-1]:.3f} m; {scenario.legs} legs, "
-            f"{kind}, period {scenario.period:g} s"
+            f"{len(scenario.pattern)} steps, {scenario.duration:.2f} s, {self.distance[-1]:.3f} m; "
+            f"{scenario.legs} legs, {kind}, period {scenario.period:g} s"
         )

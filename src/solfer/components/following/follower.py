@@ -347,15 +347,15 @@ class ReferenceFollower(Component, abc.ABC):
                 distance = target.distance
         if farthest is None or not farthest.stays:
             return
-        said = farthest.judge()
-        if said:
+        gap = farthest.judge()
+        if gap:
             reason = self._obstacles(farthest.task)
-            farthest.reason = f"cannot be reached: it stays {said} from its reference; {reason}"
+            farthest.reason = f"cannot be reached: it stays {gap} from its reference; {reason}"
             log.warning("%s: %s %s", self.name, farthest.where, farthest.reason)
         if farthest.is_unreachable:
             # what it has pulled away may come back now
             for target in self._list:
-                target.look_anew()
+                target.refresh()
 
     def _read(self, target: Target) -> None:
         wrong = target.read_port()

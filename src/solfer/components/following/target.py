@@ -301,7 +301,7 @@ class Target:
         else:
             self._restart_progress()
 
-    def look_anew(self) -> None:
+    def refresh(self) -> None:
         """Look again whether the task comes nearer to its reference; one that is held is held where it is now."""
         self._progress.look_again()
         self._held.take_again()

@@ -112,7 +112,7 @@ class GroundForces(Component):
     def topics(self) -> tuple[TopicOut, ...]:
         """Publish `<name>/<contact>`: what the ground does to the contact's link, about its origin and in its axes.
 
-        On `/diagnostics` it is told once a second what contacts do, and which forces the ground cannot have.
+        On `/diagnostics` the node reports once a second what contacts do, and which forces the ground cannot have.
         """
         interface = "geometry_msgs/WrenchStamped"
         return (

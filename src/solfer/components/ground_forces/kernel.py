@@ -75,7 +75,7 @@ def _learn(
     jacobian, world, weights, columns, least, first, share, decay, prior, factor, spread, needed, information, learned,
     solved, offsets,
 ):  # fmt: skip
-    """Add what a cycle tells of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
+    """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     rows = len(jacobian)
     size = len(learned)
     _normal_matrix(jacobian, weights, columns, least, factor)

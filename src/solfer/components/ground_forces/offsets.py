@@ -38,9 +38,9 @@ class TorqueOffsets:
 
     What the world seems to do along the DoFs is w = J^T f + E p - e, with any forces f at the contacts J that touch, a
     push p on the base (the first six DoFs, E) and the offsets e of the joints. What is left of w behind the forces
-    that explain it best tells e by least squares, beside what is known of each offset before, its deviation. A leg in
-    the air tells all of its joints. On legs that carry, three numbers of each leg, and while nothing pushes the base
-    the six that it is at rest. What is told is forgotten with time, since offsets drift.
+    that explain it best gives e by least squares, beside what is known of each offset before, its deviation. A leg in
+    the air gives all of its joints. On legs that carry, three numbers of each leg, and while nothing pushes the base
+    the six that it is at rest. What is known fades with time, since offsets drift.
 
     Args:
         contacts: The contacts, k of them.

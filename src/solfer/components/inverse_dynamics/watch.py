@@ -123,8 +123,8 @@ class DynamicsWatch:
             return f"joint '{self._robot.dofs[found]}' has a torque of {gone:.1f} Nm instead of {sent:.1f} Nm"
         index = found - size
         if index < len(names):
-            way = float(np.linalg.norm(self._moved[index]))
-            return f"contact '{names[index]}' slips: it has moved by {100.0 * way:.1f} cm"
+            distance = float(np.linalg.norm(self._moved[index]))
+            return f"contact '{names[index]}' slips: it has moved by {100.0 * distance:.1f} cm"
         index -= len(names)
         return f"contact '{names[index]}' touches nothing, and is to carry {forces[index]:.0f} N"
 
@@ -180,13 +180,13 @@ def _watch(
         for k in range(3):
             are_measured = are_measured or wrenches[tracked[i], k] != 0.0
     for i in range(count):
-        way = 0.0
+        distance = 0.0
         for k in range(3 if is_point[i] or starts[i + 1] - starts[i] == 6 else 0):
             moved[i, k] += step * (slip[starts[i] + k] - moved[i, k] / MEMORY)
             if shares[i] < 1.0:
                 moved[i, k] = 0.0
-            way += moved[i, k] ** 2
-        if math.sqrt(way) > SLIP:
+            distance += moved[i, k] ** 2
+        if math.sqrt(distance) > SLIP:
             return size + i
         pressed = 0.0
         computed = 0.0

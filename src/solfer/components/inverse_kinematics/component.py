@@ -141,12 +141,12 @@ class InverseKinematics(ReferenceFollower):
         command.velocity[self._moved] = inner.velocity[self._moved]
 
     def stop(self) -> None:
-        """Hold the joints where they are wanted."""
+        """Hold the joints where they are desired."""
         self._inner.command.velocity[:] = 0.0
         self.model.command.velocity[:] = 0.0
 
     def start_log(self, logger: Any) -> None:
-        """Declare references, residuals, and the joints that are wanted."""
+        """Declare references, residuals, and the joints that are desired."""
         self.log_references(logger)
         add = logger.add
         add("velocity", self._solver.velocity, self.model.dofs)

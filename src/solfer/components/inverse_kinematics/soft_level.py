@@ -29,7 +29,7 @@ class SoftLevel:
 
     Args:
         tasks: Tasks of the level.
-        targets: Those of them that follow what is wanted.
+        targets: Those of them that follow what is desired.
         length: L [m]; 0: the damping stays that of the tasks.
     """
 

@@ -96,13 +96,13 @@ class WheelConsensus:
         )  # fmt: skip
 
 
-def turn_of(ways: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
+def turn_of(displacements: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
     """Compute the turn about the vertical that wheels measure [rad], and the mean square of their arms [m^2].
 
     Args:
-        ways: What wheels measure of the base's way, shape (k, 3) [m].
+        displacements: What wheels measure of the base's way, shape (k, 3) [m].
         arms: From the base's origin to the contacts, shape (k, 3) [m].
         weights: Weights, shape (k,); at least two are positive.
     """
-    turn, spread = kernel.turn(ways, arms, weights)
+    turn, spread = kernel.turn(displacements, arms, weights)
     return float(turn), float(spread)

@@ -149,9 +149,9 @@ def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mea
         total = mean_speed(smoothed, arms, rate, weights, inliers, mean)
 
 
-def _turn(ways, arms, weights):
+def _turn(displacements, arms, weights):
     """Return the turn that wheels measure [rad], and the mean square of their distances from their middle [m^2]."""
-    _, _, turn, spread = fit_twist(ways, arms, weights, 0.0, 0.0)
+    _, _, turn, spread = fit_twist(displacements, arms, weights, 0.0, 0.0)
     return turn, spread
 
 

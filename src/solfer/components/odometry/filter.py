@@ -110,7 +110,7 @@ class FilteredOdometry:
         self.lifted = np.zeros(count, dtype=bool)
         # of each wheel: its rise, its weight if it touches, and if it also rolls, and the spread of its innovations
         self._rise, self._weights, self._trusted, self._spreads, self._variances = np.zeros((5, count))
-        self._ways, self._speeds, self._arms, self._arms_before = np.zeros((4, count, 3))
+        self._displacements, self._speeds, self._arms, self._arms_before = np.zeros((4, count, 3))
         self._jacobian_before = np.zeros_like(wheels.jacobian)
         self._step, self._joints_before, self._sway = np.zeros((3, wheels.joints))
         self._arm, self._tilting, self._rate, self._rate_before = np.zeros((4, 3))
@@ -183,7 +183,7 @@ class FilteredOdometry:
         moved, legs, sway = filter_kernel.joint_motion(self._step, self._wheels.legs, self._sway, keep)
         shaken, sample = self._follow_imu(legs / period)
         self._weigh()
-        self._measure_ways()
+        self._measure_displacements()
         turn, imu_time, unknown = self._measure_turn()
         self._note_rest(moved, sway, imu_time)
         self.kalman.predict(
@@ -262,12 +262,12 @@ class FilteredOdometry:
         if np.count_nonzero(self._weights) < 2:
             self._weights[:] = 1.0
 
-    def _measure_ways(self) -> None:
+    def _measure_displacements(self) -> None:
         """Compute the ways that wheels measure without a turn about the vertical, and that of the base's tilting."""
         wheels = self._wheels
-        filter_kernel.measure_ways(
+        filter_kernel.measure_displacements(
             wheels.jacobian, self._jacobian_before, wheels.arms, self._arms_before, self._step, self._base.turned,
-            self._weights, self._ways, self._arms, self._arm, self._tilting,
+            self._weights, self._displacements, self._arms, self._arm, self._tilting,
         )  # fmt: skip
 
     def _measure_turn(self) -> tuple[float, float, float]:
@@ -278,8 +278,8 @@ class FilteredOdometry:
         self._since_imu += self._period
         if self._base.fresh:
             return float(self._rate[2]) * self._since_imu - self._pending, self._since_imu, 0.0
-        turn, spread = turn_of(self._ways, self._arms, self._trusted)
-        deviation = SKID * float(np.abs(self._ways).max()) + 1e-6
+        turn, spread = turn_of(self._displacements, self._arms, self._trusted)
+        deviation = SKID * float(np.abs(self._displacements).max()) + 1e-6
         wheels = float(self._trusted.sum() / self._trusted.max())
         return turn, 0.0, deviation * deviation / max(wheels * spread, 1e-9)
 
@@ -302,7 +302,7 @@ class FilteredOdometry:
         speed = math.hypot(x, y)
         least = STANDING if self._rest > AT_REST else ENCODERS
         filter_kernel.measure_speeds(
-            self._ways, self._tilting, period, SLIP, least, self._spreads, self._variances, self._speeds
+            self._displacements, self._tilting, period, SLIP, least, self._spreads, self._variances, self._speeds
         )
         rate = turn / period
         share = imu_time / period
@@ -344,8 +344,8 @@ class FilteredOdometry:
         if base.fresh:
             self._offset += self._pending - float(base.turned[2])
             self._pending = self._since_imu = 0.0
-        way = kalman.velocity * period - self._tilting
-        self.position += about_vertical(way, self.heading + 0.5 * turn)
+        displacement = kalman.velocity * period - self._tilting
+        self.position += about_vertical(displacement, self.heading + 0.5 * turn)
         self.heading = base.heading + self._offset if base.fresh else self.heading + turn
         missing = self._map.missing_height(
             wheels.arms,
@@ -361,7 +361,7 @@ class FilteredOdometry:
         self.position[2] += raised
         self._map.note(raised, self._trusted)
         filter_kernel.find_lifted(
-            self._ways, self._arms, turn, base.turned, self._weights, self._trusted, wheels.normal,
+            self._displacements, self._arms, turn, base.turned, self._weights, self._trusted, wheels.normal,
             self._tags.clearance, 1.0 - period / FORGET, self._slope, self._rise, self.lifted,
         )  # fmt: skip
 

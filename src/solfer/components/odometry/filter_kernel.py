@@ -79,7 +79,7 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
     return 0.25 * square / 3.0
 
 
-def _measure_ways(jacobian, before, arms, arms_before, step, turned, weights, ways, mean, arm, tilting):
+def _measure_displacements(jacobian, before, arms, arms_before, step, turned, weights, displacements, mean, arm, tilting):
     """Write the ways that wheels measure, with mean Jacobians and arms, and the way of the ground point by tilting."""
     px = turned[0]
     py = turned[1]
@@ -89,26 +89,26 @@ def _measure_ways(jacobian, before, arms, arms_before, step, turned, weights, wa
         for axis in range(3):
             mean[i, axis] = 0.5 * (arms[i, axis] + arms_before[i, axis])
             row = 3 * i + axis
-            way = 0.0
+            displacement = 0.0
             for k in range(len(step)):
-                way += (jacobian[row, k] + before[row, k]) * step[k]
-            ways[i, axis] = -0.5 * way
+                displacement += (jacobian[row, k] + before[row, k]) * step[k]
+            displacements[i, axis] = -0.5 * displacement
             arm[axis] += weights[i] * mean[i, axis]
         total += weights[i]
-        ways[i, 0] -= py * mean[i, 2]
-        ways[i, 1] += px * mean[i, 2]
-        ways[i, 2] -= px * mean[i, 1] - py * mean[i, 0]
+        displacements[i, 0] -= py * mean[i, 2]
+        displacements[i, 1] += px * mean[i, 2]
+        displacements[i, 2] -= px * mean[i, 1] - py * mean[i, 0]
     for axis in range(3):
         arm[axis] /= total
     tilting[0], tilting[1], tilting[2] = py * arm[2], -px * arm[2], px * arm[1] - py * arm[0]
 
 
-def _measure_speeds(ways, tilting, time, share, least, spreads, variances, speeds):
+def _measure_speeds(displacements, tilting, time, share, least, spreads, variances, speeds):
     """Write the velocities of the ground point that wheels measure within a time [s], and their variances [m^2/s^2]."""
-    for i in range(len(ways)):
+    for i in range(len(displacements)):
         square = 0.0
         for axis in range(3):
-            speeds[i, axis] = (ways[i, axis] + tilting[axis]) / time
+            speeds[i, axis] = (displacements[i, axis] + tilting[axis]) / time
             square += speeds[i, axis] ** 2
         deviation = share * math.sqrt(square) + least
         variances[i] = max(deviation * deviation, spreads[i])
@@ -180,9 +180,9 @@ def height_above_others(weights, arms, normal, i, slope):
 
 
 @part
-def along_normal(ways, arms, i, turn, x, y, z):
+def along_normal(displacements, arms, i, turn, x, y, z):
     """Return what a wheel measures of the base's way along a normal x, y, z, with a turn about the vertical [m]."""
-    return x * (ways[i, 0] + turn * arms[i, 1]) + y * (ways[i, 1] - turn * arms[i, 0]) + z * ways[i, 2]
+    return x * (displacements[i, 0] + turn * arms[i, 1]) + y * (displacements[i, 1] - turn * arms[i, 0]) + z * displacements[i, 2]
 
 
 @part
@@ -191,7 +191,7 @@ def along_normal_by_tilting(arms, i, px, py, x, y, z):
     return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
 
 
-def _find_lifted(ways, arms, turn, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
+def _find_lifted(displacements, arms, turn, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
     """Note how far legs have lifted wheels above the others [m], and which are lifted.
 
     A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
@@ -202,16 +202,16 @@ def _find_lifted(ways, arms, turn, turned, weights, trusted, normal, clearance, 
     x = normal[0]
     y = normal[1]
     z = normal[2]
-    total = mean_tilting = mean_way = 0.0
+    total = mean_tilting = mean_displacement = 0.0
     for i in range(len(rise)):
         total += trusted[i]
         mean_tilting += trusted[i] * along_normal_by_tilting(arms, i, px, py, x, y, z)
-        mean_way += trusted[i] * along_normal(ways, arms, i, turn, x, y, z)
+        mean_displacement += trusted[i] * along_normal(displacements, arms, i, turn, x, y, z)
     mean_tilting /= total
-    mean_way /= total
+    mean_displacement /= total
     for i in range(len(rise)):
         # a wheel that goes up measures that the base goes down
-        up = mean_way - along_normal(ways, arms, i, turn, x, y, z)
+        up = mean_displacement - along_normal(displacements, arms, i, turn, x, y, z)
         by_leg = up - (along_normal_by_tilting(arms, i, px, py, x, y, z) - mean_tilting)
         if up * by_leg > 0.0:
             rise[i] += up if abs(up) < abs(by_leg) else by_leg
@@ -272,7 +272,7 @@ turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
 joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
 mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_V}, {_V}, {_M})", _mean_rate)
-measure_ways = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_ways)
+measure_displacements = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_displacements)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
 learn_spreads = cached(f"void({_M}, {_M}, {_V}, {_F}, {_B}, {_F}, {_V}, {_V}, {_V})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)

@@ -164,7 +164,7 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
     lowest = 1e9
     highest = -1e9
     mean = 0.0
-    way = 0.0
+    distance = 0.0
     for i in range(count):
         if weights[i] <= 0.0:
             continue
@@ -180,7 +180,7 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
         square = SPACING * SPACING if heads[i] == 0 else squared_distance(tracks, i, heads[i] - 1, x, y)
         if square < SPACING * SPACING:
             continue
-        way = max(way, math.sqrt(square))
+        distance = max(distance, math.sqrt(square))
         off = z - floor[0] if level else 0.0
         if not level:
             end_floor(tracks, heads, risen, i)
@@ -195,7 +195,7 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
     elif touching < 3 or highest - lowest > UNEVEN:
         floor[1] = 0.0
     else:
-        floor[1] += way
+        floor[1] += distance
         if floor[1] > FLAT:
             floor[0] = mean / touching
     return on_floor > 0 and on_floor == touching

@@ -53,8 +53,8 @@ class _Deviation:
         self._dofs = dofs
         self.desired, self.speed, self.actual, self.turning = (np.zeros(len(dofs)) for _ in range(4))
         self.turn = robot.turns[dofs]
-        self._ways = np.zeros((1, len(dofs)))
-        self._away = self._error = self._ways[0]
+        self._displacements = np.zeros((1, len(dofs)))
+        self._away = self._error = self._displacements[0]
         self._slip = np.zeros(len(dofs))
         self._beyond = np.zeros(len(dofs), dtype=bool)
 
@@ -68,7 +68,7 @@ class _Deviation:
         self.measure()
         np.subtract(self.desired, self.actual, out=self._away)
         np.subtract(self.speed, self.turning, out=self._slip)
-        self._shorten(self._ways, self.turn)
+        self._shorten(self._displacements, self.turn)
         for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
             np.abs(error, out=error)
             np.greater(error, tolerance, out=self._beyond)

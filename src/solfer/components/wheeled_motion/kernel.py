@@ -43,7 +43,7 @@ LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *TUNED, "period")])
 """Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
 _MERGED = ("motion", "motion_speed", "error", "error_speed")
-_KEPT = ("rest", "way", "desired", "turn")
+_KEPT = ("rest", "turn_left", "desired", "turn")
 
 WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
 """State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
@@ -220,7 +220,7 @@ def _find_soft(angles, desired, half, most, error):
 
 
 @part
-def _choose_ways(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
+def _choose_turns(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
     """Write desired directions of wheels, by the shorter way whose end is within the range of the steering joint.
 
     The way goes from where the joint is measured, as the wheel is; its commanded position may be elsewhere, and has to
@@ -229,25 +229,25 @@ def _choose_ways(wheels, angles, desired, rows, turning, measured, position, vel
     """
     for index in range(len(angles)):
         dof = turning[index]
-        way = wheels[index].way
+        turn_left = wheels[index].turn_left
         row = rows[index, dof]
         place = measured[dof]
-        way += _wrapped(desired[index] - angles[index] - way, PERIOD)
+        turn_left += _wrapped(desired[index] - angles[index] - turn_left, PERIOD)
         further = position[dof] + velocity[dof] * ahead
-        end = place + way * row
+        end = place + turn_left * row
         is_inside = lower[dof] < end < upper[dof]
         is_next_inside = lower[dof] < further < upper[dof]
         # what leaves the range shows which of the two others is the way back
-        toward = (further - position[dof]) * row if is_inside and not is_next_inside else way
-        other = way - math.copysign(PERIOD, toward)
+        toward = (further - position[dof]) * row if is_inside and not is_next_inside else turn_left
+        other = turn_left - math.copysign(PERIOD, toward)
         other_end = place + other * row
         is_inside = is_inside and is_next_inside
-        is_long = abs(way) > PERIOD / 2.0 + LONGER
+        is_long = abs(turn_left) > PERIOD / 2.0 + LONGER
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
-            way = other
-        wheels[index].way = way
+            turn_left = other
+        wheels[index].turn_left = turn_left
         # half a turn away is not to be taken for no way at all
-        desired[index] = angles[index] + min(max(way, -most), most)
+        desired[index] = angles[index] + min(max(turn_left, -most), most)
 
 
 def _find_errors(start):
@@ -289,7 +289,7 @@ def _find_errors(start):
             wheels = _states_at(memory.wheels, count)
             angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
-            _choose_ways(*given, lower, upper, most[0], ahead)
+            _choose_turns(*given, lower, upper, most[0], ahead)
         _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles = vector_at(memory.camber, count)

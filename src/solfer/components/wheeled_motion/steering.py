@@ -87,7 +87,7 @@ class Steering:
         """
         self.before[:2] = place
         self.before[2] = heading
-        self.wheels["way"] = 0.0
+        self.wheels["turn_left"] = 0.0
         if angles is not None:
             self.wheels[:] = np.zeros((), WHEEL)
             for direction in ("angle", "aim", "motion", "error"):

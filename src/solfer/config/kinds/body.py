@@ -5,7 +5,7 @@ from typing import ClassVar
 from solfer.config.records.pipes import LOWER_LEVEL_LAYERS, Content, ControllerRecord, FeedbackRecord, KindRecords
 
 ODOMETRY, IMU = "nav_msgs/Odometry", "sensor_msgs/Imu"
-"""Messages of a rigid body: its whole state, and what an inertial measurement unit tells of it."""
+"""Messages of a rigid body: its whole state, and what an inertial measurement unit reports of it."""
 
 ONLINE = "imu"
 """Topic of the lower level's inertial measurements."""

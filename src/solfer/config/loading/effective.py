@@ -98,7 +98,7 @@ def _pipes(tree: YamlNode, section: str, direction: str, chosen: YamlNode) -> It
         listed = tree.nearest((f"{direction}s", chosen.value))
         chosen = listed.get("list") or listed
     named = chosen.plain() if isinstance(chosen.value, tuple) else ()
-    for name in (each for each in named if isinstance(each, str)):  # what names no pipe was told when it was read
+    for name in (each for each in named if isinstance(each, str)):  # what names no pipe was reported when it was read
         pipe = () if name == "all" else (name,)
         yield direction, *pipe
         yield section, direction, *pipe
@@ -115,8 +115,8 @@ def _copy(tree: YamlNode, kept: YamlNode, path: tuple[Key, ...]) -> None:
         return
     inside: Any = kept.value
     for depth, key in enumerate(path[:-1]):
-        way = tree.nearest(path[: depth + 1])
-        inside = inside.setdefault(key, YamlNode({}, way.mark, way.key)).value
+        place = tree.nearest(path[: depth + 1])
+        inside = inside.setdefault(key, YamlNode({}, place.mark, place.key)).value
     inside[path[-1]] = found
 
 

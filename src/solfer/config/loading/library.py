@@ -120,8 +120,8 @@ class Library:
             if getattr(record, key) is None:
                 section = "" if key in ("function", "type") else f"{self._middleware.section}."
                 meaning = type(record).model_fields[key].description
-                wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
-                self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
+                expected = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
+                self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", expected)
 
     def _warn_of_idle(self, record: AnyPipeRecord, node: YamlNode) -> None:
         """Warn of keys that have no effect together with the values of others, or that are close to a known one."""

@@ -38,4 +38,4 @@ NOISE: Bounds = {"ge": 0.0, "le": 1e4}
 """Standard deviations, in the unit of the measured quantity."""
 
 GAIN: Bounds = {"ge": 0.0, "le": 1e5}
-"""Stiffness [Nm/rad, N/m] and damping [Nms/rad, Ns/m] that joints are told."""
+"""Stiffness [Nm/rad, N/m] and damping [Nms/rad, Ns/m] that joints are given."""

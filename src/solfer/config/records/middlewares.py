@@ -27,8 +27,8 @@ class MiddlewareKind:
         name: Value of the tag `middleware`.
         layer: Layer that it serves: RT or NRT.
         title: What it is, in words.
-        map: Map of every Robot in the order in which the lower level tells its joints; None: there is none.
-        named: Whether each pipe names its topic, its message and its type; else the layer of the other end may tell.
+        map: Map of every Robot in the order in which the lower level publishes its joints; None: there is none.
+        named: Whether each pipe names its topic, its message and its type; else the layer of the other end may show it.
         keys: Record of its section.
     """
 

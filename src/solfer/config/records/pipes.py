@@ -31,7 +31,7 @@ Function = Literal["state", "motor", "reference"]
 
 
 COMMAND = "solfer/JointCommand"
-"""Message of joints that plugins tell each other and the lower level."""
+"""Message of joints between plugins and to the lower level."""
 
 LOWER_LEVEL_LAYERS = ("online", "lower_level")
 """Values of `layer` for pipes to and from the robot itself; XBotCore calls what it measures `online`."""
@@ -43,7 +43,7 @@ class Content:
 
     Attributes:
         joints: Whether it is numbers of joints: those have a motor side, limits, a calibration, and a lower level.
-        body: Whether it is the state of a rigid body, whose first message may tell where the State's base is.
+        body: Whether it is the state of a rigid body, whose first message may report where the State's base is.
         contacts: Whether the Robot has to have contacts.
         port: Whether it belongs to a port of the component, and not to the Robot.
         measures: Whether a feedback writes a State, which is a measured one if its `function` does not say otherwise.

@@ -12,7 +12,7 @@ from solfer.config.yaml.nodes import Key, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 
-_WANTED = {
+_EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
     "int_type": "a whole number",
@@ -132,15 +132,15 @@ def _complain_at(
     elif item["type"] == "value_error":
         problems.add(place.mark, str(item["ctx"]["error"]))
     else:
-        wanted = " or ".join(dict.fromkeys(_wanted(each) for each in items))
+        expected = " or ".join(dict.fromkeys(_expected(each) for each in items))
         allowed = [name for each in items for name in _allowed(each)]
         names = nearest(str(place.value), allowed) if isinstance(place.value, str) else ()
-        problems.add(place.mark, f"expected {wanted}, got {_got(place)}", names=names)
+        problems.add(place.mark, f"expected {expected}, got {_got(place)}", names=names)
 
 
-def _wanted(item: ErrorDetails) -> str:
-    if item["type"] in _WANTED:
-        return _WANTED[item["type"]].format(**item.get("ctx", {}))
+def _expected(item: ErrorDetails) -> str:
+    if item["type"] in _EXPECTED:
+        return _EXPECTED[item["type"]].format(**item.get("ctx", {}))
     if item["type"] == "missing":
         return "a longer list"
     words = item["msg"].removeprefix("Input should be ")

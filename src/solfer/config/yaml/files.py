@@ -65,7 +65,7 @@ def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...]
     Args:
         path: The file, also one that was read before.
         problems: Receives the mistakes that do not keep the file from being read.
-        root: Keys that lead to the wanted part.
+        root: Keys that lead to the desired part.
         where: Place that named the file, for the error when it cannot be opened.
 
     Raises:

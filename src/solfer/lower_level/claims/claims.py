@@ -76,7 +76,7 @@ class Claims:
         self._ages[self._ids[sender]] = 0.0
         return True
 
-    def claim_by_command(self, sender: str, names: tuple[str, ...], wanted: ClaimedJoints) -> None:
+    def claim_by_command(self, sender: str, names: tuple[str, ...], requested: ClaimedJoints) -> None:
         """Grant a sender the joints that it commands, as far as it has them already or they are free.
 
         Raises:
@@ -89,18 +89,18 @@ class Claims:
                 f"commands of '{sender}' are not accepted: {reason}",
                 expected="a new claim by lower_level/claim, which starts from the measured state",
             )
-        self._grant(sender, (wanted,))
+        self._grant(sender, (requested,))
         if sender in self._claimed:
             self._claimed[sender] = True
-        self._known[sender, wanted.controller] = (names, wanted.modes)
+        self._known[sender, requested.controller] = (names, requested.modes)
 
-    def claim(self, owner: str, wanted: Sequence[ClaimedJoints]) -> None:
+    def claim(self, owner: str, requested: Sequence[ClaimedJoints]) -> None:
         """Grant joints to an owner, all or none.
 
         Raises:
             ClaimRefused: Another owner has a joint; nothing was granted.
         """
-        self._grant(owner, wanted)
+        self._grant(owner, requested)
         self._claimed[owner] = False
         self._forget(owner)
         self._barred.pop(owner, None)
@@ -174,9 +174,9 @@ class Claims:
                 parts.append(f"{owner}: {', '.join(modes)}")
         return "; ".join(parts)
 
-    def _grant(self, owner: str, wanted: Sequence[ClaimedJoints]) -> None:
+    def _grant(self, owner: str, requested: Sequence[ClaimedJoints]) -> None:
         mine = self._ids.get(owner, FREE)
-        for item in wanted:
+        for item in requested:
             owners = self._owners[item.controller]
             for mode in item.modes:
                 present = owners[MODES[mode], item.indices]
@@ -185,7 +185,7 @@ class Claims:
         if mine == FREE:
             mine = self._ids[owner] = next(self._numbers)
             self._nodes[node_of(owner)] += 1
-        for item in wanted:
+        for item in requested:
             for mode in item.modes:
                 self._owners[item.controller][MODES[mode], item.indices] = mine
         self._ages[mine] = 0.0

@@ -81,7 +81,7 @@ class CatchUp:
         self._news[joints] = False
 
     def renew(self, indices: np.ndarray) -> None:
-        """Mark the joints at `indices` as commanded anew."""
+        """Mark the joints at `indices` as commanded again."""
         self._news[indices] = True
         self._any_news = True
 

@@ -245,8 +245,8 @@ class ImpedanceController(LowerLevelController):
         """See `LowerLevelController.away`."""
         if "position" not in given:
             return super().away(indices, given)
-        ways = given["position"] - self.target[indices]
-        distances = np.abs(ways - whole_turns(ways, self._turns[indices]))
+        steps = given["position"] - self.target[indices]
+        distances = np.abs(steps - whole_turns(steps, self._turns[indices]))
         furthest = int(np.argmax(distances))
         return self.joints[indices[furthest]], float(distances[furthest])
 
@@ -282,9 +282,9 @@ class ImpedanceController(LowerLevelController):
         for ramp in self._ramps.values():
             ramp.advance(dt)
         self._leftover.advance(dt)
-        wanted = 1.0 if self.feed_forward else 0.0
-        if self._share != wanted:
-            self._share += float(np.clip(wanted - self._share, -dt / RAMP, dt / RAMP))
+        goal = 1.0 if self.feed_forward else 0.0
+        if self._share != goal:
+            self._share += float(np.clip(goal - self._share, -dt / RAMP, dt / RAMP))
         np.multiply(self.effort, self._share, out=self.applied_effort)
         self._catch_up.advance(dt, self.position)
         change = self._change

@@ -42,7 +42,7 @@ class Overspeed:
         self._counts = False
 
     def restart(self) -> None:
-        """Forget the past: the robot begins anew."""
+        """Forget the past: the robot begins again."""
         self.reason = ""
         self._calm = 0.0
         self._counts = False

@@ -38,7 +38,7 @@ class Safeguard:
         return UPRIGHT if self._tilt.reason else SLOW
 
     def restart(self, q: np.ndarray) -> None:
-        """Forget the past: the robot begins anew at q, shape (model size,)."""
+        """Forget the past: the robot begins again at q, shape (model size,)."""
         self._overspeed.restart()
         self._tilt.restart(q)
 

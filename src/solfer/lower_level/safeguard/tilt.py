@@ -41,7 +41,7 @@ class Tilt:
         return self._age > 0.0
 
     def restart(self, q: np.ndarray) -> None:
-        """Begin anew at q, shape (model size,): whether the robot lies is decided at once."""
+        """Begin again at q, shape (model size,): whether the robot lies is decided at once."""
         self.reason = ""
         self._age = 0.0
         if self._enabled and (cosine := self._cosine(q)) < self._fallen:

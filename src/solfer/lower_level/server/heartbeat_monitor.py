@@ -27,7 +27,7 @@ class HeartbeatSource(Protocol):
 class HeartbeatMonitor:
     """Supervises the heartbeat of a process; when it misses too many beats, all leases end.
 
-    Wheels stop, positions hold. Owners have to claim anew, also if the process goes on later, so that they begin from
+    Wheels stop, positions hold. Owners have to claim again, also if the process goes on later, so that they begin from
     the measured state and not with earlier commands.
 
     Args:

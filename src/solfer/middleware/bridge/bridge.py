@@ -8,7 +8,7 @@ from typing import Any
 from solfer.errors import SolferError
 from solfer.middleware.bridge.routes import Route
 from solfer.middleware.bridge.services import ServiceForward, ServiceForwarder
-from solfer.middleware.bridge.topics import OneWayTopic
+from solfer.middleware.bridge.topics import ForwardedTopic
 from solfer.throttle import Throttle
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.health import Health
@@ -36,12 +36,12 @@ class BridgeSearch:
     Attributes:
         offers: Returns the services that are offered.
         topics: Returns the topics that are published, besides those that always go out.
-        wanted: Returns the topics that components declare and receive, besides those that always go in.
+        requested: Returns the topics that components declare and receive, besides those that always go in.
     """
 
     offers: Callable[[Collection[str]], Iterable[ServiceForward]] = lambda known: ()
     topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()
-    wanted: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()
+    requested: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()
 
 
 class Bridge:
@@ -76,11 +76,11 @@ class Bridge:
         self._search = search or BridgeSearch()
         self._beside = beside
         self.forwarding = ServiceForwarder(inside, outside)
-        self._ways_in: list[OneWayTopic] = []
-        self._ways_out: list[OneWayTopic] = []
-        self.crossings: dict[str, OneWayTopic] = {}
-        self._open(inwards, outside, inside, ways=self._ways_in)
-        self._open(outwards, inside, outside, ways=self._ways_out)
+        self._forwards_in: list[ForwardedTopic] = []
+        self._forwards_out: list[ForwardedTopic] = []
+        self.crossings: dict[str, ForwardedTopic] = {}
+        self._open(inwards, outside, inside, forwards=self._forwards_in)
+        self._open(outwards, inside, outside, forwards=self._forwards_out)
         self._next_look = self._next_report = -float("inf")
         self._published = 0
         self._reports: dict[str, Any] = {}
@@ -97,14 +97,14 @@ class Bridge:
         if now >= self._next_look:
             self._next_look = now + LOOK
             self._look()
-        for crossing in self._ways_in:
+        for crossing in self._forwards_in:
             crossing.run()
         self.forwarding.run()
 
     def publish(self) -> None:
         """Run the second half: topics that go out, and replies; every `REPORT` a health report."""
         self._beside()
-        for crossing in self._ways_out:
+        for crossing in self._forwards_out:
             crossing.run()
         self._inside.sleep_until(self._inside.now())  # receives what came in, such as replies
         self.forwarding.run()
@@ -131,18 +131,18 @@ class Bridge:
         """Refuse the requests that still wait."""
         self.forwarding.close()
 
-    def _open(self, routes: Iterable[Route], source: Middleware, target: Middleware, ways: list[OneWayTopic]) -> None:
+    def _open(self, routes: Iterable[Route], source: Middleware, target: Middleware, forwards: list[ForwardedTopic]) -> None:
         """Start forwarding topics from `source` to `target`; one that crosses already stays as it is."""
         for route in routes:
             if route.topic not in self.crossings:
-                ways.append(OneWayTopic(route, source, target))
-                self.crossings[route.topic] = ways[-1]
+                forwards.append(ForwardedTopic(route, source, target))
+                self.crossings[route.topic] = forwards[-1]
 
     def _look(self) -> None:
         """Start forwarding topics and services that are new inside since the last search."""
         try:
-            self._open(self._search.topics(self.crossings), self._inside, self._outside, ways=self._ways_out)
-            self._open(self._search.wanted(self.crossings), self._outside, self._inside, ways=self._ways_in)
+            self._open(self._search.topics(self.crossings), self._inside, self._outside, forwards=self._forwards_out)
+            self._open(self._search.requested(self.crossings), self._outside, self._inside, forwards=self._forwards_in)
             self.forwarding.offer(self._search.offers(self.forwarding.names))
         except SolferError as error:
             self._throttle.warning("look", "something is not forwarded: %s", error)
@@ -156,7 +156,7 @@ class Bridge:
             "services": len(self.forwarding.names),
             "requests": self.forwarding.requests,
         }
-        for way, crossings in (("in", self._ways_in), ("out", self._ways_out)):
+        for way, crossings in (("in", self._forwards_in), ("out", self._forwards_out)):
             for crossing in crossings:
                 values[f"{way} {crossing.topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
         for name, report in self._inside.reports().items():

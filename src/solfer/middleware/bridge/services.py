@@ -51,7 +51,7 @@ class ServiceForwarder:
         self.names: set[str] = set()
         self.requests = 0
         self._waiting: deque[tuple[Callable[[], Future[Any]], Future[Any]]] = deque()
-        self._asked: list[tuple[Future[Any], Future[Any]]] = []
+        self._sent: list[tuple[Future[Any], Future[Any]]] = []
 
     def offer(self, offers: Iterable[ServiceForward]) -> None:
         """Offer what is not offered yet.
@@ -68,16 +68,16 @@ class ServiceForwarder:
     def run(self) -> None:
         """Forward the requests that have come in, and the replies that are there."""
         while self._waiting:
-            ask, answer = self._waiting.popleft()
+            send, answer = self._waiting.popleft()
             if not answer.set_running_or_notify_cancel():
                 continue
             self.requests += 1
             try:
-                self._asked.append((ask(), answer))
+                self._sent.append((send(), answer))
             except SolferError as error:
                 answer.set_exception(error)
-        if self._asked:
-            self._asked = [pair for pair in self._asked if not self._answered(*pair)]
+        if self._sent:
+            self._sent = [pair for pair in self._sent if not self._answered(*pair)]
 
     def close(self) -> None:
         """Cancel all requests that wait."""
@@ -85,7 +85,7 @@ class ServiceForwarder:
             self._waiting.popleft()[1].cancel()
 
     def _service(self, offer: ServiceForward) -> Service:
-        def ask(request: Any) -> "Future[Any]":
+        def send(request: Any) -> "Future[Any]":
             return self._inside.request(offer.name, offer.interface, request, offer.reply, offer.timeout)
 
         # The caller waits a little longer than the bridge, so that it gets the bridge's refusal, which is more precise.
@@ -94,20 +94,20 @@ class ServiceForwarder:
             offer.interface,
             offer.request,
             reply=offer.reply,
-            handler=ask,
+            handler=send,
             timeout=offer.timeout + 0.5,
         )
 
-    def _submit(self, ask: Callable[[], Any]) -> "Future[Any]":
+    def _submit(self, send: Callable[[], Any]) -> "Future[Any]":
         answer: Future[Any] = Future()
-        self._waiting.append((ask, answer))
+        self._waiting.append((send, answer))
         return answer
 
-    def _answered(self, asked: "Future[Any]", answer: "Future[Any]") -> bool:
-        if not asked.done():
+    def _answered(self, sent: "Future[Any]", answer: "Future[Any]") -> bool:
+        if not sent.done():
             return False
         try:
-            answer.set_result(asked.result())
+            answer.set_result(sent.result())
         except (SolferError, CancelledError) as error:
             answer.set_exception(error)
         return True

@@ -11,7 +11,7 @@ from solfer.transport.middleware import Middleware
 logger = logging.getLogger(__name__)
 
 
-class OneWayTopic:
+class ForwardedTopic:
     """One topic in one direction: of what has come since the last cycle only the newest message goes on.
 
     Of a topic that a component declares every message goes on: it may be a goal or a result.

@@ -236,13 +236,13 @@ class Bus:
         if name not in self._services:
             raise UnknownName("service", name, self._services)
         service, submit = self._services[name]
-        asked = service.request(**fields) if request is None else request
+        sent = service.request(**fields) if request is None else request
 
         def refusal(error: SolferError) -> Any:
             return service.reply(success=False, message=described(error, lines=True))
 
         try:
-            work = service.prepared(asked)
+            work = service.prepared(sent)
         except SolferError as error:
             refused: Future[Any] = Future()
             refused.set_result(refusal(error))

@@ -5,7 +5,7 @@ from typing import Any
 import rospy
 
 from solfer.middleware.ros.calls import alive, call, provider, replied
-from solfer.middleware.ros.node.master import ask_master
+from solfer.middleware.ros.node.master import call_master
 
 
 class RosCaller:
@@ -19,7 +19,7 @@ class RosCaller:
     """
 
     def __init__(self, service: str):
-        _, _, services = ask_master("getSystemState")
+        _, _, services = call_master("getSystemState")
         self._names = [name for name, _ in services if name.endswith(f"/{service}")]
         self._service = service
 

@@ -33,7 +33,7 @@ logger = logging.getLogger(__name__)
 ANSWER = 0.1
 """Longest wait for the answer of the master in a cycle [s]."""
 
-UNDER_WAY = 5.0
+IN_PROGRESS = 5.0
 """Longest time that an answer, a message or a connection takes in lock-step [s]."""
 
 COUNTED = 256
@@ -222,7 +222,7 @@ class RosReader(Reader):
             self.topic,
             self.subscription.senders,
             now=now if in_lockstep else time.monotonic,
-            patience=UNDER_WAY if in_lockstep else ANSWER,
+            patience=IN_PROGRESS if in_lockstep else ANSWER,
         )
 
     def _store(self, arrival: Arrival) -> None:

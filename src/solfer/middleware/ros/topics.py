@@ -21,11 +21,11 @@ def topics_beside(node: str, endpoints: Sequence[RosReader | RosQueue | RosWrite
     received = {topic: present.types.get(topic, "") for topic in listeners}
     for end in endpoints:
         if isinstance(end, RosWriter) and end.topic in received and not end.topic_publisher.receivers():
-            wanted = [message for each in listeners[end.topic] if (message := subscribed_type(each, end.topic))]
-            if not wanted:  # they have ended without unregistering
+            offered = [message for each in listeners[end.topic] if (message := subscribed_type(each, end.topic))]
+            if not offered:  # they have ended without unregistering
                 del received[end.topic]
-            elif end.carries not in wanted:
-                received[end.topic] = wanted[0]
+            elif end.carries not in offered:
+                received[end.topic] = offered[0]
     return Topics(published, received)
 
 

@@ -81,7 +81,7 @@ def declared_topics(namespace: Namespace, known: Container[str] = ()) -> list[Pu
 
 
 class Survey:
-    """The topics of a namespace, whose segments are opened anew only when one was made or has ended.
+    """The topics of a namespace, whose segments are opened again only when one was made or has ended.
 
     To open them takes as long as some cycles of a 1 kHz loop, and who looks for missing peers looks again and again.
 

@@ -230,7 +230,7 @@ class XbotMiddleware(Middleware):
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; the reply comes in `poll`."""
-        return self._calls.ask(name, interface, request, reply, timeout)
+        return self._calls.call(name, interface, request, reply, timeout)
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
         """See `Middleware.serve`.

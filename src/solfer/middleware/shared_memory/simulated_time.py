@@ -11,7 +11,7 @@ REWINDS, TIME = range(2)
 
 
 class SimulatedTime:
-    """The newest time that a simulator of this namespace has published; one that starts anew begins before it.
+    """The newest time that a simulator of this namespace has published; one that starts again begins before it.
 
     Args:
         folder: The namespace's folder.

@@ -19,7 +19,7 @@ LinkPair = tuple[str, str]
 class LinkDistances:
     """Distances of pairs of links that are near to each other, the nearest first.
 
-    Each pair of collision shapes of two links counts by itself. Spheres around all shapes tell which are near at all;
+    Each pair of collision shapes of two links counts by itself. Spheres around all shapes report which are near at all;
     coal computes the distances of these. Meshes count as their convex hulls.
 
     Args:

@@ -121,16 +121,16 @@ class Description:
     def _lead(self, name: str, mimic: Mimic) -> list[SolferError]:
         """Find the joint at the end of the chain that a joint follows; return what keeps it from moving that way."""
         where = self.joints[name].where
-        way = [name]
+        followed = [name]
         while mimic is not None:
             if mimic.joint not in self.joints:
-                if len(way) == 1:
+                if len(followed) == 1:
                     logger.warning("%s follows '%s', which is no joint here: it moves on its own", where, mimic.joint)
                 return []
-            if mimic.joint in way:
+            if mimic.joint in followed:
                 return [
                     ModelError(
-                        f"the joint follows itself: {', '.join((*way, mimic.joint))}",
+                        f"the joint follows itself: {', '.join((*followed, mimic.joint))}",
                         where=where,
                         expected="a leader that follows none of them",
                     )
@@ -144,7 +144,7 @@ class Description:
                     )
                 ]
             self.mimics[name] = mimic
-            way.append(mimic.joint)
+            followed.append(mimic.joint)
             above = self.joints[mimic.joint].mimic
             if above is None:
                 return []

@@ -328,7 +328,7 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
     ):
         """Write x; return the outcome, the number of steps, and the largest residual.
 
-        What is inexact because H is almost singular is solved anew as a sequence of problems whose cost has the
+        What is inexact because H is almost singular is solved again as a sequence of problems whose cost has the
         additional term shift |x - before|^2 / 2, which end at the same solution. Source: R. T. Rockafellar, "Monotone
         operators and the proximal point algorithm", SIAM Journal on Control and Optimization 14(5), 1976.
         """

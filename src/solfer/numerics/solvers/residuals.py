@@ -103,8 +103,8 @@ def side(name, limits):
 @part
 def lack(name, limits, x):
     """Compute by how much x violates a constraint, as a share of its side where that is larger than 1."""
-    wanted = side(name, limits)
-    return (wanted - normal_times(name, limits, x)) / max(1.0, abs(wanted))
+    sides = side(name, limits)
+    return (sides - normal_times(name, limits, x)) / max(1.0, abs(sides))
 
 
 @part
@@ -176,7 +176,7 @@ def _balance(cost, limits, turned, factor, active, names, multipliers, x, slope,
 
 @part
 def refine(cost, limits, turned, factor, active, names, multipliers, x, vectors, enough, passes):
-    """Compute x and the multipliers anew from the active constraints, by Newton steps with the decomposition.
+    """Compute x and the multipliers again from the active constraints, by Newton steps with the decomposition.
 
     With N = J^-T (R; 0) and J^T H J = 1, where the rows of `turned` are the columns of J = (J1 J2), a step is
     J1 R^-T (side - N^T x) - J2 J2^T (H x + g).

@@ -98,15 +98,15 @@ def _fields(record: FeedbackRecord | ControllerRecord) -> tuple[str, ...]:
 
 def _check_orientation(record: FeedbackRecord, convention: ConventionRecord, reading: type[BodyReading]) -> None:
     """Check that the type of orientation, angles or quaternion, is that of the message."""
-    wanted = "EULER" if reading is READINGS["geometry_msgs/Vector3Stamped"] else "QUATERNION"
+    lacking = "EULER" if reading is READINGS["geometry_msgs/Vector3Stamped"] else "QUATERNION"
     given = convention.orientation.type
-    if "orientation" in reading.carries and given != wanted:
+    if "orientation" in reading.carries and given != lacking:
         raise PipeError(
             f"the message of '{record.name}' has no orientation of the type {given}",
             where=convention.orientation.where("type") or record.where("convention"),
-            expected=f"type: {wanted}, or another message",
+            expected=f"type: {lacking}, or another message",
         )
-    if wanted == "QUATERNION" and turns(record.output_angles) != MOVING:
+    if lacking == "QUATERNION" and turns(record.output_angles) != MOVING:
         raise PipeError(
             "the base of the robot turns about x, then y, then z",
             where=record.output_angles.where(),
@@ -121,8 +121,8 @@ def _check_carried(
     located = convention.position.type == "FULL"
     needed = {"position": {"orientation", "position"}, "velocity": {"angular", "linear"}}
     for field in fields:
-        wanted = needed[field] if located else needed[field] & {"orientation", "angular"}
-        missing = sorted(wanted - reading.carries)
+        lacking = needed[field] if located else needed[field] & {"orientation", "angular"}
+        missing = sorted(lacking - reading.carries)
         if missing:
             cure = "convention.position.type: NONE" if missing[0] in ("position", "linear") else f"{field}: false"
             raise PipeError(

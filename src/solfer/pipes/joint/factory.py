@@ -193,8 +193,8 @@ def _calibration(record: PipeRecord, context: PipeContext, mapping: Bidirectiona
         return None
     robot = context.robot
     calibration = context.calibrations[record.calibration]
-    wanted = np.intersect1d(select(record.dofs, robot), robot.actuated)
-    missing = [robot.dofs[dof] for dof in wanted if robot.dofs[dof] not in calibration.joints]
+    selected = np.intersect1d(select(record.dofs, robot), robot.actuated)
+    missing = [robot.dofs[dof] for dof in selected if robot.dofs[dof] not in calibration.joints]
     if missing:
         raise PipeError(
             f"calibration '{calibration.name}' lacks joints of the pipe '{record.name}': {', '.join(missing)}",

@@ -14,7 +14,7 @@ from solfer.robot import Robot
 class StartLimits:
     """Limits of the joints that a feedback measures, each wider by a tolerance.
 
-    An encoder that is not calibrated tells a posture that the robot cannot have: a plugin that started from it would
+    An encoder that is not calibrated shows a posture that the robot cannot have: a plugin that started from it would
     drive joints against their stops.
 
     Args:

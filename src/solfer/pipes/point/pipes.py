@@ -144,9 +144,9 @@ class PointFeedbackPipe(FeedbackPipe):
         return values if self._notation is None else self._notation.read(values, np.empty_like(values))
 
     @staticmethod
-    def _check_size(shape: tuple[int, ...], wanted: tuple[int, ...]) -> None:
-        if shape != wanted:
-            raise PipeError(f"numbers of shape {shape}", expected=f"shape {wanted}")
+    def _check_size(shape: tuple[int, ...], declared: tuple[int, ...]) -> None:
+        if shape != declared:
+            raise PipeError(f"numbers of shape {shape}", expected=f"shape {declared}")
 
 
 class PointCommandPipe(CommandPipe):

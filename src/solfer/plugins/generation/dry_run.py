@@ -102,7 +102,7 @@ class DryQueue(Queue):
 
 
 class DryMiddleware(Middleware):
-    """Connects to nothing, and knows of the outside only what the files of the robot tell.
+    """Connects to nothing, and knows of the outside only what the files of the robot contain.
 
     Args:
         configuration: The plugin's configuration.

@@ -164,7 +164,7 @@ class Generator:
             problems = Problems()
             check_tags(tags, RobotNames.of_robot(robot), problems)
             problems.raise_if_any()
-        component = self._asked(lambda: self.component(robot, tags, module.name), "be made")
+        component = self._guarded(lambda: self.component(robot, tags, module.name), "be made")
         component.kinematics = module.kinematics
         component.dynamics = module.dynamics
         component.modify = module.model_change
@@ -173,8 +173,8 @@ class Generator:
 
     def read_tags(self) -> Any:
         """Read the component's own tags; None if it has none, or is not known."""
-        wanted = self.component.Tags
-        return self.configuration.tags(wanted) if self.known and wanted is not None else None
+        record_of_tags = self.component.Tags
+        return self.configuration.tags(record_of_tags) if self.known and record_of_tags is not None else None
 
     def make_pipes(
         self, robot: Robot, component: Component | None, whole: bool = True
@@ -241,7 +241,7 @@ class Generator:
 
     @staticmethod
     def _drives(robot: Robot, pipe: JointCommandPipe) -> bool:
-        """Return whether a pipe commands a drive; one that carries the floating base alone tells where it is wanted."""
+        """Return whether a pipe commands a drive; the floating base alone has none."""
         return bool(np.isin(pipe.dofs, robot.actuated).any())
 
     def _peers(
@@ -405,7 +405,7 @@ class Generator:
         component.clock = self.middleware.stamp_time
         declared = tuple(self.requests.noted(each) for each in self.declarations(component))
         self.publish = bind(component.name, declared, self.middleware, inbox=self.inbox)
-        tuning = self._asked(lambda: Tuning(component, component.live_parameters()), "list its live parameters")
+        tuning = self._guarded(lambda: Tuning(component, component.live_parameters()), "list its live parameters")
         self.tuning = tuning
         setting = cast(Service, self.requests.noted(tuning.setting()))
         self.middleware.serve(component.name, (setting,), self.inbox.submit_one_by_one)
@@ -414,13 +414,13 @@ class Generator:
     def declarations(self, component: Component) -> tuple[Declaration, ...]:
         """List what the component declares; a subclass may add declarations of its own."""
         return (
-            *self._asked(lambda: tuple(component.services()), "list its services"),
-            *self._asked(lambda: tuple(component.topics()), "list its topics"),
-            *self._asked(lambda: tuple(component.actions()), "list its actions"),
-            *self._asked(lambda: tuple(component.parameters()), "list its parameters"),
+            *self._guarded(lambda: tuple(component.services()), "list its services"),
+            *self._guarded(lambda: tuple(component.topics()), "list its topics"),
+            *self._guarded(lambda: tuple(component.actions()), "list its actions"),
+            *self._guarded(lambda: tuple(component.parameters()), "list its parameters"),
         )
 
-    def _asked(self, step: Callable[[], Any], what: str) -> Any:
+    def _guarded(self, step: Callable[[], Any], what: str) -> Any:
         """Run a step of the component, and return its result.
 
         Raises:

@@ -128,13 +128,13 @@ class Writing:
 def writing_of(record: FeedbackRecord, reader: Configuration, group: Iterable[Configuration]) -> Writing | None:
     """Find the other plugin of a group that has written what a feedback receives; None: it has to be received.
 
-    That plugin has `model_change`, and publishes the shared State itself, with all interfaces that are wanted and
+    That plugin has `model_change`, and publishes the shared State itself, with all interfaces that are desired and
     without a filter, as the message and on the topic that the feedback names.
     """
     for configuration in group:
         if configuration.module.model_change and configuration.module.name != reader.module.name:
             for pipe in configuration.controllers:
-                if record.measures and _tells(pipe, record):
+                if record.measures and _publishes(pipe, record):
                     return Writing(configuration.module.name, pipe.name)
     return None
 
@@ -223,10 +223,10 @@ def _two_sources(number: Number, first: tuple[FeedbackRecord, str], second: tupl
         f"the wrench of contact '{dof}'" if function == "contact" else f"the {_SIDES[function]}{interface} of '{dof}'"
     )
     same = _plain(other.source) == _plain(record.source)
-    ways = "with other settings from the same topic" if same else f"from '{_plain(record.source)}'"
+    difference = "with other settings from the same topic" if same else f"from '{_plain(record.source)}'"
     return PipeError(
-        f"{what} has two sources: '{plugin}' receives it by '{record.name}' {ways}, '{owner}', which shares its Robot, "
-        f"by '{other.name}' from '{_plain(other.source)}'",
+        f"{what} has two sources: '{plugin}' receives it by '{record.name}' {difference}, '{owner}', "
+        f"which shares its Robot, by '{other.name}' from '{_plain(other.source)}'",
         where=record.where("source"),
         expected=f"one source for both, as in {other.where('source')}, or one plugin with model_change that receives "
         "either of them",
@@ -260,7 +260,7 @@ def _text(record: TextRecord | None) -> tuple[Any, ...] | None:
     return None if record is None else (record.parameter, record.location)
 
 
-def _tells(pipe: ControllerRecord, record: FeedbackRecord) -> bool:
+def _publishes(pipe: ControllerRecord, record: FeedbackRecord) -> bool:
     """Return whether a command pipe publishes what a feedback receives, as it stands in the State."""
     return (
         not pipe.lower_level

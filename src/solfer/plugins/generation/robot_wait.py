@@ -48,16 +48,16 @@ def wait_for_robot(
     """
     configurations = tuple(configurations)
     looks = 0
-    said = ""
+    reported = ""
     while running():
         found = missing(configurations, middleware)
         if not found:
-            if said:
+            if reported:
                 logger.info("the robot is there")
             return True
-        if found != said or looks % round(AGAIN / LOOK) == 0:
+        if found != reported or looks % round(AGAIN / LOOK) == 0:
             logger.warning("waits for the robot: %s", found)
-            said = found
+            reported = found
             looks = 0
         looks += 1
         pause()

@@ -24,12 +24,12 @@ class Foreign(NamedTuple):
     Attributes:
         mark: Place of the value.
         what: What it says, such as `layer RT`.
-        wanted: The key and its value that this node would run.
+        setting: The key and its value that this node would run.
     """
 
     mark: Mark
     what: str
-    wanted: str
+    setting: str
 
 
 def require_ros(configuration: Configuration, default: Naming, shared: bool = False) -> None:
@@ -49,7 +49,7 @@ def require_ros(configuration: Configuration, default: Naming, shared: bool = Fa
         raise ConfigError(
             f"'{name}' is for the {foreign.what}, and this node runs the layer NRT on ROS",
             where=str(foreign.mark),
-            expected=f"{foreign.wanted}, or {_command(configuration, default)} in place of this node",
+            expected=f"{foreign.setting}, or {_command(configuration, default)} in place of this node",
         )
     if configuration.module.requires and not shared:
         _LOG.info("%s: has no effect: '%s' runs alone", configuration.module.where("requires"), name)

@@ -61,12 +61,12 @@ class SharedRobot:
         if writing is not None:
             written = self._note_of(writing, context.middleware.now)
             return WrittenFeedbackPipe(record.name, WrittenReader(record.source or "", written), record.initialize)
-        wanted = origin(record, configuration) | extent(record) | {"order": _order(record, context.robot)}
-        source = next((source for settings, source in self._read if settings == wanted), None)
+        key = origin(record, configuration) | extent(record) | {"order": _order(record, context.robot)}
+        source = next((source for settings, source in self._read if settings == key), None)
         if source is None:
             longest = longest_history(record, configuration, self._group)
             source = Source(factory.feedback(record.model_copy(update={"history": longest}), context), self._turns)
-            self._read.append((wanted, source))
+            self._read.append((key, source))
         self._sources.add(record, configuration, _numbers(source.pipe, record, context.robot))
         return source.share(record)
 

@@ -67,7 +67,7 @@ class Budget:
         self._begin = 0
 
     def restart(self, cycle: int) -> None:
-        """Begin anew with a start of the plugin in this cycle of the loop."""
+        """Begin again with a start of the plugin in this cycle of the loop."""
         self._begin = cycle
         self.overruns.reset()
 
@@ -80,8 +80,8 @@ class Budget:
             self.overruns.reset()
         return often
 
-    def told(self, took: int) -> str:
-        """Tell why a plugin, whose component took so long [ns], is aborted."""
+    def explanation(self, took: int) -> str:
+        """Report why a plugin, whose component took so long [ns], is aborted."""
         return (
             f"its component took {1e-6 * took:.3f} ms, and more than its budget of {1e-6 * self.limit:.3f} ms too often"
         )

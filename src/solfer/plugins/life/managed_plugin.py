@@ -53,13 +53,13 @@ class ManagedPlugin:
         return self.state in AT_REST
 
     @property
-    def told(self) -> str:
+    def explanation(self) -> str:
         """State and reason."""
         return f"{self.state.name}: {self.reason}" if self.reason else self.state.name
 
     def health(self) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence."""
-        return (Health.ERROR, self.told) if self.state in FAILED else self.plugin.health()
+        return (Health.ERROR, self.explanation) if self.state in FAILED else self.plugin.health()
 
     def initialize(self) -> None:
         """Get ready to be started; sends nothing."""

@@ -145,7 +145,7 @@ class PluginSet:
         if budget.overruns.total != before:
             managed.changed(managed)
         if often:
-            managed.too_slow(budget.told(took))
+            managed.too_slow(budget.explanation(took))
 
     def _note(self, index: int, managed: ManagedPlugin) -> None:
         """Follow a change of a plugin."""

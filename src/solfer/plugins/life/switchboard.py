@@ -89,7 +89,7 @@ class Switchboard:
                 name,
                 [
                     self._switch_one("switch", plugin),
-                    Service("state", TRIGGER, NoFields, reply=Answer, handler=partial(_tell, plugin)),
+                    Service("state", TRIGGER, NoFields, reply=Answer, handler=partial(_explain, plugin)),
                     Service("abort", TRIGGER, NoFields, reply=Answer, handler=answered(partial(_abort, plugin))),
                 ],
                 submit,
@@ -102,7 +102,7 @@ class Switchboard:
         return Service(name, SWITCH_ONE, Flag, reply=Answer, handler=answered(self.commit), prepare=prepare)
 
     def _list(self, _: NoFields) -> Answer:
-        return Answer(message="\n".join(f"{name}: {plugin.told}" for name, plugin in self._plugins.items()))
+        return Answer(message="\n".join(f"{name}: {plugin.explanation}" for name, plugin in self._plugins.items()))
 
     def _named(self, names: Sequence[str]) -> tuple[ManagedPlugin, ...]:
         for name in names:
@@ -115,11 +115,11 @@ class Switchboard:
             if plugin in switch.start:
                 raise MiddlewareError(f"'{plugin.name}' is to start and to stop", expected="one of the two")
             if not plugin.active:
-                raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.told}", expected="a plugin that runs")
+                raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.explanation}", expected="a plugin that runs")
         for plugin in switch.start:
             if plugin.state not in STARTABLE:
                 raise MiddlewareError(
-                    f"'{plugin.name}' cannot be started: {plugin.told}", expected="a plugin that is stopped"
+                    f"'{plugin.name}' cannot be started: {plugin.explanation}", expected="a plugin that is stopped"
                 )
         if switch.start:
             self._admit()
@@ -136,11 +136,11 @@ class Switchboard:
         ]
 
 
-def _tell(plugin: ManagedPlugin, _: NoFields) -> Answer:
-    return Answer(message=plugin.told)
+def _explain(plugin: ManagedPlugin, _: NoFields) -> Answer:
+    return Answer(message=plugin.explanation)
 
 
 def _abort(plugin: ManagedPlugin, _: NoFields) -> None:
     if not plugin.active and plugin.state is not PluginState.STOPPING:
-        raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.told}", expected="a plugin that runs")
+        raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.explanation}", expected="a plugin that runs")
     plugin.abort("by service")

@@ -75,9 +75,9 @@ class Outputs:
         return not self._idle and bool(np.isin(pipe.dofs, self._robot.actuated).any())
 
     @property
-    def way(self) -> float:
-        """How far joints have been commanded to move so far, of each cycle that one which moves farthest [rad, m]."""
-        return self._joints.way
+    def distance(self) -> float:
+        """Sum over all cycles of the largest commanded step of a joint [rad, m]."""
+        return self._joints.distance
 
     @property
     def claims(self) -> frozenset[Claim]:

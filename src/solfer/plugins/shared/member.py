@@ -78,7 +78,7 @@ class SpaceMember(Middleware):
         message = canonical(message)
         channel = self._space.published_to(self.component, resolved, message)
         if channel is not None:
-            channel.heard = True
+            channel.is_received = True
             return SpaceReader(topic, channel, self.now)
         outside = self._outside.reader(topic, message, kept)
         own = self._space.published_by(self.component, resolved, message)

@@ -83,8 +83,8 @@ class SharedGenerator:
         """
         plugins: list[Plugin | None] = []
         for each, generator, outside in zip(self._listed, self._generators, self._outside, strict=True):
-            way = SpaceMember(each.name, self.spaces[each.group], outside) if each.group in self.spaces else outside
-            generation = generator(self._known(each.configuration), way, self.sharing)
+            outlet = SpaceMember(each.name, self.spaces[each.group], outside) if each.group in self.spaces else outside
+            generation = generator(self._known(each.configuration), outlet, self.sharing)
             plugins.append(generation.attempt(whole))
             self._note(error.at(each.where) for error in generation.faults)
         self._check_ends(plugins)

@@ -44,12 +44,12 @@ class SpaceChannel:
         message: The newest message; before the first one that its writer has prepared, None without one.
         sequence: Number of messages so far.
         arrival: Time of the newest message [s]; minus infinity before the first.
-        heard: Whether another component receives it.
+        is_received: Whether another component receives it.
     """
 
     def __init__(self, publication: SharedTopic):
         self.publication = publication
-        self.heard = False
+        self.is_received = False
         self.message: Message | None = None
         self.sequence = 0
         self.arrival = -math.inf
@@ -114,7 +114,7 @@ class SharedSpace:
         return None if channel is None or channel.publication.component == component else channel
 
     def published_by(self, component: str, topic: str, message: str) -> SpaceChannel | None:
-        """Return the channel that a component publishes; None: others have not been told of this publication."""
+        """Return the channel that a component publishes; None: others do not know this publication."""
         channel = self.channels.get((topic, message))
         return None if channel is None or channel.publication.component != component else channel
 
@@ -139,9 +139,9 @@ class SpaceWriter(Writer):
         self._now = now
 
     @property
-    def heard(self) -> bool:  # type: ignore[override]
-        """See `Writer.heard`."""
-        return self.channel.heard
+    def is_received(self) -> bool:  # type: ignore[override]
+        """See `Writer.received`."""
+        return self.channel.is_received
 
     def prepare(self, message: Message) -> None:
         """See `Writer.prepare`."""

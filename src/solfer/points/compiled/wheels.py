@@ -162,7 +162,7 @@ def rolling_offset(row, program, with_jacobian):
     reference = numbers[three : three + 3]
     place = numbers[3 * count + three : 3 * count + three + 3]
     error = numbers[6 * count + three : 6 * count + three + 3]
-    way = numbers[9 * count + two : 9 * count + two + 2]
+    heading = numbers[9 * count + two : 9 * count + two + 2]
     axle = numbers[11 * count + three : 11 * count + three + 3]
     base = numbers[14 * count :]
     vertex = carray(floats(row.first), (3,))
@@ -184,8 +184,8 @@ def rolling_offset(row, program, with_jacobian):
     px = vertex[0] - pose[0]
     py = vertex[1] - pose[1]
     up = vertex[2] - reference[2]
-    way[0] = fx
-    way[1] = fy
+    heading[0] = fx
+    heading[1] = fy
     place[0], place[1], place[2] = cos * px + sin * py, cos * py - sin * px, vertex[2]
     error[0], error[1], error[2] = cos * ex + sin * ey, cos * ey - sin * ex, -up
     value = value_of(row)

@@ -34,7 +34,7 @@ TRUTH = "nav_msgs/Odometry"
 """Message of the true state of a simulated base."""
 
 HOLD = "hold"
-"""Kind of the event that a plugin which ran has to start anew."""
+"""Kind of the event that a plugin which ran has to start again."""
 
 
 class BlackBox:
@@ -69,7 +69,7 @@ class BlackBox:
         truth: Reader | None = None,
     ):
         for plugin in plugins:
-            plugin.requests.wanted = True
+            plugin.requests.enabled = True
         logs = tuple(PluginLog(plugin) for plugin in plugins)
         loop = Logger(LOOP)
         # methods and lists as they are: the cycle looks nothing up

@@ -216,9 +216,9 @@ def of_namespace(namespace: str, root: Path = SHARED_MEMORY) -> list[RecordDrain
     known = sorted({name for name, _ in found})
     if not namespace and len(known) > 1:
         raise MiddlewareError(f"{len(known)} namespaces record", expected=f"NAMESPACE, one of {', '.join(known)}")
-    wanted = namespace or (known[0] if known else "solfer")
-    if wanted not in known:
+    chosen = namespace or (known[0] if known else "solfer")
+    if chosen not in known:
         raise UnknownName(
-            "namespace that records", wanted, known, where=str(root), expected="" if known else "plugins that run"
+            "namespace that records", chosen, known, where=str(root), expected="" if known else "plugins that run"
         )
-    return [drain for name, drain in found if name == wanted]
+    return [drain for name, drain in found if name == chosen]

@@ -55,7 +55,7 @@ class RowRing:
     """The writing end of a `Ring` that overwrites; whoever reads it uses `Ring`.
 
     To gather a row here and not in `Ring.values`, without a word of Python in between, takes a third of the time where
-    the processor has to fetch code and numbers anew, as in a loop that sleeps between its cycles.
+    the processor has to fetch code and numbers again, as in a loop that sleeps between its cycles.
 
     Args:
         memory: Content of a segment, of `Ring.size` bytes.

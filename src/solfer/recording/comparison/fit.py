@@ -56,7 +56,7 @@ def blocks_of(count: int, step: float) -> np.ndarray:
 def fit(
     curve: CubicSpline, times: np.ndarray, second: np.ndarray, free: tuple[int, ...], noise: float, density: float
 ) -> Law:
-    """Fit the law robustly: least squares that are weighted anew in each round (Huber), linear in a step of the delay.
+    """Fit the law robustly: least squares that are weighted again in each round (Huber), linear in a step of the delay.
 
     The errors are those of a sandwich over blocks in time (Liang and Zeger 1986), since what is left is not independent
     from one sample to the next, with Student's quantile for their number; and no less than what the noise alone makes.

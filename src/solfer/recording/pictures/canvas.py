@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 SUFFIXES = (".pdf", ".png")
 MOST = 2000  # points of a line; more are neither seen nor quickly drawn
 FONT = 8.0
-FIRST, SECOND, WANTED, WRONG = "#1f77b4", "#d95f02", "#fdb863", "#b2182b"
-"""Colours that people with a weakness for red and green tell apart."""
+FIRST, SECOND, DESIRED, WRONG = "#1f77b4", "#d95f02", "#fdb863", "#b2182b"
+"""Colours that people with a weakness for red and green distinguish."""
 
 
 def new_figure(width: float, height: float) -> "Figure":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.recording.model import Channel, Recording
-from solfer.recording.pictures.canvas import FIRST, FONT, WANTED, WRONG, draw, dress, new_figure
+from solfer.recording.pictures.canvas import FIRST, FONT, DESIRED, WRONG, draw, dress, new_figure
 from solfer.recording.pictures.tracks import Track, tracks_of
 from solfer.recording.requests import EventGroup, grouped
 
@@ -77,7 +77,7 @@ def _joints(place: "SubFigure", tracks: list[Track], limits: Limits, start: floa
         _joint(axes, track, limits, start=start)
         axes.tick_params(labelbottom=index + COLUMNS >= len(tracks))
     place.supxlabel("time [s]", fontsize=FONT)
-    handles = [_line(color=FIRST, lw=1.0), _line(color=WANTED, lw=2.8), _line(color=WRONG, lw=1.3, ls=":")]
+    handles = [_line(color=FIRST, lw=1.0), _line(color=DESIRED, lw=2.8), _line(color=WRONG, lw=1.3, ls=":")]
     place.legend(
         handles, ["measured", "desired", "limit"], loc="outside upper right", ncols=3, fontsize=FONT, frameon=False
     )
@@ -91,7 +91,7 @@ def _line(**style: Any) -> Any:
 
 def _joint(axes: "Axes", track: Track, limits: Limits, start: float) -> None:
     if track.desired is not None:  # below and wider: both are seen where they are one
-        draw(axes, track.desired.times - start, track.desired.values, color=WANTED, lw=2.8)
+        draw(axes, track.desired.times - start, track.desired.values, color=DESIRED, lw=2.8)
     draw(axes, track.measured.times - start, track.measured.values, color=FIRST, lw=0.9)
     dress(axes, f"{track.joint}  [{track.unit or '-'}]")
     low, high = axes.get_ylim()
@@ -107,7 +107,7 @@ def _joint(axes: "Axes", track: Track, limits: Limits, start: float) -> None:
 
 
 def _errors(place: "SubFigure", tracks: list[Track], start: float) -> None:
-    """Draw the errors of all joints as colours: forty lines in one plot could not be told apart.
+    """Draw the errors of all joints as colours: forty lines in one plot could not be distinguished.
 
     Colours are parts of the largest error of the same unit: wheels, of which velocities are compared, hide no joint.
     """

@@ -80,8 +80,8 @@ def tracks_of(recording: Recording, plugin: str) -> list[Track]:
 
 def _nearest(sent: Series, measured: Series) -> Series:
     """Return what was sent, in the count of a driver, on the turns of what was measured."""
-    ways = np.nan_to_num(sent.values - measured.at(sent.times))
-    return Series(sent.times, sent.values - whole_turns(ways, np.array(math.tau)))
+    errors = np.nan_to_num(sent.values - measured.at(sent.times))
+    return Series(sent.times, sent.values - whole_turns(errors, np.array(math.tau)))
 
 
 def _columns(recording: Recording, plugin: str, parts: tuple[str, ...], field: str) -> dict[str, tuple[str, Series]]:

@@ -142,5 +142,5 @@ def _below(center: np.ndarray, corners: np.ndarray, down: np.ndarray) -> bool:
     edges = np.column_stack((corners[1] - corners[0], corners[2] - corners[0], -down))
     if abs(np.linalg.det(edges)) < 1e-15:
         return False
-    first, second, way = np.linalg.solve(edges, center - corners[0])
-    return bool(first >= 0.0 and second >= 0.0 and first + second <= 1.0 and way > 0.0)
+    first, second, shift = np.linalg.solve(edges, center - corners[0])
+    return bool(first >= 0.0 and second >= 0.0 and first + second <= 1.0 and shift > 0.0)

@@ -36,7 +36,7 @@ class Drift:
         self._switch_on()
 
     def restart(self, seed: int | None = None) -> None:
-        """Switch the sensor on anew, with the same bias and noise, or those of another seed."""
+        """Switch the sensor on again, with the same bias and noise, or those of another seed."""
         self._noise.restart(seed)
         self._switch_on()
 

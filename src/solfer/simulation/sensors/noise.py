@@ -18,7 +18,7 @@ class Noise:
         self.restart()
 
     def restart(self, seed: int | None = None) -> None:
-        """Begin the sequence anew, or that of another seed."""
+        """Begin the sequence again, or that of another seed."""
         self._generator = np.random.default_rng(self._key if seed is None else (seed, self._key[1]))
 
     def add(self, values: np.ndarray, deviation: float) -> None:

@@ -23,7 +23,7 @@ class Sensor(abc.ABC):
         what: What it measures, for the documentation of its rate.
         rate: Rate of publication by default [Hz].
         tags: Its keys below `sensors`, with their types and fields, as `pydantic.create_model` takes them.
-        truth: Whether it tells what no sensor of a real robot could measure; a mock of hardware leaves it out.
+        truth: Whether it reports what no sensor of a real robot could measure; a mock of hardware leaves it out.
         topics: Topics of its messages.
         begun: Number of its restarts.
     """
@@ -51,7 +51,7 @@ class Sensor(abc.ABC):
         """
 
     def restart(self, seed: int | None = None) -> None:
-        """Begin the noise anew, or that of another seed."""
+        """Begin the noise again, or that of another seed."""
         self.noise.restart(seed)
         self.begun += 1
         self._seed = seed

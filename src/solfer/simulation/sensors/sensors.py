@@ -40,6 +40,6 @@ class Sensors(Mapping[str, Any]):
         return len(self._sensors)
 
     def restart(self, seed: int | None = None) -> None:
-        """Begin all noise anew; `seed` replaces the robot's own until the next restart."""
+        """Begin all noise again; `seed` replaces the robot's own until the next restart."""
         for sensor in self.values():
             sensor.restart(seed)

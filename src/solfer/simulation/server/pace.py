@@ -33,7 +33,7 @@ class Pace:
         return self._loop.skipped * self._loop.period if self._loop is not None else 0.0
 
     def wait(self, time: float) -> None:
-        """Return when the simulated `time` [s] is due; the first call and a time that goes back start anew."""
+        """Return when the simulated `time` [s] is due; the first call and a time that goes back start again."""
         now = self._now()
         newest = self._newest
         self._newest = time
@@ -48,7 +48,7 @@ class Pace:
             self._loop.begin()
 
     def restart(self) -> None:
-        """Start anew with the next `wait`: the time in between does not count as lost."""
+        """Start again with the next `wait`: the time in between does not count as lost."""
         self._newest = None
 
     def _measure(self, now: float, time: float) -> None:

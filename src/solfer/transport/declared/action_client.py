@@ -21,7 +21,7 @@ class Goal:
         text: One sentence about it.
         feedback: The newest feedback, None before the first.
         result: The result, None as long as it has not ended, and if it was lost.
-        known: Whether the owner of the action has told that it has the goal.
+        known: Whether the owner of the action has confirmed the goal.
     """
 
     def __init__(self, name: GoalName):
@@ -50,7 +50,7 @@ class ActionClient:
 
     def __init__(self, middleware: Middleware, name: str, interface: str, goal: type, feedback: type, result: type):
         self._types = envelopes(goal, feedback, result)
-        # a client that is started again has the same name, and its clock may begin anew
+        # a client that is started again has the same name, and its clock may begin again
         self._sender = f"{middleware.name}-{secrets.token_hex(4)}"
         self._now = middleware.stamp_time
         self._count = itertools.count(1)

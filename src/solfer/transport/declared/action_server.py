@@ -176,5 +176,5 @@ class ActionServer:
     def _publish_status(self) -> None:
         """Publish the states of the goals."""
         self._next_status = self._now() + BEAT
-        under_way = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
-        self._topics.publish_status((*self._past.values(), *under_way))
+        in_progress = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
+        self._topics.publish_status((*self._past.values(), *in_progress))

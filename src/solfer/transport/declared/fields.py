@@ -55,7 +55,7 @@ def message_of(interface: str, value: Any) -> Message:
     header = fields.get("header", {})
     frame = header.get("frame_id", "")
     stamp = header.get("stamp", 0.0)
-    numbers = np.array([float(_at(fields, way).get(name, 0.0)) for way, names in _PLACES[interface] for name in names])
+    numbers = np.array([float(_at(fields, path).get(name, 0.0)) for path, names in _PLACES[interface] for name in names])
     if interface in WRENCH_MESSAGES:
         return WrenchMessage(frame, numbers[:3], numbers[3:], stamp=stamp)
     return VectorMessage(frame, numbers, stamp)
@@ -137,14 +137,14 @@ def _sequence(values: Any) -> Any:
     return values
 
 
-def _at(fields: Mapping[str, Any], way: tuple[str, ...]) -> Mapping[str, Any]:
-    for name in way:
+def _at(fields: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
+    for name in path:
         fields = fields.get(name, {})
     return fields
 
 
 def _fields_of(message: Message) -> dict[str, Any]:
-    """Convert a message of geometry to the fields of its interfaces; which one, its readers tell."""
+    """Convert a message of geometry to the fields of its interfaces; its readers name them."""
     assert isinstance(message, VectorMessage | WrenchMessage)
     fields: dict[str, Any] = {"header": {"stamp": message.stamp, "frame_id": message.frame}}
     if isinstance(message, WrenchMessage):
@@ -155,9 +155,9 @@ def _fields_of(message: Message) -> dict[str, Any]:
         interfaces = tuple(each for each, size in VECTOR_MESSAGES.items() if size == len(numbers))
     for interface in interfaces:
         rest = iter(numbers)
-        for way, names in _PLACES[interface]:
+        for path, names in _PLACES[interface]:
             place = fields
-            for name in way:
+            for name in path:
                 place = place.setdefault(name, {})
             place |= {name: next(rest) for name in names}
     return fields

@@ -143,14 +143,14 @@ def unknown_class(changed):
 
 
 LEFT, RIGHT = "mwoibn.ros.controller.left.sink", "mwoibn.ros.controller.right.sink"
-WANTED, ENTRY = "mwoibn.ros.feedback.wanted.source", "mwoibn.modules.shared.plugins[0]: "
+DESIRED, ENTRY = "mwoibn.ros.feedback.wanted.source", "mwoibn.modules.shared.plugins[0]: "
 SECOND = "mwoibn.modules.second."
 MISTAKES = {
     two_publishers: (f"{RIGHT}: ", LEFT, "both publish the topic 'left'"),
     two_declared: ("mwoibn.modules.first: ", LEFT, "both publish the topic 'told'"),
-    another_interface: (f"{WANTED}: ", LEFT, "'velocity' is not sent, only position"),
-    another_map: (f"{WANTED}: ", LEFT, "does not fit what 'first' sends (left"),
-    another_order: (f"{WANTED}: ", LEFT, "does not fit what 'second' sends (left"),
+    another_interface: (f"{DESIRED}: ", LEFT, "'velocity' is not sent, only position"),
+    another_map: (f"{DESIRED}: ", LEFT, "does not fit what 'first' sends (left"),
+    another_order: (f"{DESIRED}: ", LEFT, "does not fit what 'second' sends (left"),
     two_sources: ("encoders.source: ", "joints.source", "the measured position of 'shoulder' has two sources"),
     a_strange_required: (f"{SECOND}requires[0]: ", "did you mean: first"),
     requires_itself: (f"{SECOND}requires[0]: ", "'second' requires itself"),

@@ -92,8 +92,8 @@ def test_who_hears_of_a_plugin_is_looked_for(tmp_path, caplog):
         others.publish(k)
         plugin.cycle()
         plugin.peers.look()
-    (told,) = [text for text in caplog.messages if "no subscriber" in text]
-    assert told.startswith("sets: no subscriber on heard (controller 'heard', ") and "main.yaml:" in told
+    (explanation,) = [text for text in caplog.messages if "no subscriber" in text]
+    assert explanation.startswith("sets: no subscriber on heard (controller 'heard', ") and "main.yaml:" in explanation
 
 
 def test_documents_of_a_run_are_those_of_its_robot(tmp_path):

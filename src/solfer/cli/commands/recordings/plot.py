@@ -1,4 +1,4 @@
-"""Draw a recording: a page for each plugin with what it measured, wanted and missed, limits, ages and times.
+"""Draw a recording: a page for each plugin with what it measured, desired and missed, limits, ages and times.
 
 With -c chosen columns over time, one plot for each channel. COLUMN is the name of a channel, such as
 arm/command/direct/position, of a column, such as elbow, or both, channel/column; * and ? stand for anything.

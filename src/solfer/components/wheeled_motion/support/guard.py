@@ -102,7 +102,7 @@ class MotionGuard:
             error=rates.error,
             away=rates.away,
             forward=rates.forward,
-            way=np.zeros(len(rates.error)),
+            held=np.zeros(len(rates.error)),
             velocity=velocity,
             state=self._state,
             watched_count=len(watched),

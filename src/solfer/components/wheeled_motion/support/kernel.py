@@ -48,7 +48,7 @@ GUARD = np.dtype(
         # first rows of the tasks; -1: there is no such task. Then addresses of their errors, rates by which errors go
         # away, desired rates, the way that is held, and joint velocities
         *((name, np.int64) for name in ("of_base", "of_vertices")),
-        *((name, np.int64) for name in ("error", "away", "forward", "way", "velocity")),
+        *((name, np.int64) for name in ("error", "away", "forward", "held", "velocity")),
         # rows that are watched, and their bounds; joints of the legs, and those that steer
         *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds")),
         *((name, np.int64) for name in ("leg_count", "legs", "turning_count", "turning")),
@@ -127,8 +127,8 @@ def _rate(memory, points, edge, velocity):
     a = vector_at(points[first, 0], 2)
     b = vector_at(points[second, 0], 2)
     c = vector_at(points[center, 0], 2)
-    way = (c[0] - a[0]) * (b[0] - a[0]) + (c[1] - a[1]) * (b[1] - a[1])
-    share = way / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
+    along = (c[0] - a[0]) * (b[0] - a[0]) + (c[1] - a[1]) * (b[1] - a[1])
+    share = along / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
     nx = edge[NORMAL_X]
     ny = edge[NORMAL_Y]
     dofs = memory.dofs
@@ -212,12 +212,12 @@ def _reason(memory, is_short, margin, speed, velocity):
 @part
 def _guard(memory, state, is_short, forward, pace, velocity, passed):
     """Whether the motion is held, since it leads where the robot does not get on."""
-    way = vector_at(memory.way, memory.rows)
+    held = vector_at(memory.held, memory.rows)
     size = 0.0
     along = 0.0
     for k in range(memory.rows):
         size += forward[k] * forward[k]
-        along += forward[k] * way[k]
+        along += forward[k] * held[k]
     size = math.sqrt(size)
     if size == 0.0:
         return False
@@ -229,7 +229,7 @@ def _guard(memory, state, is_short, forward, pace, velocity, passed):
         state[WORST] = worst
         state[AGE] = 0.0
         for k in range(memory.rows):
-            way[k] = forward[k] / size
+            held[k] = forward[k] / size
         return True
     if state[WHY] == NOTHING:
         return False

@@ -91,7 +91,7 @@ class Lifting:
         self._holding = tuple(holding)
         self.margin = margin
         self._ground = np.zeros(len(wheels.links))
-        self._asked: list[int] = []
+        self._requested: list[int] = []
         self._answers: list[Future[LiftReply]] = []
         self.phase = Phase.NONE
         self._waited = self._period = 0.0
@@ -119,12 +119,12 @@ class Lifting:
             if name not in names:
                 raise UnknownName("tracked contact", name, names, expected="a contact of the group `track`")
         lifted = self._references.lifted
-        asked = [names.index(name) for name in request.contacts or names]
+        requested = [names.index(name) for name in request.contacts or names]
         answer: Future[LiftReply] = Future()
         if not request.lifted:
-            self._give_back(asked, answer)
+            self._give_back(requested, answer)
             return answer
-        left = len(lifted) - len({*asked, *np.flatnonzero(lifted).tolist()})
+        left = len(lifted) - len({*requested, *np.flatnonzero(lifted).tolist()})
         if left < CARRYING:
             raise ComponentError(f"{left} wheels would carry the robot", expected=f"{CARRYING} or more")
         if not self._wheels.is_whole:
@@ -134,8 +134,8 @@ class Lifting:
             )
         if self.phase is not Phase.NONE:
             raise ComponentError(f"{self.phase.value}", expected="a request when that is done")
-        self._asked = [index for index in asked if not lifted[index]]
-        if not self._asked:
+        self._requested = [index for index in requested if not lifted[index]]
+        if not self._requested:
             answer.set_result(LiftReply())
             return answer
         self._answers.append(answer)
@@ -168,14 +168,14 @@ class Lifting:
                 self.shift.end()
                 self._end("")
 
-    def _give_back(self, asked: list[int], answer: "Future[LiftReply]") -> None:
+    def _give_back(self, requested: list[int], answer: "Future[LiftReply]") -> None:
         """Put wheels down; a lift that is under way is given up."""
         lifted = self._references.lifted
         if self.phase in (Phase.SHIFT, Phase.SETTLE):
             self._fail("a request to put wheels down")
         elif self.phase is Phase.NONE:
-            self._asked = [index for index in asked if lifted[index]]
-            if not self._asked:
+            self._requested = [index for index in requested if lifted[index]]
+            if not self._requested:
                 answer.set_result(LiftReply())
                 return
             self.phase = Phase.LOWER
@@ -189,13 +189,13 @@ class Lifting:
     def _lacking(self, margin: float) -> tuple[float, float]:
         """Return the way of the centre of mass to where the others carry it with a margin, x and y [m]."""
         lifted = np.flatnonzero(self._references.lifted).tolist()
-        return self.polygon.towards([*self._asked, *lifted], margin)
+        return self.polygon.towards([*self._requested, *lifted], margin)
 
     def _settle(self) -> None:
         """Lift the wheels as soon as the others carry the robot."""
         x, y = self._lacking(self.margin - WORSE)
         if math.hypot(x, y) < 1e-3:
-            for index in self._asked:
+            for index in self._requested:
                 self._ground[index] = self._wheels.offsets.states[index, 2] - self._plane(index)
                 self._release(index, True)
             self._end("")
@@ -207,16 +207,16 @@ class Lifting:
         if self._rounds < ROUNDS:
             self._begin_shift()
         else:
-            names = ", ".join(self._wheels.contacts[index].name for index in self._asked)
+            names = ", ".join(self._wheels.contacts[index].name for index in self._requested)
             self._fail(f"without {names} the centre of mass stays {math.hypot(x, y):.3f} m too near to an edge")
 
     def _lower(self) -> None:
         """Let wheels go down until they stand."""
         references = self._references
         forces = self._wheels.measure_forces()
-        feels = bool(np.delete(forces, self._asked).any())
+        feels = bool(np.delete(forces, self._requested).any())
         lost = ""
-        for index in list(self._asked):
+        for index in list(self._requested):
             height = float(references.vertices[index, 2]) - self._plane(index) - self._ground[index]
             force = float(forces[index]) * len(forces)
             if (force > PUSH * float(forces.sum())) if feels else height < 1e-4:
@@ -227,8 +227,8 @@ class Lifting:
                 continue
             else:
                 lost = f"no ground below '{self._wheels.contacts[index].name}'"
-            self._asked.remove(index)
-        if lost or not self._asked:
+            self._requested.remove(index)
+        if lost or not self._requested:
             if references.lifted.any():
                 self._end(lost)
             else:
@@ -238,7 +238,7 @@ class Lifting:
         """Return the height of the plane of the carrying wheels at another one [m]: the robot gives way, and tilts."""
         states = self._wheels.offsets.states
         carrying = ~self._references.lifted
-        carrying[self._asked] = False
+        carrying[self._requested] = False
         corners = np.column_stack((states[carrying, :2], np.ones(int(carrying.sum()))))
         plane, *_ = np.linalg.lstsq(corners, states[carrying, 2], rcond=None)
         return float(plane @ (states[index, 0], states[index, 1], 1.0))

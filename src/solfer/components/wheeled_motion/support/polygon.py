@@ -46,11 +46,11 @@ class SupportPolygon:
         flags[list(lifted)] = True
         edges = self.edges[: find_edges(self.points, flags, self.order, self.edges)]
         normals = edges[:, [NORMAL_X, NORMAL_Y]]
-        way = np.zeros(2)
+        shift = np.zeros(2)
         for _ in range(32):  # projections on half-planes, in turn, meet in their common part
-            lacks = least - (edges[:, INSIDE] + normals @ way)
+            lacks = least - (edges[:, INSIDE] + normals @ shift)
             shortest = int(lacks.argmax())
             if lacks[shortest] < NEAR:
                 break
-            way += lacks[shortest] * normals[shortest]
-        return float(way[0]), float(way[1])
+            shift += lacks[shortest] * normals[shortest]
+        return float(shift[0]), float(shift[1])

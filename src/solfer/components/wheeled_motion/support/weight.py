@@ -32,12 +32,12 @@ class WeightShift:
         self._references = references
         self._wheels = wheels
         self._joints = joints
-        self.goal, self._way, self._moved = np.zeros((3, 2))
+        self.goal, self._shift, self._moved = np.zeros((3, 2))
         self._speed = 0.0
 
     def start(self) -> None:
         """Begin with the weight where it is."""
-        self._way[:] = 0.0
+        self._shift[:] = 0.0
         self._moved[:] = 0.0
 
     def displace(self, move: PlanarMove) -> None:
@@ -48,16 +48,16 @@ class WeightShift:
         """Let the base move by a way in the world [m]."""
         position = self._references.position
         self.goal[:] = position[0] + x, position[1] + y
-        self._way += self._seen(np.array((x, y)))
+        self._shift += self._seen(np.array((x, y)))
         self._speed = 0.0
 
     def give_up(self) -> None:
         """Let the base stay where it has come to: the rest of the way was not gone."""
-        self._way += self._seen(self._references.position[:2] - self.goal)
+        self._shift += self._seen(self._references.position[:2] - self.goal)
 
     def begin_back(self) -> None:
         """Let the base move back by all ways that it has gone."""
-        x, y = turned(self._references.heading, *self._way.tolist())
+        x, y = turned(self._references.heading, *self._shift.tolist())
         self.begin(-x, -y)
 
     def end(self) -> None:
@@ -86,6 +86,6 @@ class WeightShift:
         references.velocity[:2] = left * (speed / distance)
         return False
 
-    def _seen(self, way: np.ndarray) -> np.ndarray:
+    def _seen(self, shift: np.ndarray) -> np.ndarray:
         """Return a way in the world as seen from the heading [m]."""
-        return np.array(seen_from(self._references.heading, *way.tolist()))
+        return np.array(seen_from(self._references.heading, *shift.tolist()))

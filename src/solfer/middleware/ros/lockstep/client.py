@@ -14,7 +14,7 @@ import rospy
 
 from solfer.errors import ConfigError, MiddlewareError
 from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.endpoints import UNDER_WAY, RosQueue, RosReader, RosWriter
+from solfer.middleware.ros.endpoints import IN_PROGRESS, RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.waiting import ShutdownRequested, wait_for
 
@@ -82,9 +82,9 @@ def _wait_for_message(
     endpoint: RosReader | RosQueue, sender: str, number: int, running: Callable[[], bool], before: int
 ) -> None:
     subscription = endpoint.subscription
-    if not wait_for(lambda: subscription.number(sender, before) == number, UNDER_WAY, running, step=1e-4):
+    if not wait_for(lambda: subscription.number(sender, before) == number, IN_PROGRESS, running, step=1e-4):
         raise MiddlewareError(
-            f"message {number} of {sender} on topic {endpoint.topic} has not arrived within {UNDER_WAY:g} s",
+            f"message {number} of {sender} on topic {endpoint.topic} has not arrived within {IN_PROGRESS:g} s",
             expected="in lock-step every message to arrive",
         )
 
@@ -116,7 +116,7 @@ def wait_for_connections(endpoints: Iterable[Endpoint], name: str, running: Call
 
 def _wait_for_nodes(nodes: set[str], connected: Callable[[], set[str]], running: Callable[[], bool]) -> set[str]:
     """Wait until the nodes are connected; returns those that are not connected in time."""
-    wait_for(lambda: nodes <= connected(), UNDER_WAY, running)
+    wait_for(lambda: nodes <= connected(), IN_PROGRESS, running)
     return nodes - connected()
 
 

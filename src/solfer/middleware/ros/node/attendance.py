@@ -33,23 +33,23 @@ class Attendance:
         self._patience = patience
         self._since: dict[str, float] = {}
         self._registered: set[str] = set()
-        self._asked = -RIVALRY
+        self._checked = -RIVALRY
         self._answer: Future[set[str]] | None = None
 
     def awaited(self, published: Container[str]) -> list[str]:
         """List the nodes that have been known for less than RIVALRY and are not among `published`, sorted."""
         now = self._now()
-        self._ask(now)
+        self._check(now)
         present = self._connected() | self._registered
         self._since = {name: self._since.get(name, now) for name in present}
         return sorted(name for name in present if name not in published and now - self._since[name] < RIVALRY)
 
-    def _ask(self, now: float) -> None:
+    def _check(self, now: float) -> None:
         """Bring the registered publishers up to date."""
         if self._answer is None:
-            if now - self._asked < RIVALRY:
+            if now - self._checked < RIVALRY:
                 return
-            self._asked = now
+            self._checked = now
             self._answer = in_thread(lambda: _registered(self._topic))
             wait((self._answer,), self._patience)
         answer = self._answer

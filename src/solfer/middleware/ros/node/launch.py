@@ -51,7 +51,7 @@ class Launch:
         self._port = port
         self._process: subprocess.Popen | None = None
         self.patience = 10.0
-        self._asked = 0.0
+        self._checked = 0.0
         self.uri = f"http://localhost:{port}"
 
     def __enter__(self) -> "Launch":
@@ -75,16 +75,16 @@ class Launch:
 
     def request_end(self) -> None:
         """Ask the system to end, without waiting; what is left to do here can be done meanwhile."""
-        self._asked = self._asked or time.monotonic()
+        self._checked = self._checked or time.monotonic()
         if self._process.poll() is None:
             # roslaunch takes it as it takes SIGINT, of which Python complains while it still begins
             os.killpg(self._process.pid, signal.SIGTERM)
 
     def __exit__(self, *_: object) -> None:
         nodes = descendants(self._process.pid)
-        if not self._asked:
+        if not self._checked:
             self.request_end()
-        self._wait(self._asked + self.patience - time.monotonic())
+        self._wait(self._checked + self.patience - time.monotonic())
         if self._process.poll() is None:
             self._process.terminate()
             self._wait(0.5 * self.patience)

@@ -45,7 +45,7 @@ class _Bounded(xmlrpc.client.Transport):
         return connection
 
 
-def ask(uri: str, method: str, *arguments: Any) -> Any:
+def call(uri: str, method: str, *arguments: Any) -> Any:
     """Call a method of a master or a node.
 
     Raises:
@@ -59,7 +59,7 @@ def ask(uri: str, method: str, *arguments: Any) -> Any:
     return value
 
 
-def ask_master(method: str, *arguments: Any) -> Any:
+def call_master(method: str, *arguments: Any) -> Any:
     """Call a method of the master.
 
     Raises:
@@ -68,7 +68,7 @@ def ask_master(method: str, *arguments: Any) -> Any:
     """
     uri = rosgraph.get_master_uri()
     try:
-        return ask(rosgraph.Master(CALLER).master_uri, method, *arguments)  # which checks the URI
+        return call(rosgraph.Master(CALLER).master_uri, method, *arguments)  # which checks the URI
     except UNREACHABLE as error:
         raise MiddlewareError(
             f"the ROS master does not answer ({error})",
@@ -86,7 +86,7 @@ def require_master() -> int:
     Raises:
         MiddlewareError: It does not; names its URI.
     """
-    return ask_master("getPid")
+    return call_master("getPid")
 
 
 def knows(node: str, uri: str) -> bool:
@@ -96,7 +96,7 @@ def knows(node: str, uri: str) -> bool:
         MiddlewareError: The master does not answer.
     """
     try:
-        return ask_master("lookupNode", node) == uri
+        return call_master("lookupNode", node) == uri
     except rosgraph.MasterError:
         return False
 
@@ -104,7 +104,7 @@ def knows(node: str, uri: str) -> bool:
 def lives(uri: str, process: int) -> bool:
     """Return whether the node of a process still answers at its URI; one that hangs does."""
     try:
-        return ask(uri, "getPid") == process
+        return call(uri, "getPid") == process
     except TimeoutError:
         return True
     except (*UNREACHABLE, rosgraph.MasterError):
@@ -117,14 +117,14 @@ def graph() -> Graph:
     Raises:
         MiddlewareError: The master does not answer.
     """
-    publishers, subscribers, _ = ask_master("getSystemState")
-    return Graph(dict(publishers), dict(subscribers), dict(ask_master("getTopicTypes")))
+    publishers, subscribers, _ = call_master("getSystemState")
+    return Graph(dict(publishers), dict(subscribers), dict(call_master("getTopicTypes")))
 
 
 def subscribed_type(node: str, topic: str) -> str:
     """Ask a node for the type of the messages that it expects on a topic; empty if it does not answer."""
     try:
-        return dict(ask(ask_master("lookupNode", node), "getSubscriptions")).get(topic, "")
+        return dict(call(call_master("lookupNode", node), "getSubscriptions")).get(topic, "")
     except (*UNREACHABLE, rosgraph.MasterError, MiddlewareError):
         return ""
 
@@ -136,7 +136,7 @@ def refuse_twin(resolved: str) -> None:
         MiddlewareError: There is one.
     """
     try:
-        ask(ask_master("lookupNode", resolved), "getPid")
+        call(call_master("lookupNode", resolved), "getPid")
     except (rosgraph.MasterError, ConnectionError, socket.gaierror):
         return
     except OSError:
@@ -155,7 +155,7 @@ def _twin(resolved: str, state: str, cure: str) -> MiddlewareError:
 def _answers(node: str) -> bool:
     """Return whether a node that the master knows lives; one that hangs does."""
     try:
-        ask(ask_master("lookupNode", node), "getPid")
+        call(call_master("lookupNode", node), "getPid")
     except (rosgraph.MasterError, ConnectionError, socket.gaierror):
         return False
     except OSError:

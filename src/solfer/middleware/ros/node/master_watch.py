@@ -26,12 +26,12 @@ class MasterWatch:
     """Asks the master for its number, and for this node, periodically, in a thread of its own.
 
     A node goes on without a master, but no node finds it any more, even after a master is back: only the master that
-    received registrations keeps them, and rospy has no way to make all of them anew, so that the node has to start
-    anew. A master that answers late, or is away for a moment and comes back as the same process, lost nothing.
+    received registrations keeps them, and rospy has no way to make all of them again, so that the node has to start
+    again. A master that answers late, or is away for a moment and comes back as the same process, lost nothing.
 
     Args:
         lost: Called once, in the watch's thread, when the master is lost.
-        number: Returns a number that changes when the master starts anew; raises MiddlewareError if it does not answer.
+        number: Returns a number that changes when the master starts again; MiddlewareError: it does not answer.
         known: Returns whether the master knows this node; raises MiddlewareError in the same way.
         period: Time between two calls [s].
         patience: Time without an answer after which the master is lost [s].
@@ -51,7 +51,7 @@ class MasterWatch:
         period: float = PERIOD,
         patience: float = PATIENCE,
     ):
-        self._ask = number
+        self._request = number
         self._known = known
         self._lost = lost
         self._period = period
@@ -88,7 +88,7 @@ class MasterWatch:
 
     def _look(self) -> str:
         """Describe what is wrong with a master that answers; empty: nothing."""
-        if self._ask() != self._number:
+        if self._request() != self._number:
             return f"another ROS master answers at {rosgraph.get_master_uri()}, which does not know this node"
         known = self._known()
         if self._registered and not known:

@@ -58,14 +58,14 @@ class RosNode:
                 f"'{base}' cannot be the name of a node",
                 expected="a letter, then letters, digits and underscores; another name by __name:=NAME",
             )
-        self._asked, self._closing, self._gone = (threading.Event() for _ in range(3))
+        self._ends, self._closing, self._gone = (threading.Event() for _ in range(3))
         self._watch: MasterWatch | None = None
         self.loss = ""
         require_master()
         namespace = rosgraph.names.get_ros_namespace(argv=argv)
         refuse_twin(rosgraph.names.ns_join(namespace, base))
         set_caller(rosgraph.names.ns_join(namespace, "unnamed"))  # rospy has read it from the process' own arguments
-        self._end = ProcessEnd(self._asked.set)
+        self._end = ProcessEnd(self._ends.set)
         try:
             rospy.init_node(base, argv=argv, disable_signals=True, disable_rostime=True)
         except rospy.ROSException as error:
@@ -92,7 +92,7 @@ class RosNode:
 
     def running(self) -> bool:
         """Return whether the end was not requested yet."""
-        return self._end.running() and not self._asked.is_set()
+        return self._end.running() and not self._ends.is_set()
 
     def close(self) -> None:
         """Unregister from the master.
@@ -100,7 +100,7 @@ class RosNode:
         Raises:
             MiddlewareError: The node has ended because its master was lost.
         """
-        self._asked.set()
+        self._ends.set()
         if self._watch is not None:
             self._watch.close()
         self._closing.set()
@@ -110,7 +110,7 @@ class RosNode:
         self._gone.wait(GRACE)
         if self.loss:
             raise MiddlewareError(
-                f"node {self.name} ends: {self.loss}; start it anew",
+                f"node {self.name} ends: {self.loss}; start it again",
                 expected="a ROS master that stays, and knows the node",
             )
 
@@ -119,13 +119,13 @@ class RosNode:
 
     def _on_loss(self) -> None:
         """End the node with an error, unless it was asked to end already."""
-        if not self._asked.is_set():
+        if not self._ends.is_set():
             self.loss = self._watch.loss
-            self._asked.set()
+            self._ends.set()
 
     def _on_shutdown(self) -> None:
         """Keep rospy from closing the topics before the loop has sent its last command."""
-        self._asked.set()
+        self._ends.set()
         if threading.current_thread() is not threading.main_thread():
             self._closing.wait(GRACE)
 

@@ -23,7 +23,7 @@ HALF = np.sqrt(0.5)
 AXES = {"x": (HALF, 0.0, 0.0, HALF), "y": (0.0, 0.0, HALF, HALF), "z": (0.0, HALF, 0.0, HALF)}
 """Quaternions (x, y, z, w) that turn the axis x of a control to each axis."""
 
-WAYS = {
+DIRECTIONS = {
     "position": (InteractiveMarkerControl.MOVE_AXIS,),
     "orientation": (InteractiveMarkerControl.ROTATE_AXIS,),
     "pose": (InteractiveMarkerControl.MOVE_AXIS, InteractiveMarkerControl.ROTATE_AXIS),
@@ -93,9 +93,9 @@ class ReferenceMarkers:
 def _made(name: str, frame: str, shown: ShownReference) -> InteractiveMarker:
     made = InteractiveMarker(name=name, description=name, scale=SIZE, pose=pose_of(shown.own))
     made.header.frame_id = frame
-    for way in WAYS[shown.quantity]:
+    for direction in DIRECTIONS[shown.quantity]:
         for axis, turn in AXES.items():
-            control = InteractiveMarkerControl(name=f"{axis}{way}", interaction_mode=way)
+            control = InteractiveMarkerControl(name=f"{axis}{direction}", interaction_mode=direction)
             place = control.orientation
             place.x, place.y, place.z, place.w = turn
             made.controls.append(control)

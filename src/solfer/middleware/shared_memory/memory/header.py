@@ -85,7 +85,7 @@ def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> Non
         )
     if memory[8 * Word.BOOT : 8 * Word.BOOT + 16] != boot():
         raise MiddlewareError(
-            "shared memory from before the machine was started", where=where, expected="an owner that makes it anew"
+            "shared memory from before the machine was started", where=where, expected="an owner that makes it again"
         )
     if kind_of(memory) != kind:
         raise MiddlewareError(f"shared memory of the kind '{kind_of(memory)}'", where=where, expected=f"'{kind}'")

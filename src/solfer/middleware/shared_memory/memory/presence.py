@@ -53,5 +53,5 @@ class Presence:
         if self.loss:
             raise MiddlewareError(
                 f"no other process finds this one any more: {self.loss}",
-                expected="a new start, which makes the namespace anew",
+                expected="a new start, which makes the namespace again",
             )

@@ -1,7 +1,7 @@
 """A piece of memory that processes share: a file below /dev/shm with a header, one owner, and any number of others.
 
 A segment is made whole under another name and then renamed, so that no process ever sees half of one. An owner that
-makes it anew, with another layout or after a crash, leaves the old memory to processes that still map it, and marks it
+makes it again, with another layout or after a crash, leaves the old memory to processes that still map it, and marks it
 as retired. `multiprocessing.shared_memory` is not used: before Python 3.13 it deletes what others still need.
 """
 

@@ -13,7 +13,7 @@ from solfer.middleware.shared_memory.rpc.services import CALLS, SERVICES, client
 
 
 @dataclass
-class _Asked:
+class _PendingCall:
     """A call without a reply yet; `sent`: whether the service was there, `latest`: when the client gives up [s]."""
 
     name: str
@@ -43,13 +43,13 @@ class Calls:
         self._namespace, self._client, self._now = namespace, client_name(node), now
         self._offers: dict[str, Segment] = {}
         self._channels: dict[tuple[str, bytes], RpcChannel] = {}
-        self.open: list[_Asked] = []
+        self.open: list[_PendingCall] = []
         self._count = 0
 
-    def ask(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+    def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """Call a service as soon as it is offered; `poll` completes the Future. See `Middleware.request`."""
         self._count += 1
-        asked = _Asked(
+        pending = _PendingCall(
             name.lstrip("/"),
             interface_of(interface, type(request), reply),
             request,
@@ -59,9 +59,9 @@ class Calls:
             latest=self._now() + timeout,
             number=self._count,
         )
-        self.open.append(asked)
+        self.open.append(pending)
         self.poll()
-        return asked.answer
+        return pending.answer
 
     def poll(self) -> None:
         """Send what can be sent, and receive replies."""
@@ -70,19 +70,19 @@ class Calls:
         for channel in self._channels.values():
             while (reply := channel.replies.receive()) is not None:
                 self._answer(*reply)
-        for asked in self.open:
+        for pending in self.open:
             try:
-                self._advance(asked)
+                self._advance(pending)
             except MiddlewareError as error:
-                asked.answer.set_exception(error)
-        self.open = [asked for asked in self.open if not asked.answer.done()]
+                pending.answer.set_exception(error)
+        self.open = [pending for pending in self.open if not pending.answer.done()]
 
     def close(self) -> None:
         """Close the channels; calls without a reply fail."""
-        for asked in self.open:
-            asked.answer.set_exception(
+        for pending in self.open:
+            pending.answer.set_exception(
                 MiddlewareError(
-                    f"the caller of service '{asked.name}' ends",
+                    f"the caller of service '{pending.name}' ends",
                     expected="a caller that runs until the answer is there",
                 )
             )
@@ -91,59 +91,59 @@ class Calls:
             channel.segment.close(for_good=True)
             self._namespace.bell(SERVICES, name).ring()
 
-    def _advance(self, asked: _Asked) -> None:
-        if asked.answer.done():
+    def _advance(self, pending: _PendingCall) -> None:
+        if pending.answer.done():
             return
-        if not asked.sent and self._offered(asked):
-            asked.sent = self._channel(asked).requests.send(asked.number, [asked.latest, packed(asked.request)])
-        if self._now() < asked.latest:
+        if not pending.sent and self._offered(pending):
+            pending.sent = self._channel(pending).requests.send(pending.number, [pending.latest, packed(pending.request)])
+        if self._now() < pending.latest:
             return
-        if not asked.sent and not self._offered(asked):
+        if not pending.sent and not self._offered(pending):
             raise ServiceUnavailable(
-                f"no node offers the service '{asked.name}' (waited {asked.timeout:g} s)",
-                names=nearest(asked.name, services_of(self._namespace)),
+                f"no node offers the service '{pending.name}' (waited {pending.timeout:g} s)",
+                names=nearest(pending.name, services_of(self._namespace)),
             )
         raise MiddlewareError(
-            f"service '{asked.name}' does not answer (waited {asked.timeout:g} s)",
+            f"service '{pending.name}' does not answer (waited {pending.timeout:g} s)",
             expected="an owner that runs; one that is held up does not answer",
         )
 
-    def _offered(self, asked: _Asked) -> bool:
+    def _offered(self, pending: _PendingCall) -> bool:
         """Return whether the service of a call is offered.
 
         Raises:
             MiddlewareError: It has another interface.
         """
-        segment = self._offers.get(asked.name)
+        segment = self._offers.get(pending.name)
         if segment is None or segment.retired:
-            segment = offered(self._namespace, asked.name)
+            segment = offered(self._namespace, pending.name)
             if segment is None:
-                self._offers.pop(asked.name, None)
+                self._offers.pop(pending.name, None)
                 return False
-            self._offers[asked.name] = segment
-        if segment.layout != asked.interface:
+            self._offers[pending.name] = segment
+        if segment.layout != pending.interface:
             raise MiddlewareError(
-                f"service '{asked.name}' is {segment.layout.decode()}",
+                f"service '{pending.name}' is {segment.layout.decode()}",
                 where=str(segment.path),
-                expected=asked.interface.decode(),
+                expected=pending.interface.decode(),
             )
         return True
 
-    def _channel(self, asked: _Asked) -> RpcChannel:
-        key = asked.name, asked.interface
+    def _channel(self, pending: _PendingCall) -> RpcChannel:
+        key = pending.name, pending.interface
         if key not in self._channels:
-            path = self._namespace.place(SERVICES, asked.name, CALLS, self._client)
-            self._channels[key] = RpcChannel.open(path, asked.interface)
-            self._namespace.bell(SERVICES, asked.name).ring()
+            path = self._namespace.place(SERVICES, pending.name, CALLS, self._client)
+            self._channels[key] = RpcChannel.open(path, pending.interface)
+            self._namespace.bell(SERVICES, pending.name).ring()
         return self._channels[key]
 
     def _answer(self, number: int, content: Any) -> None:
-        asked = next((each for each in self.open if each.number == number), None)
-        if asked is None or asked.answer.done():
+        pending = next((each for each in self.open if each.number == number), None)
+        if pending is None or pending.answer.done():
             return  # it came too late
         state, published = content
         if state == DONE:
-            asked.answer.set_result(unpacked(asked.reply, published))
+            pending.answer.set_result(unpacked(pending.reply, published))
         else:
             reason = published
-            asked.answer.set_exception(MiddlewareError(f"service '{asked.name}' fails: {reason}"))
+            pending.answer.set_exception(MiddlewareError(f"service '{pending.name}' fails: {reason}"))

@@ -212,7 +212,7 @@ class XbotQueue(Queue):
 
 
 class XbotMail:
-    """Tells whether messages may wait in any of several queues, in one call.
+    """Reports whether messages may wait in any of several queues, in one call.
 
     Args:
         queues: The queues.
@@ -223,7 +223,7 @@ class XbotMail:
         self._queues = tuple(queues)
         self._words = bell.words
         self._rung = bell.place
-        self._heard, self._ends = -1, tuple[Slot | Ring, ...]()
+        self._count, self._ends = -1, tuple[Slot | Ring, ...]()
 
     def __call__(self) -> bool:
         """Return it; true as well if a sender of any topic has started or ended."""
@@ -231,13 +231,13 @@ class XbotMail:
             if end.words[NEWEST] != end.sequence:
                 return True
         number = self._words[self._rung]
-        if number == self._heard:
+        if number == self._count:
             return False
         for queue in self._queues:
             if queue:
                 return True
         # nothing has rung for these queues since they were emptied
-        self._heard = number
+        self._count = number
         self._ends = tuple(end for queue in self._queues for end in queue.ends)
         return False
 

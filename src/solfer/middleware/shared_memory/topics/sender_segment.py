@@ -143,7 +143,7 @@ def require_message(namespace: Namespace, topic: str, message: str) -> None:
         try:
             segment = Segment.attach(path, KIND)
         except MiddlewareError:
-            continue  # readers report what is damaged, its writer makes it anew
+            continue  # readers report what is damaged, its writer makes it again
         published = json.loads(segment.layout)
         if published["message"] != message and segment.owned():
             raise MiddlewareError(

@@ -137,7 +137,7 @@ class Imu(SingleSensor):
         )
 
     def restart(self, seed: int | None = None) -> None:
-        """See `Sensor.restart`; the sensor is switched on anew."""
+        """See `Sensor.restart`; the sensor is switched on again."""
         super().restart(seed)
         self._gyroscope.restart(seed)
         self._accelerometer.restart(seed)

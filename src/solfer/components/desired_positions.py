@@ -5,7 +5,7 @@ import numpy as np
 from solfer.robot import Robot
 
 
-class WantedPositions:
+class DesiredPositions:
     """Positions in the desired State as the pipes of a configuration write them there, in whole or in parts.
 
     A component that commands others than those that it received, and found its own numbers there in a cycle without a
@@ -16,7 +16,7 @@ class WantedPositions:
         robot: The Robot; its desired positions are no numbers until a pipe, or `start`, writes them.
 
     Attributes:
-        values: Wanted position of each DoF, shape (n,) [rad, m].
+        values: Desired position of each DoF, shape (n,) [rad, m].
     """
 
     def __init__(self, robot: Robot):
