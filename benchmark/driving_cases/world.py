@@ -68,7 +68,7 @@ class World:
     registered, more = NAME, ""
     """Name of the plugin that drives it, and what its configuration has besides."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913, PLR0917 a case names what it changes
         self,
         folder: Path,
         tags: str = "",

@@ -30,6 +30,77 @@ from solfer.recording.model import JOINTS
 from solfer.robot import Robot
 
 
+class _JointRamp:
+    """A ramp of all joints, which moves those that follow no trajectory.
+
+    Args:
+        size: Number n of joints.
+
+    Attributes:
+        moves: Which joints it moves, shape (n,); live.
+    """
+
+    def __init__(self, size: int):
+        self.moves = np.ones(size, dtype=bool)
+        self._ramp = Ramp(size)
+        self._time = self._duration = 0.0
+        self._position = np.zeros(size)
+        self._velocity = np.zeros(size)
+
+    @property
+    def left(self) -> float:
+        """Time until its end [s]."""
+        return self._duration - self._time
+
+    @property
+    def stop_time(self) -> float:
+        """See `Ramp.stop_time`."""
+        return self._ramp.stop_time
+
+    def plan(self, position: np.ndarray, velocity: np.ndarray, goal: np.ndarray, limits: np.ndarray) -> None:
+        """Begin with all joints; see `Ramp.plan`."""
+        self._duration = self._ramp.plan(position, velocity, goal, limits)
+        self._time = 0.0
+        self.moves[:] = True
+
+    def advance(self, step: float, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Go on by a time [s], and write positions and velocities of the joints that it moves, shape (n,) each."""
+        if self._time >= self._duration:
+            return
+        self._time = min(self._time + step, self._duration)
+        self._ramp.at(self._time, self._position, self._velocity)
+        np.copyto(position, self._position, where=self.moves)
+        np.copyto(velocity, self._velocity, where=self.moves)
+
+    def end(self) -> None:
+        """End where the joints are."""
+        self.moves[:] = True
+        self._time = self._duration = 0.0
+
+
+class _WheelSpeeds:
+    """Speeds of wheels, which come nearer to their goals with a limited acceleration.
+
+    Args:
+        count: Number k of wheels.
+
+    Attributes:
+        velocity, goal: Present and final speeds, shape (k,) [rad/s]; live.
+    """
+
+    def __init__(self, count: int):
+        self.velocity = np.zeros(count)
+        self.goal = np.zeros(count)
+        self._step = np.zeros(count)
+
+    def advance(self, most: float) -> None:
+        """Change each speed by `most` at most [rad/s]."""
+        np.subtract(self.goal, self.velocity, out=self._step)
+        np.maximum(self._step, -most, out=self._step)
+        np.minimum(self._step, most, out=self._step)
+        self.velocity += self._step
+
+
 class JointStates(Component):
     """Moves joints to positions in synchronised ramps and turns wheels at given speeds, by a service.
 
@@ -63,16 +134,10 @@ class JointStates(Component):
         self._goals = JointGoals(robot, self._joints, self._wheels, chain=self.tags.chain)
         self._limit = robot.upper_limits.velocity[self._joints]
         self._turns = robot.turns[self._joints]
-        self._ramp = Ramp(len(self._joints))
-        self._time = self._duration = 0.0
+        self._ramp = _JointRamp(len(self._joints))
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))
-        self._ramped = np.zeros(len(self._joints))
-        self._ramp_velocity = np.zeros(len(self._joints))
-        self._by_ramp = np.ones(len(self._joints), dtype=bool)
         self._follower = TrajectoryFollower(robot, self._joints, self._position, velocity=self._velocity)
-        self._wheel_velocity = np.zeros(len(self._wheels))
-        self._wheel_goal = np.zeros(len(self._wheels))
-        self._step = np.zeros(len(self._wheels))
+        self._speeds = _WheelSpeeds(len(self._wheels))
         self._error = np.zeros(len(self._joints))
 
     def _group(self, tag: str) -> np.ndarray:
@@ -96,26 +161,18 @@ class JointStates(Component):
 
     def update(self) -> None:
         """Follow the ramp and the trajectory of the joints, and bring the wheels nearer to their speed."""
-        if self._time < self._duration:
-            self._time = min(self._time + self.time_step, self._duration)
-            self._ramp.at(self._time, self._ramped, self._ramp_velocity)
-            np.copyto(self._position, self._ramped, where=self._by_ramp)
-            np.copyto(self._velocity, self._ramp_velocity, where=self._by_ramp)
+        self._ramp.advance(self.time_step, self._position, self._velocity)
         self._follower.advance(self.time_step)
         if self._follower.violated:
             self._brake()
-        step = self.tags.wheel_acceleration * self.time_step
-        np.subtract(self._wheel_goal, self._wheel_velocity, out=self._step)
-        np.maximum(self._step, -step, out=self._step)
-        np.minimum(self._step, step, out=self._step)
-        self._wheel_velocity += self._step
+        self._speeds.advance(self.tags.wheel_acceleration * self.time_step)
 
     def send(self) -> None:
         """Write positions and velocities of the joints, and velocities of the wheels."""
         command = self.model.command
         command.position[self._joints] = self._position
         command.velocity[self._joints] = self._velocity
-        command.velocity[self._wheels] = self._wheel_velocity
+        command.velocity[self._wheels] = self._speeds.velocity
 
     def stop(self) -> None:
         """Hold the joints where the ramp is; wheels stand still at once."""
@@ -128,8 +185,8 @@ class JointStates(Component):
         logger.add("ramp/velocity", self._velocity, names, "rad/s", kind=JOINTS)
         logger.add("goal/position", self._goal, names, "rad", kind=JOINTS)
         logger.add("error/position", self._error, names, "rad", kind=JOINTS)
-        logger.add("wheels/velocity", self._wheel_velocity, wheels, "rad/s", kind=JOINTS)
-        logger.add("wheel_goal/velocity", self._wheel_goal, wheels, "rad/s", kind=JOINTS)
+        logger.add("wheels/velocity", self._speeds.velocity, wheels, "rad/s", kind=JOINTS)
+        logger.add("wheel_goal/velocity", self._speeds.goal, wheels, "rad/s", kind=JOINTS)
 
     def log(self, logger: Logger, time: float) -> None:
         """See `Component.log`: how far the measured joints are from the ramp."""
@@ -209,16 +266,16 @@ class JointStates(Component):
             ComponentError: A value is beyond the robot's limits, or the request contradicts itself.
         """
         speed = self._speed(request.speed)
-        goal, wheel_goal = self._goals.targets_of(request, self._goal, self._wheel_goal)
+        goal, wheel_goal = self._goals.targets_of(request, self._goal, self._speeds.goal)
         moved = goal != self._goal
         goal[moved] -= whole_turns(goal - self._position, self._turns)[moved]
         if self._goals.moves_joints(request):
             self._follower.leave("a request of the service has taken over")
             self._plan(goal, np.minimum(speed, self._limit))
         self._goal[:] = goal
-        self._wheel_goal[:] = wheel_goal
-        spin = np.abs(wheel_goal - self._wheel_velocity).max(initial=0.0) / self.tags.wheel_acceleration
-        return Reply(duration=float(max(self._duration - self._time, spin)))
+        self._speeds.goal[:] = wheel_goal
+        spin = np.abs(wheel_goal - self._speeds.velocity).max(initial=0.0) / self.tags.wheel_acceleration
+        return Reply(duration=float(max(self._ramp.left, spin)))
 
     def _speed(self, speed: float) -> float:
         if not np.isfinite(speed) or speed < 0.0:
@@ -230,14 +287,12 @@ class JointStates(Component):
         end = self._follower.begin(trajectory, self.clock(), goal)
         if before:
             self._slow_down()
-        self._by_ramp[self._follower.places] = False
+        self._ramp.moves[self._follower.places] = False
         self._goal[self._follower.places] = end
 
     def _plan(self, goal: np.ndarray, limits: np.ndarray) -> None:
         """Begin a ramp of all joints, from how they move at present."""
-        self._duration = self._ramp.plan(self._position, self._velocity, goal, limits)
-        self._time = 0.0
-        self._by_ramp[:] = True
+        self._ramp.plan(self._position, self._velocity, goal, limits)
         self._goal[:] = goal
 
     def _brake(self) -> None:
@@ -257,9 +312,8 @@ class JointStates(Component):
 
     def _rest(self) -> None:
         self._follower.forget()
-        self._by_ramp[:] = True
-        self._time = self._duration = 0.0
+        self._ramp.end()
         self._goal[:] = self._position
         self._velocity[:] = 0.0
-        self._wheel_velocity[:] = 0.0
-        self._wheel_goal[:] = 0.0
+        self._speeds.velocity[:] = 0.0
+        self._speeds.goal[:] = 0.0

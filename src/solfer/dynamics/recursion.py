@@ -12,6 +12,50 @@ DENSE_CALL, DENSE_SHARE = 3500, 0.125
 Measured by `benchmark/growth.py`: it wins from some 30 joints in a row on, and loses where limbs branch off a base."""
 
 
+class _Branches:
+    """Which bodies the kernels go over.
+
+    Args:
+        parents: Parent of each body, -1: the world, shape (n,).
+        is_folded: Whether a leader moves what other branches carry, too: then no entry is surely zero.
+
+    Attributes:
+        parents: See above.
+        factor_parents: The same for factors of the inertia matrix.
+        factor_last: Last body that each carries, for factors, shape (n,).
+        products: Products of numbers that the recursion needs for an inverse.
+    """
+
+    def __init__(self, parents: np.ndarray, is_folded: bool):
+        size = len(parents)
+        last = np.arange(size)
+        for body in range(size - 1, -1, -1):
+            if parents[body] >= 0:
+                last[parents[body]] = max(last[parents[body]], last[body])
+        self.parents = parents
+        self.factor_parents = np.arange(-1, size - 1) if is_folded else parents
+        self.factor_last = np.full(size, size - 1) if is_folded else last
+        self.products = np.sum((last - np.arange(size) + 1) ** 2)
+
+
+class _Bodies:
+    """What the kernels compute of each body.
+
+    Args:
+        size: Number n of bodies.
+
+    Attributes:
+        spatial, composite: Inertias of a body alone, and of all that it carries, shape (n, 10).
+        motion: Velocity and acceleration, shape (n, 12).
+        force: Shape (n, 6).
+    """
+
+    def __init__(self, size: int):
+        self.spatial, self.composite = np.zeros((2, size, 10))
+        self.motion = np.zeros((size, 12))
+        self.force = np.zeros((size, 6))
+
+
 class Recursion:
     """Bias force, inertia matrix and its inverse at the present kinematics of a robot; nothing is allocated.
 
@@ -31,58 +75,50 @@ class Recursion:
         self._tree = robot.kinematics.tree
         self._gravity = np.array(robot.kinematics.gravity)
         size = robot.kinematics.size
-        self.bias, self.inertia, self.inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
+        self.bias = np.zeros(size)
+        self.inertia, self.inertia_inverse = np.zeros((2, size, size))
         # entries that are always zero are not written: what is folded is not the array that the recursion writes
-        self._followers = self._tree.followers
         self._folds = bool(self._tree.followers)
         self._unfolded = np.zeros((size, size)) if self._folds else self.inertia
         self._diagonal = self._unfolded.reshape(-1)[:: size + 1]
         self._has_rotors = bool(self._tree.armature.any())
-        self._parents = self._tree.parents[1:] - 1
-        self._last = np.arange(size)
-        for body in range(size - 1, -1, -1):
-            if self._parents[body] >= 0:
-                self._last[self._parents[body]] = max(self._last[self._parents[body]], self._last[body])
-        self._line = np.arange(-1, size - 1)
-        self._ends = np.full(size, size - 1)
-        self._spatial, self._composite = np.zeros((2, size, 10))
-        self._motion = np.zeros((size, 12))
-        self._force = np.zeros((size, 6))
-        products = np.sum((self._last - np.arange(size) + 1) ** 2)
-        self._dense = products > DENSE_CALL + DENSE_SHARE * size**3
+        self._branches = _Branches(self._tree.parents[1:] - 1, self._folds)
+        self._bodies = _Bodies(size)
+        self._dense = self._branches.products > DENSE_CALL + DENSE_SHARE * size**3
         # LAPACK's own order, so that it works in place
         self._factor = np.zeros((size, size), order="F" if self._dense else "C")
         self._roots = np.zeros(size)
-        self._inverse_diagonal = self.inertia_inverse.reshape(-1)[:: size + 1]
 
     def place(self) -> None:
         """Compute the inertias of the bodies in world axes."""
         tree = self._tree
-        kernel.place(tree.placements, tree.masses, tree.levers, tree.inertias, self._spatial)
+        kernel.place(tree.placements, tree.masses, tree.levers, tree.inertias, self._bodies.spatial)
 
     def compute_bias(self) -> None:
         """Write `bias`."""
+        bodies = self._bodies
         kernel.bias(
             self._tree.jacobian,
             self._tree.velocity,
-            self._parents,
-            self._spatial,
+            self._branches.parents,
+            bodies.spatial,
             self._gravity,
-            self._motion,
-            self._force,
+            bodies.motion,
+            bodies.force,
             self.bias,
         )
         if self._folds:
-            self._followers.fold(self.bias)
+            self._tree.followers.fold(self.bias)
 
     def compute_inertia(self) -> None:
         """Write `inertia`."""
-        kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self._unfolded)
+        bodies = self._bodies
+        kernel.inertia(self._tree.jacobian, self._branches.parents, bodies.spatial, bodies.composite, self._unfolded)
         if self._has_rotors:
             self._diagonal += self._tree.armature
         if self._folds:
             self.inertia[:] = self._unfolded
-            self._followers.fold_inertia(self.inertia)
+            self._tree.followers.fold_inertia(self.inertia)
 
     def compute_inverse(self) -> None:
         """Write `inertia_inverse`.
@@ -100,11 +136,9 @@ class Recursion:
 
     def _invert_tree(self) -> int:
         """Invert by the factors of the tree; return the DoF at which that fails, or -1."""
-        parents = self._parents
-        last = self._last
-        if self._folds:  # a leader moves what other branches carry, too: no entry is surely zero
-            parents = self._line
-            last = self._ends
+        branches = self._branches
+        parents = branches.factor_parents
+        last = branches.factor_last
         return kernel.inverse(self.inertia, parents, last, self._factor, self._roots, self.inertia_inverse)
 
     def _invert_dense(self) -> int:
@@ -115,5 +149,5 @@ class Recursion:
             return failed - 1
         lapack.dpotri(self._factor, lower=1, overwrite_c=1)
         np.add(self._factor, self._factor.T, out=self.inertia_inverse)
-        self._inverse_diagonal *= 0.5
+        self.inertia_inverse.reshape(-1)[:: len(self.bias) + 1] *= 0.5
         return -1

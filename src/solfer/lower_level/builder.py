@@ -1,6 +1,6 @@
 """Builds a robot's lower level from its records."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -20,9 +20,7 @@ def build_lower_level(
     groups: Mapping[str, Iterable[str]],
     gains: Mapping[str, GainRecord] | None = None,
     record: LowerLevelRecord | None = None,
-    robot: str = "",
     posture: np.ndarray | None = None,
-    passive: Collection[str] = (),
     actuators: Actuators | None = None,
 ) -> LowerLevel:
     """Build the controllers of a robot; without any record one impedance controller called `joints` holds it.
@@ -33,17 +31,17 @@ def build_lower_level(
         groups: Names of the joints of each group.
         gains: Default gains by joint; without them see `default_gains`.
         record: Settings of the lower level's defences.
-        robot: Name of the robot, the key of its part in gains files.
         posture: Positions of all DoFs for which missing gains are computed, and joints with two masses are chosen,
             shape (kinematics.size,).
-        passive: Joints without a drive, which no controller has.
-        actuators: Springs between motors and joints, and the motors' inertia; None: all joints are rigid.
+        actuators: Joints with a drive, springs between motors and joints, and the motors' inertia; None: all joints
+            but followers have one, and are rigid.
 
     Raises:
         UnknownName: A group that does not exist.
         ModelError: A joint is in two controllers or in none, or a joint of an impedance controller has no gains.
     """
     records = records or {"joints": JointControllerRecord(type="impedance")}
+    passive = kinematics.followers.names if actuators is None else actuators.passive
     base = 0 if kinematics.base is None else 6
     driven = [joint for joint in kinematics.dofs[base:] if joint not in passive]
     if not driven:
@@ -55,7 +53,6 @@ def build_lower_level(
             for name, item in records.items()
         ],
         record,
-        robot=robot,
         passive=passive,
         actuators=actuators,
         posture=posture,

@@ -13,6 +13,7 @@ from solfer.lower_level.claims.refusals import Refusals
 from solfer.lower_level.emergency_stop import EmergencyStop
 from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.laws.drives import Drives
+from solfer.lower_level.laws.measured_turns import MeasuredPosition
 from solfer.lower_level.records import LowerLevelRecord
 from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.actuators import Actuators
@@ -38,12 +39,12 @@ class LowerLevel:
         kinematics: Model of the robot, with its floating base if it has one.
         controllers: Controllers that together have every actuated joint exactly once.
         record: Settings of its defences.
-        robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
         passive: Joints without a drive.
         actuators: Springs between motors and joints, see `Drives`.
         posture: Position for which those are made, see `Drives`.
 
     Attributes:
+        robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
         controllers: Controllers by name.
         claims: Leases on the joints.
         emergency: The emergency stop; tripped by `emergency_stop` only.
@@ -63,7 +64,6 @@ class LowerLevel:
         kinematics: Kinematics,
         controllers: Sequence[LowerLevelController],
         record: LowerLevelRecord | None = None,
-        robot: str = "",
         passive: Collection[str] = (),
         actuators: Actuators | None = None,
         posture: np.ndarray | None = None,
@@ -72,7 +72,9 @@ class LowerLevel:
         self.controllers = {controller.name: controller for controller in controllers}
         self.drives = Drives(kinematics, controllers, passive, actuators=actuators, posture=posture)
         record = record or LowerLevelRecord()
-        self.robot, self._silence, self.folders = robot, record.silence, Folders()
+        self.robot = ""
+        self._silence = record.silence
+        self.folders = Folders()
         self.ration = record.ration
         self.claims = Claims({controller.name: controller.joints for controller in controllers}, record.lease)
         self.emergency = EmergencyStop(record.fade)
@@ -80,17 +82,8 @@ class LowerLevel:
         self.refusals = Refusals()
         self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
-        self._measured = np.zeros(kinematics.size)
+        self._measured = MeasuredPosition(kinematics.turns)
         self.starts = 0
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import keep_turns, unwrap
-
-        self._unwrap = unwrap
-        self._keep_turns = keep_turns
-        self._turns = kinematics.turns
-        self._added = np.zeros(kinematics.size)
-        self._turning = np.flatnonzero(self._turns)
-        self._before = np.zeros((3, kinematics.size))  # see the kernel
 
     @property
     def refused(self) -> int:
@@ -226,7 +219,7 @@ class LowerLevel:
         if self.emergency:
             logger.warning("the emergency stop is reset")
             self.emergency.reset()
-            self._restart(self._measured)
+            self._restart(self._measured.value)
 
     def start(self, q: np.ndarray) -> None:
         """Begin with a robot that was put into the position q of the model's DoFs, shape (model size,)."""
@@ -239,9 +232,7 @@ class LowerLevel:
         Owners of claims have to claim again: their commands were meant for another position. An owner without a name
         commands from within this process, and knows of the start.
         """
-        self._measured[:] = q
-        self._before[:] = q
-        self._added[:] = 0.0
+        self._measured.start(q)
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:
@@ -257,11 +248,7 @@ class LowerLevel:
         Returns:
             `Drives.torque` and `Drives.speed`.
         """
-        self._measured[:] = q
-        if self._turning.size:  # encoders may count within a turn
-            self._unwrap(self._measured, self._turning, self._before, self._turns, self._added)
-            self._keep_turns(self._measured, self._turning, self._before, self._added)
-            q = self._measured
+        q = self._measured.measure(q)
         for ended in self.claims.advance(dt):
             self._expire(ended)
         if wrong := self.safeguard.advance(q, v, dt):
@@ -327,7 +314,7 @@ class LowerLevel:
         logger.error("the robot holds and refuses all commands: %s", reason)
         self.release_all(reason)
         for controller in self.controllers.values():
-            controller.start(self._measured[controller.dofs])
+            controller.start(self._measured.value[controller.dofs])
 
     def _expire(self, ended: LeaseEnded) -> None:
         """Handle a lease that has timed out.
@@ -355,7 +342,7 @@ class LowerLevel:
     def _rest(self, controller: LowerLevelController, joints: np.ndarray) -> None:
         """Hold joints of a controller, indices, in the fields that have no owner."""
         free = {field: self.claims.unclaimed(controller.name, field, joints) for field in JOINT_FIELDS}
-        if unsprung := controller.hold(self._measured[controller.dofs], free):
+        if unsprung := controller.hold(self._measured.value[controller.dofs], free):
             logger.warning(
                 "%s: no commands any longer, and no spring to hold them; their dampers brake them", ", ".join(unsprung)
             )

@@ -46,6 +46,53 @@ RESTS = 5
 """How often zero velocities are published at the end."""
 
 
+class _Subscribers:
+    """Waits until what is published has subscribers.
+
+    Args:
+        middleware: Carries the topics.
+        course: Has their writers.
+
+    Attributes:
+        begin: Since when it waits [s].
+    """
+
+    def __init__(self, middleware: Middleware, course: Course):
+        self._middleware = middleware
+        self._course = course
+        self._topics: Future[Topics] | None = None
+        self._are_connected = False
+        self._lacked = 0.0
+        self.begin = middleware.now()
+
+    def missing(self) -> str:
+        """Return which topic has no subscriber; empty once all have had one for a while.
+
+        Raises:
+            MiddlewareError: It takes too long.
+        """
+        if self._are_connected:
+            return ""
+        now = self._middleware.now()
+        if self._topics is None:
+            self._topics = self._middleware.topics()
+            return "the topics of others"  # which answer in the next cycle at the earliest, on every middleware
+        if not self._topics.done():
+            return "the topics of others"
+        topics = self._topics.result()
+        self._topics = None
+        for writer in self._course.writers:
+            missing = topics.missing_subscriber(writer.topic, writer.carries)
+            if missing is None:
+                continue
+            if now - self.begin > PATIENCE:
+                raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
+            self._lacked = now
+            return f"a subscriber on {writer.topic}"
+        self._are_connected = now - max(self._lacked, self.begin) >= SETTLED
+        return "" if self._are_connected else CONNECTIONS
+
+
 class Navigation:
     """Carries a course out.
 
@@ -69,7 +116,8 @@ class Navigation:
         self._middleware = middleware
         self._course = course
         self._rate = rate
-        self._period, self._throttle, self._inbox = 1.0 / rate, Throttle(logger, 5.0), Inbox()
+        self._throttle = Throttle(logger, 5.0)
+        self._inbox = Inbox()
         self.done = self.paused = False
         self.pace = 0.0
         self.elapsed = 0.0
@@ -77,10 +125,8 @@ class Navigation:
         self._progress = middleware.writer(f"{name}/progress", PROGRESS)
         self._reported = -EVERY
         self._number = -1
-        self._requested: Future[Topics] | None = None
-        self._begin = self._went = middleware.now()
-        self._is_received = False
-        self._lacked = 0.0
+        self._subscribers = _Subscribers(middleware, course)
+        self._went = self._subscribers.begin
         pause = Service("pause", SWITCH_ONE, Flag, reply=Accepted, handler=self._pause)
         middleware.serve(name, (pause,), self._inbox.submit)
 
@@ -106,14 +152,14 @@ class Navigation:
 
     def cycle(self, skipped: int = 0) -> None:
         """Carry out one period, and those that were `skipped` before: the robot has gone on meanwhile."""
-        period = self._period * (1 + min(skipped, MOST_SKIPPED))
+        period = (1 + min(skipped, MOST_SKIPPED)) / self._rate
         self._inbox.apply()
-        self.waits = self._missing_subscriber()
+        self.waits = self._subscribers.missing()
         # a course that asks others has its answers when it begins; one that measures begins with what is new then
         if not self.waits or (self._course.has_dialogue and self.waits == CONNECTIONS):
             self.waits = self._course.awaits() or self.waits
         if self.waits:
-            if self._middleware.now() - self._begin > SOON:
+            if self._middleware.now() - self._subscribers.begin > SOON:
                 self._throttle.warning(self.waits, "waits for %s", self.waits)
             self.pace, self._went = 0.0, self._middleware.now()
             self._course.rest()
@@ -139,33 +185,6 @@ class Navigation:
                 f"the robot has not gone on for {STUCK:g} s: its pace is {self._course.share:.2f}",
                 expected="a motion that the robot can follow; its own log says what holds it",
             )
-
-    def _missing_subscriber(self) -> str:
-        """Return which topic has no subscriber; empty once all have had one for a while.
-
-        Raises:
-            MiddlewareError: It takes too long.
-        """
-        if self._is_received:
-            return ""
-        now = self._middleware.now()
-        if self._requested is None:
-            self._requested = self._middleware.topics()
-            return "the topics of others"  # which answer in the next cycle at the earliest, on every middleware
-        if not self._requested.done():
-            return "the topics of others"
-        topics = self._requested.result()
-        self._requested = None
-        for writer in self._course.writers:
-            missing = topics.missing_subscriber(writer.topic, writer.carries)
-            if missing is None:
-                continue
-            if now - self._begin > PATIENCE:
-                raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
-            self._lacked = now
-            return f"a subscriber on {writer.topic}"
-        self._is_received = now - max(self._lacked, self._begin) >= SETTLED
-        return "" if self._is_received else CONNECTIONS
 
     def _pause(self, request: Flag) -> Accepted:
         self.paused = request.data

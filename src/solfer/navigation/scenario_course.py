@@ -10,7 +10,7 @@ from solfer.errors import ComponentError, SolferError
 from solfer.navigation.course import Course, FollowedPace
 from solfer.navigation.lookahead import Lookahead
 from solfer.navigation.scenario_motion import ScenarioPositions, ScenarioVelocities
-from solfer.scenarios import Player
+from solfer.scenarios import Player, Scenario
 from solfer.scenarios.records import LegRecord
 from solfer.transport import Middleware
 
@@ -18,6 +18,53 @@ LIFT = "solfer/LiftContacts"
 
 PATIENCE = 120.0
 """Longest time until a contact is lifted or carries again [s]."""
+
+
+class ContactChanges:
+    """Lets contacts be lifted and carry again, one after the other, as a scenario has them.
+
+    Args:
+        middleware: Carries the requests.
+        service: Name of the service.
+        names: Names of the contacts, leg by leg.
+        grounded: Which legs of the scenario have contact with the ground, shape (n,); live.
+    """
+
+    def __init__(self, middleware: Middleware, service: str, names: Sequence[str], grounded: np.ndarray):
+        self._middleware = middleware
+        self._service = service
+        self._names = tuple(names)
+        self._desired = grounded
+        self._grounded = grounded.copy()
+        self._changing = 0
+        self._answer: Future[LiftReply] | None = None
+
+    def awaits(self) -> str:
+        """Return what is awaited; empty: nothing.
+
+        Raises:
+            ComponentError: A contact cannot be lifted, or cannot carry again.
+        """
+        if self._answer is None:
+            return ""
+        if not self._answer.done():
+            return f"an answer of {self._service}"
+        answer = self._answer.result()
+        self._answer = None
+        if not answer.success:
+            raise ComponentError(f"{self._service} refuses: {answer.message}", expected="a contact that can change")
+        self._grounded[self._changing] = not self._grounded[self._changing]
+        return self.change()
+
+    def change(self) -> str:
+        """Request the first contact that is not as the scenario has it; return what is awaited, empty: nothing."""
+        changed = np.flatnonzero(self._grounded != self._desired)
+        if not len(changed):
+            return ""
+        self._changing = int(changed[0])
+        request = LiftContacts((self._names[self._changing],), bool(self._grounded[self._changing]))
+        self._answer = self._middleware.request(self._service, LIFT, request, LiftReply, PATIENCE)
+        return f"an answer of {self._service}"
 
 
 class ScenarioCourse(Course):
@@ -54,23 +101,18 @@ class ScenarioCourse(Course):
         positions: bool = False,
     ):
         self._player = player
-        self._middleware = middleware
         name = f"{target}/" if target else ""
         kind = ScenarioPositions if positions else ScenarioVelocities
         self._motion = kind(middleware, player, name, odometry)
         self._lookahead = Lookahead(player.scenario)
         self._followed = FollowedPace(middleware, f"{name}pace")
-        self._lift = f"{name}lift"
-        self._contacts = tuple(contacts)
-        self._grounded = player.grounded.copy()
-        self._requested = 0
-        self._answer: Future[LiftReply] | None = None
+        self._changes = ContactChanges(middleware, f"{name}lift", contacts, grounded=player.grounded)
         self._is_held = False
         self._moves = True
         self._pace = 0.0
         self.writers = self._motion.writers
         self.count = len(player.scenario.pattern)
-        self._require_contacts()
+        _require_contacts(player.scenario, contacts)
 
     def awaits(self) -> str:
         """See `Course.awaits`.
@@ -82,16 +124,7 @@ class ScenarioCourse(Course):
             return missing
         missing = self._followed.awaits()
         self.share = 0.0 if missing else self._followed.value
-        if self._answer is None:
-            return missing
-        if not self._answer.done():
-            return f"an answer of {self._lift}"
-        answer = self._answer.result()
-        self._answer = None
-        if not answer.success:
-            raise ComponentError(f"{self._lift} refuses: {answer.message}", expected="a contact that can change")
-        self._grounded[self._requested] = not self._grounded[self._requested]
-        return self._change_contact()
+        return self._changes.awaits() or missing
 
     def step(self, period: float, pace: float) -> bool:
         """See `Course.step`."""
@@ -101,7 +134,7 @@ class ScenarioCourse(Course):
         if not self._is_held:
             self._go_on(period * pace * self.share)
             self._pace = pace
-            self._is_held = bool(self._change_contact())  # what the player has computed waits for the contact
+            self._is_held = bool(self._changes.change())  # what the player has computed waits for the contact
             if self._is_held:
                 self.rest()
                 return True
@@ -135,26 +168,16 @@ class ScenarioCourse(Course):
         """See `Course.left`."""
         return self._player.left
 
-    def _change_contact(self) -> str:
-        """Ask for the first contact that is not as the scenario has it; returns what is awaited, empty: nothing."""
-        changed = np.flatnonzero(self._grounded != self._player.grounded)
-        if not len(changed):
-            return ""
-        self._requested = int(changed[0])
-        request = LiftContacts((self._contacts[self._requested],), bool(self._grounded[self._requested]))
-        self._answer = self._middleware.request(self._lift, LIFT, request, LiftReply, PATIENCE)
-        return f"an answer of {self._lift}"
 
-    def _require_contacts(self) -> None:
-        scenario = self._player.scenario
-        changing = [step for step in scenario.pattern if isinstance(step, LegRecord)]
-        if changing and not self._contacts:
-            raise SolferError(
-                f"a step of the type '{changing[0].type}' needs the names of the contacts",
-                where=changing[0].where(),
-                expected=f"--contacts with {scenario.legs} names",
-            )
-        if len(self._contacts) not in (0, scenario.legs):
-            raise SolferError(
-                f"{len(self._contacts)} contacts", where="--contacts", expected=f"{scenario.legs}, one for each leg"
-            )
+def _require_contacts(scenario: Scenario, contacts: Sequence[str]) -> None:
+    changing = [step for step in scenario.pattern if isinstance(step, LegRecord)]
+    if changing and not contacts:
+        raise SolferError(
+            f"a step of the type '{changing[0].type}' needs the names of the contacts",
+            where=changing[0].where(),
+            expected=f"--contacts with {scenario.legs} names",
+        )
+    if len(contacts) not in (0, scenario.legs):
+        raise SolferError(
+            f"{len(contacts)} contacts", where="--contacts", expected=f"{scenario.legs}, one for each leg"
+        )

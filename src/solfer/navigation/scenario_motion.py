@@ -102,6 +102,29 @@ class ScenarioVelocities(ScenarioMotion):
         return False
 
 
+class OdometryJumps:
+    """Finds jumps of an odometry: it is not where it would be if it had gone on as before."""
+
+    def __init__(self) -> None:
+        self._measured, self._step = np.zeros((2, 4))
+        self._measured_at = -math.inf
+
+    def find(self, pose: MeasuredPose, now: float) -> PlanarMove | None:
+        """Return how a pose has jumped that was measured `now` [s]; None: it has not."""
+        measured = np.array((pose.x, pose.y, pose.z, pose.heading))
+        expected = self._measured + self._step
+        passed = now - self._measured_at
+        self._step = measured - self._measured
+        self._measured = measured
+        self._measured_at = now
+        turn = float(measured[3] - expected[3])
+        move = PlanarMove(expected[:3], measured[:3], turn)
+        has_jumped = move.distance > JUMP[0] + SPEED[0] * passed or abs(turn) > JUMP[1] + SPEED[1] * passed
+        if has_jumped or passed == math.inf:
+            self._step[:] = 0.0
+        return move if has_jumped else None
+
+
 class ScenarioPositions(ScenarioMotion):
     """Publishes positions for the pipes `base` and `vertices` of the target, in the frame of the odometry.
 
@@ -135,8 +158,7 @@ class ScenarioPositions(ScenarioMotion):
         self._heading = self._ended = 0.0
         self._base = np.zeros(4)
         self._vertices = np.zeros_like(player.vertex_velocity)
-        self._measured, self._step = np.zeros((2, 4))
-        self._measured_at = -math.inf
+        self._jumps = OdometryJumps()
 
     def awaits(self) -> str:
         """See `ScenarioMotion.awaits`."""
@@ -196,19 +218,7 @@ class ScenarioPositions(ScenarioMotion):
 
     def _move_with_odometry(self) -> None:
         """Move the course as the odometry has jumped: from where it would be if it had gone on as before."""
-        pose = self._pose
-        now = self._middleware.now()
-        measured = np.array((pose.x, pose.y, pose.z, pose.heading))
-        expected = self._measured + self._step
-        passed = now - self._measured_at
-        self._step = measured - self._measured
-        self._measured = measured
-        self._measured_at = now
-        turn = float(measured[3] - expected[3])
-        move = PlanarMove(expected[:3], measured[:3], turn)
-        if move.distance > JUMP[0] + SPEED[0] * passed or abs(turn) > JUMP[1] + SPEED[1] * passed:
+        move = self._jumps.find(self._pose, self._middleware.now())
+        if move is not None:
             move.move(self._begin[BASE_PORT][:3])
-            self._heading += turn
-            self._step[:] = 0.0
-        elif passed == math.inf:
-            self._step[:] = 0.0
+            self._heading += move.turn

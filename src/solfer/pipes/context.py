@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 from solfer.components.port import Port
 from solfer.config import CalibrationRecord
-from solfer.config.records.pipes import InterfaceRecord, PipeRecord
+from solfer.config.records.pipes import FeedbackRecord, InterfaceRecord, PipeRecord
 from solfer.errors import PipeError
 from solfer.model import State
 from solfer.numerics.filters import LowPass
-from solfer.pipes.joint.pipes import MakeFilter
+from solfer.pipes.feedback_pipe import MakeFilter, Reception
 from solfer.robot import Robot
 from solfer.transport.endpoints import NullWriter, Writer
 from solfer.transport.messages import canonical
@@ -71,6 +71,15 @@ class PipeContext:
 
         make(0)  # raises for a wrong filter here, even if none is made later
         return make
+
+    def reception(self, record: FeedbackRecord) -> Reception:
+        """Return how a pipe to a State receives."""
+        return Reception(
+            record.initialize,
+            low_pass=self.low_pass(record),
+            measured=record.function != "reference",
+            history=record.history or 0,
+        )
 
 
 def fields_of(interface: InterfaceRecord, pipe: str) -> tuple[str, ...]:

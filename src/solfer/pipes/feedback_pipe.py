@@ -4,6 +4,7 @@ import abc
 import logging
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,6 +28,24 @@ UNFIT = (PipeError, UnknownName, NotFinite)
 NAMING_DELAY = 0.2
 """Time within which a plugin receives that its robot was put into another state, and within which joints agree with
 their velocities again after an impact: a contradiction that is still there then is one of a sensor [s]."""
+
+
+@dataclass(frozen=True)
+class Reception:
+    """How a pipe receives numbers of a State.
+
+    Attributes:
+        required: Whether the plugin has to wait for the pipe before it starts.
+        low_pass: Makes the filter of one field; None: there is none.
+        measured: Whether the State is measured; else the newest message of any publisher counts.
+        history: Most messages of one cycle that are handed over, of a reader that keeps as many; 0: the newest alone.
+            Measured States only.
+    """
+
+    required: bool = True
+    low_pass: MakeFilter | None = None
+    measured: bool = False
+    history: int = 0
 
 
 class FeedbackPipe(abc.ABC):
@@ -227,6 +246,41 @@ class FeedbackPipe(abc.ABC):
         """
 
 
+class _StateWriter:
+    """Writes numbers of certain DoFs to a State.
+
+    Args:
+        state: The State.
+        interfaces: Names of the interfaces that are written.
+        dofs: The DoFs, shape (k,).
+    """
+
+    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import scatter
+        from solfer.numerics.pointers import address
+
+        self._state = state
+        self._scatter = scatter
+        self._dofs = dofs
+        self._all = np.arange(len(dofs))
+        # arrays of a State stay where they are
+        self._live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
+        self._touched = _subsets(interfaces)
+
+    def write(self, values: np.ndarray, part: np.ndarray | None) -> bool:
+        """Write values of some of the DoFs, None: of all; return whether any number has changed.
+
+        Args:
+            values: The values, shape (interfaces, k).
+            part: Indices of the values that are written.
+        """
+        changes = self._scatter(values, self._all if part is None else part, self._dofs, self._live)
+        if changes:
+            self._state.touch(*self._touched[changes])
+        return bool(changes)
+
+
 class StateFeedbackPipe(FeedbackPipe):
     """A pipe that writes a State; filters make one step in every cycle, also without a new message.
 
@@ -239,11 +293,7 @@ class StateFeedbackPipe(FeedbackPipe):
         state: State that is written.
         fields: Fields of the pipe, which name the interfaces that are written.
         dofs: DoFs that are written, shape (k,).
-        required: Whether the plugin has to wait for this pipe before it starts.
-        low_pass: Makes the filter of one field; None: there is none.
-        measured: Whether the State is measured; else the newest message of any publisher counts.
-        history: Most messages of one cycle that are handed over, of a `reader` that keeps as many; 0: the newest alone.
-            Measured States only.
+        reception: How it receives.
 
     Attributes:
         state_fields: The interfaces that are written.
@@ -259,36 +309,26 @@ class StateFeedbackPipe(FeedbackPipe):
         state: State,
         fields: Sequence[str],
         dofs: np.ndarray,
-        required: bool,
-        low_pass: MakeFilter | None = None,
-        measured: bool = False,
-        history: int = 0,
+        reception: Reception,
     ):
-        super().__init__(name, reader, required)
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import scatter
-        from solfer.numerics.pointers import address
-
+        super().__init__(name, reader, reception.required)
+        low_pass = reception.low_pass
         self._state = state
         self._filtered = low_pass is not None
-        self._scatter = scatter
         self.values = np.zeros((len(fields), len(dofs)))
         self._passed = np.zeros((len(fields), len(dofs)))
         self.state_fields = tuple(
             StateField(field, dofs, values, passed=passed, low_pass=low_pass(len(dofs)) if low_pass else None)
             for field, values, passed in zip(fields, self.values, self._passed, strict=True)
         )
-        self._dofs, self._all = dofs, np.arange(len(dofs))
-        # arrays of a State stay where they are
-        self._live = np.array([address(state[each.interface]) for each in self.state_fields], dtype=np.int64)
-        self._touched = _subsets([each.interface for each in self.state_fields])
+        self._writer = _StateWriter(state, [each.interface for each in self.state_fields], dofs)
         self.part: np.ndarray | None = None
-        self._precedence = Precedence(len(dofs)) if measured else None
+        self._precedence = Precedence(len(dofs)) if reception.measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
         self.history: History | None = None
-        if history:
-            self.history = History([each.interface for each in self.state_fields], dofs, history)
+        if reception.history:
+            self.history = History([each.interface for each in self.state_fields], dofs, reception.history)
             state.histories.append(self.history)
         self._dropped = 0
 
@@ -346,8 +386,7 @@ class StateFeedbackPipe(FeedbackPipe):
         if self._filtering:
             for state_field in self.state_fields:
                 state_field.filter()
-            ever = self._all if self._ever is None else self._ever
-            self._state.touch(*self._touched[self._scatter(self._passed, ever, self._dofs, self._live)])
+            self._writer.write(self._passed, self._ever)
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`; resets the filters as well."""
@@ -456,11 +495,8 @@ class StateFeedbackPipe(FeedbackPipe):
     def _write_fields(self) -> None:
         """Write the newest values to the State, or pass them to the filters."""
         if not self._filtered:
-            part = self._all if self.part is None else self.part
-            changes = self._scatter(self.values, part, self._dofs, self._live)
-            if changes:
+            if self._writer.write(self.values, self.part):
                 self.changed = self.arrival
-                self._state.touch(*self._touched[changes])
             return
         for state_field in self.state_fields:
             state_field.accept(self.part)

@@ -6,7 +6,7 @@ from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.life.plugin_set import PluginSet
 from solfer.plugins.loop import LoopStatistics, run
-from solfer.plugins.plugin import Plugin
+from solfer.plugins.plugin import Plugin, PluginParts
 from solfer.plugins.trace import CycleTrace, TraceEvent, TraceLog
 from solfer.transport.plugin_state import PluginState
 
@@ -14,6 +14,7 @@ __all__ = [
     "CycleTrace",
     "Generator",
     "Plugin",
+    "PluginParts",
     "PluginSet",
     "PluginState",
     "Registry",

@@ -2,22 +2,25 @@
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 from solfer.components import Component
 from solfer.config.records.modules import OverloadRecord
 from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.base_jumps import BaseJumps
+from solfer.plugins.component_cycle import ComponentCycle
 from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
-from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
+from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.overload import Overload
 from solfer.plugins.peers import Peers
+from solfer.plugins.readiness import Readiness
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.robot_time import RobotTime
-from solfer.plugins.start_conditions import FORGET, HOLD, WORK, CycleVerdict, StartConditions
+from solfer.plugins.start_conditions import FORGET, HOLD, WORK, CycleVerdict
 from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET
@@ -39,6 +42,49 @@ CLOSED = PluginState.CLOSED
 CALLS, READ, ROBOT, COMPONENT, GATE, WRITE = Stage
 
 
+@dataclass(frozen=True)
+class PluginParts:
+    """What a plugin is made of.
+
+    Attributes:
+        component: The algorithm.
+        robot: The Robot that it works on.
+        watches: Pipes in, in the order of the configuration, each with its timeout.
+        outputs: Pipes out.
+        inbox: Calls from outside.
+        rate: Cycles per second [Hz].
+        middleware: The clock of the pipes.
+        claim: Its claim on the joints that it commands; None: it commands none.
+        peers: Supervises the other ends of its pipes; None: they are not supervised.
+        stall: Lateness of its own loop at which it begins again [s]; see `StartConditions`.
+        limits: When its loop is overloaded; None: the defaults.
+        jumps: Finds jumps of the base; None: its component has no references in the world.
+        guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
+        publish: Publish what the component declares, after each of its cycles.
+        documents: Returns what a recording of it shall have besides numbers.
+        requests: Notes what happens, and what others ask of the component; None: it declares nothing.
+        tuning: Changes its parameters; None: it has none that are live.
+    """
+
+    component: Component
+    robot: Robot
+    watches: Sequence[FeedbackTimeout]
+    outputs: Outputs
+    inbox: Inbox
+    rate: float
+    middleware: Middleware
+    claim: JointClaim | None = None
+    peers: Peers | None = None
+    stall: float | None = None
+    limits: OverloadRecord | None = None
+    jumps: BaseJumps | None = None
+    guard: MeasuredGuard | None = None
+    publish: Bindings = ()
+    documents: Callable[[], RunDocuments] = RunDocuments
+    requests: RequestNotes | None = None
+    tuning: Tuning | None = None
+
+
 class Plugin:
     """One component on one Robot.
 
@@ -52,23 +98,7 @@ class Plugin:
     - when a plugin that follows it starts again.
 
     Args:
-        component: The algorithm.
-        robot: The Robot that it works on.
-        watches: Pipes in, in the order of the configuration, each with its timeout.
-        outputs: Pipes out.
-        inbox: Calls from outside.
-        rate: Cycles per second [Hz].
-        middleware: The clock of the pipes.
-        claim: Its claim on the joints that it commands; None: it commands none.
-        peers: Supervises the other ends of its pipes; None: they are not supervised.
-        guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
-        stall: Lateness of its own loop at which it begins again [s]; see `StartConditions`.
-        limits: When its loop is overloaded; None: the defaults.
-        jumps: Finds jumps of the base; None: its component has no references in the world.
-        publish: Publish what the component declares, after each of its cycles.
-        documents: Returns what a recording of it shall have besides numbers.
-        requests: Notes what happens, and what others ask of the component; None: it declares nothing.
-        tuning: Changes its parameters; None: it has none that are live.
+        parts: What it is made of.
 
     Attributes:
         life: State of the plugin: STARTING, as long as it lacks a required feedback or its claim on joints and sends
@@ -80,66 +110,52 @@ class Plugin:
         overload: Whether its loop is overloaded.
     """
 
-    def __init__(
-        self,
-        component: Component,
-        robot: Robot,
-        watches: Sequence[FeedbackTimeout],
-        outputs: Outputs,
-        inbox: Inbox,
-        rate: float,
-        middleware: Middleware,
-        claim: JointClaim | None = None,
-        peers: Peers | None = None,
-        stall: float | None = None,
-        limits: OverloadRecord | None = None,
-        jumps: BaseJumps | None = None,
-        guard: MeasuredGuard | None = None,
-        publish: Bindings = (),
-        documents: Callable[[], RunDocuments] = RunDocuments,
-        requests: RequestNotes | None = None,
-        tuning: Tuning | None = None,
-    ):
+    def __init__(self, parts: PluginParts):
+        component = parts.component
+        period = 1.0 / parts.rate
         self.component = component
-        self.robot = robot
-        self.rate = rate
-        self.outputs = outputs
-        self.inbox = inbox
-        self._publish = tuple(publish)
-        self._jumps = jumps
-        self.documents, self.requests = documents, requests or RequestNotes()
-        self.tuning = tuning or Tuning(component, ())
-        component.start_position = outputs.start_position
-        if claim is not None:
-            claim.note = self.requests.note
-        self.peers = peers or Peers(self.name, (), middleware)
+        self.robot = parts.robot
+        self.rate = parts.rate
+        self.outputs = parts.outputs
+        self.inbox = parts.inbox
+        self.documents = parts.documents
+        self.requests = parts.requests or RequestNotes()
+        self.tuning = parts.tuning or Tuning(component, ())
+        component.start_position = parts.outputs.start_position
+        if parts.claim is not None:
+            parts.claim.note = self.requests.note
+        self.peers = parts.peers or Peers(self.name, (), parts.middleware)
         self.life = STARTING
-        self._guard = guard
-        self._feedback_timeouts = FeedbackTimeouts(watches)
-        self._now = middleware.now
-        self._claim = claim
-        self._conditions = StartConditions(
-            self.name, self._feedback_timeouts, middleware, claim=claim, period=1.0 / rate, stall=stall
+        self._now = parts.middleware.now
+        self._readiness = Readiness(
+            self.name, parts.watches, parts.claim, middleware=parts.middleware, period=period, stall=parts.stall
         )
+        self._readiness.taken = parts.outputs.forget
         self.timing = CycleTiming()
-        self.robot_time = RobotTime(self.feedbacks, 1.0 / rate)
-        self.overload = Overload(self.name, self.feedbacks, 1.0 / rate, limits=limits or OverloadRecord())
-        # made before the first cycle: importing its modules takes a while
-        self._dynamics = robot.dynamics if component.dynamics else None
-        self._lacks = ""
-        self._logger: Logger | None = None
-        self._began = 0.0  # [s]
+        self._work = ComponentCycle(
+            component, RobotTime(self.feedbacks, period), parts.jumps, guard=parts.guard, publish=parts.publish
+        )
+        self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._wait()
 
     @property
     def feedbacks(self) -> tuple[FeedbackPipe, ...]:
         """Pipes in, in the order of the configuration."""
-        return self._feedback_timeouts.feedbacks
+        return self._readiness.feedbacks.feedbacks
 
     @property
     def name(self) -> str:
         """Name of the plugin's configuration."""
         return self.component.name
+
+    @property
+    def robot_time(self) -> RobotTime:
+        """Time that passes for the component."""
+        return self._work.robot_time
+
+    @robot_time.setter
+    def robot_time(self, robot_time: RobotTime) -> None:
+        self._work.robot_time = robot_time
 
     def cycle(self) -> None:
         """Run one control cycle, from reading the feedbacks to publishing the commands; no effect after the end.
@@ -159,7 +175,7 @@ class Plugin:
         clock = timing.nanoseconds
         times[:] = NO_TIMES
         begin = clock()
-        gap = self._conditions.stall(now)
+        gap = self._readiness.stall(now)
         if gap and (self.life is STARTING or self.life is RUNNING):
             self.overload.advance(gap)
             self._awake(now)
@@ -170,8 +186,8 @@ class Plugin:
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._feedback_timeouts.read(now, self.outputs.distance)
-        verdict = self._judge(now, life is RUNNING)
+        self._readiness.feedbacks.read(now, self.outputs.distance)
+        verdict = self._readiness.judge(now, life is RUNNING)
         end = clock()
         times[READ] = end - begin
         begin = end
@@ -180,31 +196,25 @@ class Plugin:
             return
         self._update_robot(life)
         component = self.component
-        robot_time = self.robot_time
-        component.passed = robot_time.advance(now)
-        component.time_lost = robot_time.lost
-        component.pace = self.overload.advance(component.passed)
+        work = self._work
+        component.pace = self.overload.advance(work.advance(now))
         following = self.outputs.following
         if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
             if not self.peers.complaint():
                 raise fault
             following.start()  # no node receives its commands, which the health says
-        if self._jumps is not None and life is RUNNING and (move := self._jumps.find(component.passed)):
-            component.move_world(move)
+        if life is RUNNING:
+            work.jump()
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
         end = clock()
         times[ROBOT] = end - begin
         begin = end
-        if self._guard is None:
-            self.component.update()
-            self.component.send()
-        else:
-            self._work_guarded(self._guard)
+        work.work()
         end = clock()
         times[COMPONENT] = end - begin
         begin = end
-        if self.component.modify:
+        if component.modify:
             # its pipes publish joints that follow others; who reads the State next computes what it needs
             self.robot.follow()
         self.outputs.collect()
@@ -212,22 +222,9 @@ class Plugin:
         times[GATE] = end - begin
         begin = end
         self.outputs.send(self._now())
-        for publish in self._publish:
-            publish()
+        work.publish()
         times[WRITE] = clock() - begin
-        if self._logger is not None:
-            self.component.log(self._logger, now - self._began)
-
-    def _work_guarded(self, guard: MeasuredGuard) -> None:
-        """Run the component; if it fails, or leaves numbers that are not finite, others see what was before."""
-        guard.keep()
-        try:
-            self.component.update()
-            self.component.send()
-            guard.check()
-        except BaseException:
-            guard.restore()
-            raise
+        work.log(now)
 
     def measure_with(self, nanoseconds: Callable[[], int], times: memoryview | None = None) -> None:
         """Measure the stages of a cycle with another clock, and into memory of the caller; see `CycleTiming`."""
@@ -235,19 +232,18 @@ class Plugin:
 
     def start_log(self, logger: Logger) -> None:
         """Let the component declare what it logs; from now on its `log`, if it has one, is called after each `send`."""
-        self.component.start_log(logger)
-        self._logger = logger if type(self.component).log is not Component.log else None
+        self._work.start_log(logger)
 
     def health(self) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence."""
-        level, summary = self._conditions.health(self.life is not STARTING)
+        level, summary = self._readiness.health(self.life is not STARTING)
         complaint = "; ".join(filter(None, (self.overload.reason, self.peers.complaint())))
         sentence = "; ".join(filter(None, (summary or self.life.name.lower(), complaint)))
         return max(level, Health.WARNING) if complaint else level, sentence
 
     def pipe_reports(self) -> Iterator[tuple[str, HealthReport]]:
         """Yield the name and the health of each pipe; one thread may call it, also beside the loop."""
-        for name, report in self._conditions.reports():
+        for name, report in self._readiness.reports():
             yield f"{self.name} feedback {name}", report
         for name, report in self.outputs.reports(self.running):
             yield f"{self.name} controller {name}", report
@@ -260,8 +256,7 @@ class Plugin:
         computed = {f"computed {name}": count for name, count in self.robot.computations().items()}
         left_out, age, pace = self.overload.figures.tolist()
         load = {"periods left out [%]": 100.0 * left_out, "age of the measurement [ms]": 1e3 * age, "pace": pace}
-        jumps = {} if self._jumps is None else {"jumps of the base": self._jumps.count}
-        return {**self._conditions.figures(), **load, **jumps, **self.outputs.counts(), **computed}
+        return {**self._readiness.figures(), **load, **self._work.figures(), **self.outputs.counts(), **computed}
 
     def stop(self) -> None:
         """Bring the robot to rest: the component's own way first, then wheels at zero in any case."""
@@ -276,8 +271,7 @@ class Plugin:
         if self.life is STOPPED:
             self.outputs.forget()
             self.overload.restart()
-            self._feedback_timeouts.restart()
-            self._conditions.restart()
+            self._readiness.restart()
             self._wait()
 
     def blend_in(self, shortest: float) -> None:
@@ -292,7 +286,7 @@ class Plugin:
     @property
     def released(self) -> bool:
         """Whether the joints were released, and the lower level has confirmed it."""
-        return self._claim is None or self._claim.released
+        return self._readiness.released
 
     def close(self) -> None:
         """Release the component's resources."""
@@ -313,64 +307,31 @@ class Plugin:
             if was_running:
                 rest()
         finally:
-            if self._claim is not None:
-                self._claim.release()
-
-    def _judge(self, now: float, running: bool) -> CycleVerdict:
-        """Judge what to do in this cycle, whose messages were read `now` [s]; ask for the claim when all is there."""
-        verdict = self._conditions.judge(now, running)
-        claim = self._claim
-        if claim is not None and not running and claim.restarts():
-            return self._conditions.judge_claim(claim, running)
-        if verdict is not WORK or claim is None:
-            return verdict
-        ours = not claim.lost() if running else claim.granted()
-        if claim.is_taken:
-            self.outputs.forget()
-        return verdict if ours else self._conditions.judge_claim(claim, running)
+            self._readiness.release()
 
     def _obey(self, verdict: CycleVerdict, now: float) -> None:
         """Do what a verdict of the time `now` [s] asks for."""
         if verdict is HOLD:
             self._hold()
-            self._give_back()
+            self._readiness.give_back()
         elif verdict is FORGET:
             self.outputs.forget()
-            self._forget(now)
+            self._readiness.forget(now)
         self._restart()
 
     def _awake(self, now: float) -> None:
         """Hold `now` [s], after the loop stood still, and drop messages and requests from before, also in the inbox."""
         if self.life is RUNNING:
             self._hold()
-        self._forget(now)
+        self._readiness.forget(now)
         self._restart()
-
-    def _give_back(self) -> None:
-        """Release or lapse the claim, or damp, after the joints were brought to rest."""
-        claim = self._claim
-        if claim is None:
-            return
-        if self._feedback_timeouts.action() == "damp":
-            claim.damp()
-        if claim.reason:
-            claim.release()
-        else:
-            claim.lapse()
-
-    def _forget(self, now: float) -> None:
-        """Discard all that was received before `now` [s], and the claim."""
-        self._feedback_timeouts.restart()
-        if self._claim is not None:
-            self._claim.lapse()
-        self._conditions.forgotten(now)
 
     def _restart(self) -> None:
         """Wait for what the plugin lacks, and reset a component that ran."""
         was_running = self.life is RUNNING
         self._wait()
         if was_running:
-            self.requests.note(RESET, f"waits {self._conditions.lacks}")
+            self.requests.note(RESET, f"waits {self._readiness.lacks}")
             self.component.reset()
 
     def _update_robot(self, life: PluginState) -> None:
@@ -379,31 +340,23 @@ class Plugin:
             self.robot.update()
         if life is STARTING:
             self._start()
-        if self._dynamics is not None:
-            self._dynamics.update()
+        self._work.update_dynamics()
 
     def _wait(self) -> None:
         """Wait for what the plugin lacks, and log it if it has changed."""
         self.life = STARTING
-        lacks = self._conditions.lacks
-        if lacks == self._lacks:
-            return
-        self._lacks = lacks
-        self.inbox.refusal = f"plugin '{self.name}' waits {lacks}"
-        logger.log(self._conditions.level, "%s holds and waits %s", self.name, lacks)
+        if self._readiness.log_wait():
+            self.inbox.refusal = f"plugin '{self.name}' waits {self._readiness.lacks}"
 
     def _start(self) -> None:
         self.outputs.start()
         self.tuning.finish()
         self.component.init()
-        if self._jumps is not None:
-            self._jumps.restart()
+        self._work.forget_jumps()
         self.life = RUNNING
         self.inbox.refusal = ""
-        self._lacks = ""
-        self._conditions.started()
-        self._began = self._now()
-        self.robot_time.restart(self._began)
+        self._readiness.start()
+        self._work.start(self._now())
         logger.info("%s runs at %g Hz", self.name, self.rate)
 
     def _come_to_rest(self) -> None:

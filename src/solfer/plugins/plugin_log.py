@@ -155,7 +155,7 @@ class PluginLog:
         for part in parts:
             self._copies.append((memoryview(whole[start : start + part.size]), memoryview(part)))
             start += part.size
-        log.add(name, whole, NAMED[kind], with_units(NAMED[kind], UNITS), frame, kind, child)
+        log.add(name, whole, NAMED[kind], unit=with_units(NAMED[kind], UNITS), frame=frame, kind=kind, child=child)
 
 
 def _count_in(gates: Iterable[CommandGate], counts: np.ndarray) -> None:
@@ -203,7 +203,7 @@ def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     unit = _UNITS.get(port.quantity, "")
     units = (unit,) * len(columns) if unit else with_units(columns, UNITS)
     if port.count is None:
-        log.add(name, port.value, columns, units, frame, kind)
+        log.add(name, port.value, columns, unit=units, frame=frame, kind=kind)
     else:
         names = [f"{index} {column}" for index in range(port.count) for column in columns]
         log.add(name, port.value, names, units * port.count, frame)
@@ -211,7 +211,7 @@ def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
 
 def _add_wrench(log: Logger, name: str, wrench: np.ndarray, frame: str) -> None:
     kind = "geometry_msgs/WrenchStamped"
-    log.add(name, wrench, NAMED[kind], with_units(NAMED[kind], UNITS), frame, kind)
+    log.add(name, wrench, NAMED[kind], unit=with_units(NAMED[kind], UNITS), frame=frame, kind=kind)
 
 
 def _of_each(names: tuple[str, ...], values: np.ndarray) -> list[str]:

@@ -2,6 +2,7 @@
 
 import abc
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -19,6 +20,25 @@ from solfer.points.point import Point
 NOTHING = np.zeros(0)
 
 
+@dataclass(frozen=True)
+class LinkMotion:
+    """What an operation computes of the motion of a link.
+
+    Attributes:
+        joint: Joint that carries the point.
+        parts: Parts of the motion.
+        offset: The offset that is written, where the point is dynamic.
+    """
+
+    joint: int = 0
+    parts: int = 0
+    offset: np.ndarray = field(default_factory=lambda: NOTHING)
+
+
+STILL = LinkMotion()
+"""For operations that compute no motion of a link."""
+
+
 class Instruction:
     """One operation of the kernel on a point.
 
@@ -28,9 +48,7 @@ class Instruction:
         operands: Points that are read, at most two.
         numbers: Parameters, float64.
         table: Parameters, int64 or records of `solfer.points.compiled.instruction`.
-        offset: The offset that is written, where the point is dynamic.
-        joint: Joint that carries the point.
-        motion: Parts of the motion of a link.
+        motion: Motion of the link of the point.
         columns: DoFs that the operation runs over; None: those of the point.
 
     Attributes:
@@ -49,16 +67,14 @@ class Instruction:
         *,
         numbers: np.ndarray = NOTHING,
         table: np.ndarray = NOTHING,
-        offset: np.ndarray = NOTHING,
-        joint: int = 0,
-        motion: int = 0,
+        motion: LinkMotion = STILL,
         columns: np.ndarray | None = None,
     ):
         columns = point.written_columns() if columns is None else columns
         _require_fit(point, operands, columns)
         operand_arrays = [array for operand in operands for array in (operand.value, operand.jacobian)]
         self.arrays: list[Any] = [
-            *(point.value, point.jacobian, offset, point.flags, columns, numbers, table),
+            *(point.value, point.jacobian, motion.offset, point.flags, columns, numbers, table),
             *operand_arrays,
         ]
         value, jacobian, written, flags, dofs, parameters, rows, *read = map(address, self.arrays)
@@ -67,7 +83,7 @@ class Instruction:
         self.record = (
             *(Operation[kernel.name].value, value, jacobian, written, flags, point.size, point.rows),
             *(dofs, len(columns), first, first_jacobian, first_size, second, second_jacobian),
-            *(parameters, rows, len(table), joint, motion),
+            *(parameters, rows, len(table), motion.joint, motion.parts),
         )
 
 

@@ -11,7 +11,7 @@ from solfer.points.compiled.instruction import ANGULAR, LINEAR
 from solfer.points.compiled.registry import Kernel
 from solfer.points.compiled.rigid import place, velocity
 from solfer.points.offset import OrientationOffset, PositionOffset, quaternion_convention
-from solfer.points.program import CompiledPoint, Instruction, folded
+from solfer.points.program import CompiledPoint, Instruction, LinkMotion, folded
 from solfer.points.space import ORIENTATION, POSE, Space, vector
 
 __all__ = ["AngularVelocity", "FrameOrientation", "LinearPoint", "LinearVelocity", "SpatialPoint", "SpatialVelocity"]
@@ -53,9 +53,7 @@ class LinkPoint(CompiledPoint):
                 kernel,
                 self,
                 numbers=self._numbers,
-                offset=self.written_offset,
-                joint=self._joint,
-                motion=self.motion,
+                motion=LinkMotion(self._joint, self.motion, self.written_offset),
                 columns=columns,
             )
             for kernel in self.kernels

@@ -13,6 +13,7 @@ from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.life.budget import BudgetRules, LeakyCounter
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.plugin_set import NOTHING, PluginSet
+from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import Interruptions
@@ -51,6 +52,23 @@ class ExecutorRules:
     grace: int = 100
 
 
+@dataclass(frozen=True)
+class ExecutorTelemetry:
+    """What measures and records the cycles of an executor.
+
+    Attributes:
+        statistics: Memory of its statistics; None: private memory.
+        nanoseconds: Clock for durations [ns]; a virtual one makes every run the same to the bit.
+        black_box: Records each cycle; None: nothing is recorded.
+        interruptions: Measures how long cycles are kept from running: no overruns; None: they never are.
+    """
+
+    statistics: RuntimeStatistics | None = None
+    nanoseconds: Callable[[], int] = monotonic_ns
+    black_box: BlackBox | None = None
+    interruptions: Interruptions | None = None
+
+
 class Executor:
     """The RT layer: plugins in the order of their list, at one rate.
 
@@ -58,18 +76,14 @@ class Executor:
         plugins: The plugins, all at the layer's rate.
         middleware: Clock, and services that switch plugins.
         estop: The emergency stop.
-        statistics: Memory of its statistics; None: private memory.
         rules: Its limits.
-        nanoseconds: Clock for durations [ns]; a virtual one makes every run the same to the bit.
+        telemetry: What measures and records its cycles; None: private statistics.
         polls: Called at the beginning of each cycle: receive calls and replies for the plugins.
-        black_box: Records each cycle; None: nothing is recorded.
-        beside: Called by `run` ten times a second, when a cycle is done.
         requires: See `PluginSet`.
-        interruptions: Measures how long cycles are kept from running: no overruns; None: they never are.
 
     Attributes:
         statistics: Its statistics.
-        switchboard: Starts and stops the plugins.
+        beside: Called by `run` ten times a second, when a cycle is done.
 
     Raises:
         MiddlewareError: There is no plugin, two have one name, or their rates differ.
@@ -80,49 +94,57 @@ class Executor:
         plugins: Sequence[Plugin],
         middleware: Middleware,
         estop: EmergencyStopLatch,
-        statistics: RuntimeStatistics | None = None,
         rules: ExecutorRules | None = None,
-        nanoseconds: Callable[[], int] = monotonic_ns,
+        telemetry: ExecutorTelemetry | None = None,
         polls: Sequence[Callable[[], None]] = (),
-        black_box: BlackBox | None = None,
-        beside: Callable[[], None] = lambda: None,
         requires: Mapping[str, Sequence[str]] = NOTHING,
-        interruptions: Interruptions | None = None,
     ):
+        telemetry = telemetry or ExecutorTelemetry()
         self._rules = rules = rules or ExecutorRules()
-        self._beside = beside
-        self._ns = nanoseconds
+        self.beside: Callable[[], None] = lambda: None
+        self._ns = telemetry.nanoseconds
         self._middleware = middleware
         self.estop = estop
-        self.statistics = statistics or RuntimeStatistics(
+        self.statistics = telemetry.statistics or RuntimeStatistics(
             plugins[0].rate if plugins else 0.0, [plugin.name for plugin in plugins], STAGES
         )
         # one array for all durations of a cycle, in the rows of the statistics
         self._durations = np.zeros(len(self.statistics.histograms.rows), dtype=np.int64)
         budget = BudgetRules(rules.budget, rules.overruns, rules.grace)
-        self._interruptions = interruptions
+        self._interruptions = telemetry.interruptions
         self._was_interrupted = False
         self._set = PluginSet(
             plugins,
             budget,
             rules.blend,
-            nanoseconds=nanoseconds,
             polls=polls,
             admit=self._admit,
-            interrupted=self._interrupted,
-            times=self._durations[len(LoopTime) :],
             requires=requires,
         )
-        self.plugins = self._set.plugins
-        self.switchboard = self._set.switchboard
-        self.rate = self._set.rate
+        self._set.measure(telemetry.nanoseconds, self._durations[len(LoopTime) :])
+        self._set.interrupted = self._interrupted
         self._seldom = max(1, round(SELDOM * self.rate))
         self._period = round(1e9 / self.rate)
         self._late = LeakyCounter(rules.overruns)
-        self._black_box = black_box
+        self._black_box = telemetry.black_box
         self._set.changed = self._note
         self._set.initialize()
         self._serve()
+
+    @property
+    def plugins(self) -> tuple[ManagedPlugin, ...]:
+        """The plugins with their lives."""
+        return self._set.plugins
+
+    @property
+    def switchboard(self) -> Switchboard:
+        """Starts and stops the plugins."""
+        return self._set.switchboard
+
+    @property
+    def rate(self) -> float:
+        """Cycles per second [Hz]."""
+        return self._set.rate
 
     def cycle(self, late: int = 0) -> None:
         """Run one cycle, which began `late` after its deadline [ns]. Errors of plugins are not raised."""
@@ -217,7 +239,7 @@ class Executor:
             for index, managed in enumerate(self.plugins):
                 self.statistics.put_computed(index, managed.plugin.robot.computations())
                 managed.plugin.tuning.log()
-            self._beside()
+            self.beside()
 
     def _overhang(self) -> int:
         """Compute how much longer the newest cycle lasted than to the next deadline [ns]."""

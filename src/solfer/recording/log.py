@@ -56,7 +56,7 @@ class Logger:
         """Return a logger of the same recording whose channels begin with `<prefix>/<name>`."""
         return Logger(f"{self._prefix}/{name}", self.sources)
 
-    def add(
+    def add(  # noqa: PLR0913, PLR0917 for users: what describes a channel, by its names
         self,
         name: str,
         array: np.ndarray,

@@ -51,7 +51,7 @@ def read(path: Path) -> Recording:
         path: The file.
 
     Returns:
-        What it holds; where its writer came to no end, `missing` counts, and rows that were lost on the way count.
+        What it holds; where its writer came to no end, `missing` reports it, and rows that were lost on the way count.
 
     Raises:
         RecordingError: There is no such file, or it is no recording.

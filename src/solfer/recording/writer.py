@@ -199,7 +199,11 @@ class RecordingWriter:
         data = _bytes(Attachment(0, 0, name, media, content))
         begin = self.size
         self._append(data)
-        self._attached.append(AttachmentIndex(begin, len(data), 0, 0, len(content), name, media))
+        self._attached.append(
+            AttachmentIndex(
+                begin, length=len(data), create_time=0, log_time=0, data_size=len(content), name=name, media_type=media
+            )
+        )
 
     def _chunk(self, messages: bytes, first: int, index: np.ndarray) -> None:
         """Append a chunk with messages of topics from `first` on; `index`: their times and places, (topics, T, 2)."""
@@ -215,7 +219,17 @@ class RecordingWriter:
             places[number], size = start + len(chunk) + len(tail), 16 * len(rows)
             tail += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + size, number, size) + rows.tobytes()
         self._append(chunk + tail)
-        entry = ChunkIndex(len(chunk), start, "zstd", len(packed), end, len(tail), places, begin, len(messages))
+        entry = ChunkIndex(
+            len(chunk),
+            chunk_start_offset=start,
+            compression="zstd",
+            compressed_size=len(packed),
+            message_end_time=end,
+            message_index_length=len(tail),
+            message_index_offsets=places,
+            message_start_time=begin,
+            uncompressed_size=len(messages),
+        )
         self._span = (min(begin, self._span[0]), max(end, self._span[1])) if self._chunks else (begin, end)
         self._chunks.append(_bytes(entry))
         for number in places:

@@ -30,10 +30,6 @@ class Player:
             shape (n, 3) [m/s].
         base_velocity: Velocities of x, y, z and heading of the base in the file's frame, with the constant velocity,
             shape (4,) [m/s, rad/s].
-        camber: Camber of each leg, shape (n,) [rad].
-        grounded: Which legs have contact with the ground, shape (n,).
-        vertices: Vertices of the file at the end of its newest period, shape (n, 3) [m].
-        base: Base of the file then, without the constant velocity, shape (4,) [m, rad].
         elapsed: Time that was played [s].
     """
 
@@ -42,21 +38,38 @@ class Player:
         self.period = scenario.period if period is None else period
         if not 0.0 < self.period < np.inf:
             raise SolferError(f"a period of {period}", expected="a positive number of seconds")
-        self._script, self._steps = Script(scenario), played(scenario)
+        self._script = Script(scenario)
+        self._steps = played(scenario)
         self._constant = scenario.constant
         self._numbers = len(self._steps)
         self.vertex_velocity = np.zeros((scenario.legs, 3))
         self.base_velocity = np.zeros(4)
         self._vertex_part = np.zeros((scenario.legs, 3))
         self._base_part = np.zeros(4)
-        self.camber = self._script.camber
-        self.grounded = self._script.grounded
-        self.vertices = self._script.vertices
-        self.base = self._script.base
         self._index = -1
         self._rest = 0.0
         self.elapsed = 0.0
         self._is_over = False
+
+    @property
+    def camber(self) -> np.ndarray:
+        """Camber of each leg, shape (n,) [rad]; live."""
+        return self._script.camber
+
+    @property
+    def grounded(self) -> np.ndarray:
+        """Which legs have contact with the ground, shape (n,); live."""
+        return self._script.grounded
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Vertices of the file at the end of its newest period, shape (n, 3) [m]; live."""
+        return self._script.vertices
+
+    @property
+    def base(self) -> np.ndarray:
+        """Base of the file then, without the constant velocity, shape (4,) [m, rad]; live."""
+        return self._script.base
 
     @property
     def number(self) -> int:

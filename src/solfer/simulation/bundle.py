@@ -130,11 +130,10 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         {name: group.joints for name, group in groups.items()},
         gains=gains,
         record=record.lower_level,
-        robot=record.name,
         posture=_posture(kinematics, states, start),
-        passive=kinematics.followers.names if actuators is None else actuators.passive,
         actuators=actuators,
     )
+    lower_level.robot = record.name
     _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
     return Bundle(

@@ -52,7 +52,7 @@ class Task:
         UnknownName: The robot has no such DoF.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 for users: numbers of its rows, by their names
         self,
         name: str,
         point: Point,

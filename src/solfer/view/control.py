@@ -235,7 +235,7 @@ class PageControl:
         async def moved(event: TransformControlsEvent) -> None:
             place = handle.position.copy()
             turn = handle.wxyz.copy()
-            self._requests.submit(partial(self._drag, name, event.client_id, event.phase, place, turn))
+            self._requests.submit(partial(self._drag, name, event.client_id, event.phase, position=place, turn=turn))
 
         handle.on_update(moved)
         return handle

@@ -15,6 +15,23 @@ COMMAND = "command"
 TRUTH = "truth"
 
 
+class PlayedTopics:
+    """Where a recording is published again.
+
+    Args:
+        middleware: Carries them.
+
+    Attributes:
+        states, base, odometry, wrenches: Of joints, true and estimated base, and forces of the ground.
+    """
+
+    def __init__(self, middleware: Middleware):
+        self.states = middleware.writer("joint_states", "sensor_msgs/JointState")
+        self.base = middleware.writer("floating_base", "nav_msgs/Odometry")
+        self.odometry = middleware.writer("odometry/odom", "nav_msgs/Odometry")
+        self.wrenches = middleware.writer("ground_forces", "solfer/RobotPoints")
+
+
 class Playback:
     """Publishes the rows of a recording at a time, as the robot and its plugins did.
 
@@ -45,10 +62,7 @@ class Playback:
         self.time = self.begin
         self.speed = 1.0
         self.plays = True
-        self._states = middleware.writer("joint_states", "sensor_msgs/JointState")
-        self._base = middleware.writer("floating_base", "nav_msgs/Odometry")
-        self._odometry = middleware.writer("odometry/odom", "nav_msgs/Odometry")
-        self._wrenches = middleware.writer("ground_forces", "solfer/RobotPoints")
+        self._topics = PlayedTopics(middleware)
         self._commands: list[tuple[Channel, Writer]] = []
         channels = [each for each in recording.channels.values() if len(each.times)]
         for channel in channels:
@@ -98,13 +112,13 @@ class Playback:
         for channel in reversed(self._joints):
             known |= dict(zip(channel.columns, self._row(channel).tolist(), strict=True))
         joints = tuple(name for name in known if name not in self._chart)
-        self._states.write(JointMessage(joints, position=np.array([known[name] for name in joints])))
+        self._topics.states.write(JointMessage(joints, position=np.array([known[name] for name in joints])))
         self._publish_base(known)
         for channel, writer in self._commands:
             writer.write(JointMessage(channel.columns, position=self._row(channel).copy()))
         if self._forces:
             values = np.array([self._row(each) for each in self._forces.values()])
-            self._wrenches.write(PointsMessage("world", tuple(self._forces), values))
+            self._topics.wrenches.write(PointsMessage("world", tuple(self._forces), values))
 
     def _publish_base(self, known: dict[str, float]) -> None:
         chart = self._robot.kinematics.base
@@ -114,14 +128,16 @@ class Playback:
         for channel in self._truths[:1]:
             row = self._row(channel)
             if np.isfinite(row[:7]).all():
-                self._base.write(BodyMessage(channel.frame, link, row[:3].copy(), orientation=row[3:7].copy()))
+                self._topics.base.write(BodyMessage(channel.frame, link, row[:3].copy(), orientation=row[3:7].copy()))
         for channel in self._estimates[:1]:
             row = self._row(channel)
-            self._odometry.write(BodyMessage(channel.frame, channel.child, row[:3].copy(), orientation=row[3:7].copy()))
+            self._topics.odometry.write(
+                BodyMessage(channel.frame, channel.child, row[:3].copy(), orientation=row[3:7].copy())
+            )
         if not self._truths and not self._estimates:
             numbers = np.array([known.get(name, 0.0) for name in self._chart])
             position, orientation = chart.to_pose(numbers)
-            self._base.write(BodyMessage("world", link, np.array(position), orientation=np.array(orientation)))
+            self._topics.base.write(BodyMessage("world", link, np.array(position), orientation=np.array(orientation)))
 
 
 def robot_of_recording(recording: Recording) -> Robot:

@@ -103,11 +103,8 @@ class _PluginTab:
         with self._tab:
             buttons = self._gui.add_button_group("life", ("start", "stop", "abort"), disabled=self._control is None)
             with self._gui.add_folder("parameters", expand_by_default=False):
-                for row in zip(
-                    reply.names, reply.types, reply.values, reply.defaults, reply.units, reply.minimums, reply.maximums,
-                    reply.descriptions, strict=True,
-                ):  # fmt: skip
-                    self._controls[row[0]] = self._make_control(*row)
+                for index, name in enumerate(reply.names):
+                    self._add_parameter(name, reply, index)
 
         @buttons.on_click
         async def _(event: GuiEvent[Any]) -> None:
@@ -121,13 +118,16 @@ class _PluginTab:
         else:
             self._requests.call(f"{self._name}/switch", SWITCH_ONE, Flag(verb == "start"), Answer)
 
-    def _make_control(
-        self, name: str, kind: str, value: str, default: str, unit: str, low: str, high: str, description: str
-    ) -> Control:
+    def _add_parameter(self, name: str, reply: ParametersReply, index: int) -> None:
+        value = reply.values[index]
+        unit = reply.units[index]
+        description = reply.descriptions[index]
         label = f"{name} [{unit}]" if unit else name
         control: Control
-        numbers = [_number(each) for each in (value, default, low, high)]
-        number, usual, least, most = numbers
+        number = _number(value)
+        usual = _number(reply.defaults[index])
+        least = _number(reply.minimums[index])
+        most = _number(reply.maximums[index])
         off = self._control is None
         if value in ("true", "false"):
             control = self._gui.add_checkbox(label, value == "true", disabled=off, hint=description)
@@ -145,8 +145,6 @@ class _PluginTab:
             if event.client is not None:
                 text = control.value if isinstance(control.value, str) else json.dumps(control.value)
                 self._requests.submit(partial(self._set, event.client_id, name, text))
-
-        return control
 
     def _set(self, client: int | None, name: str, text: str) -> None:
         if self._control is not None and self._control.may_command(client):

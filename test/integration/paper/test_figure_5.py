@@ -13,7 +13,7 @@ from solfer.components.move_joints import MoveJoints
 from solfer.config.loading.rt_layer import read_layer
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor
+from solfer.realtime.executor import Executor, ExecutorTelemetry
 
 LEGS = "mammal_wide_high"
 UPPER = {"torso_yaw": 0.3, "neck_pitch": 0.2}  # [rad]
@@ -37,8 +37,8 @@ class Layers:
             plugins,
             self.world.node("xbot"),
             EmergencyStopLatch(folder),
-            nanoseconds=lambda: round(1e9 * bus.time),
             polls=[node.poll for node in nodes],
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * bus.time)),
         )
         self.executor.switchboard.commit(self.executor.switchboard.plan(layer.executor.start))
         bus.every(1.0 / self.executor.rate, self.executor.cycle)

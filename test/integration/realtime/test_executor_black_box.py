@@ -14,7 +14,7 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
 from solfer.plugins.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.reader import read
@@ -37,8 +37,9 @@ def executor(world, plugin, tmp_path):
         MemoryMiddleware(world.bus, "xbot"),
         EmergencyStopLatch(tmp_path),
         rules=ExecutorRules(blend=0.2),
-        nanoseconds=lambda: round(1e9 * world.bus.time),
-        black_box=BlackBox(tmp_path, [plugin]),
+        telemetry=ExecutorTelemetry(
+            nanoseconds=lambda: round(1e9 * world.bus.time), black_box=BlackBox(tmp_path, [plugin])
+        ),
     )
     world.bus.every(1.0 / made.rate, made.cycle)
     return made

@@ -15,7 +15,7 @@ from solfer.components.move_joints import MoveJoints
 from solfer.config import load
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.transport import JointMessage
 
@@ -75,7 +75,7 @@ def test_ten_thousand_moving_cycles_keep_no_memory(tmp_path):
         EmergencyStopLatch(tmp_path),
         rules=rules,
         polls=[node.poll],
-        black_box=BlackBox(tmp_path, [plugin], 1.0),
+        telemetry=ExecutorTelemetry(black_box=BlackBox(tmp_path, [plugin], 1.0)),
     )
     robot.bus.every(1.0 / executor.rate, executor.cycle)
     executor.switchboard.commit(executor.switchboard.plan(start=[PLUGIN]))

@@ -11,7 +11,7 @@ from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.reader import read
@@ -33,8 +33,7 @@ def test_recording_of_layer_is_replayed(shared, tmp_path, capsys):
         MemoryMiddleware(shared.bus, "xbot"),
         EmergencyStopLatch(tmp_path),
         rules=ExecutorRules(blend=0.2),
-        nanoseconds=lambda: round(1e9 * shared.bus.time),
-        black_box=box,
+        telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * shared.bus.time), black_box=box),
     )
     shared.bus.every(1.0 / executor.rate, node.poll)
     shared.bus.every(1.0 / executor.rate, executor.cycle)

@@ -14,7 +14,7 @@ from solfer.navigation import Navigation, ScenarioCourse
 from solfer.plugins import PluginSet, Registry, generate
 from solfer.plugins.shared import generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor
+from solfer.realtime.executor import Executor, ExecutorTelemetry
 from solfer.scenarios import Player, Scenario
 
 STANCE = "\n".join(f"{axis} cp: [0.0, 0.0, 0.0, 0.0]\n{axis} cp ref: [[0.0, 0.0, 0.0, 0.0]]" for axis in "xyz")
@@ -148,9 +148,9 @@ class Layer(Driven, BridgedWorld):
             members.plugins,
             self.node("xbot"),
             EmergencyStopLatch(folder),
-            nanoseconds=lambda: round(1e9 * self.bus.time),
             polls=[members.sharing.turns.next, *(node.poll for node in nodes.values())],
             requires=members.requires,
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * self.bus.time)),
         )
         self.executor.switchboard.commit(self.executor.switchboard.plan(layer.start))
         self.rate = self.executor.rate

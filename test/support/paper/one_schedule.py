@@ -23,7 +23,7 @@ from solfer.plugins import PluginSet, Registry, generate
 from solfer.plugins.outputs.start_blend import SHORTEST
 from solfer.plugins.shared import generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.scenarios import Player, read_scenario
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, Flag
@@ -182,9 +182,9 @@ class InLayer(_Scheduled, BridgedWorld):
             self.node("xbot"),
             EmergencyStopLatch(self._folder),
             rules=ExecutorRules(blend=SHORTEST),
-            nanoseconds=lambda: round(1e9 * self.bus.time),
             polls=[members.sharing.turns.next, *(node.poll for node in nodes)],
             requires=members.requires,
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * self.bus.time)),
         )
         self.bridge.cycle()
         return [executor]

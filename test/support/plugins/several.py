@@ -6,7 +6,7 @@ from support.unit.joint_pipes import RATE, make_robot
 
 from solfer.components import Component
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins import Plugin, PluginSet
+from solfer.plugins import Plugin, PluginParts, PluginSet
 from solfer.plugins.life.plugin_set import NOTHING
 from solfer.plugins.loop import PluginLoop
 from solfer.plugins.outputs.outputs import Outputs
@@ -111,4 +111,4 @@ class Several:
             outputs.commanding = (
                 SimpleNamespace(controller="wheels", fields=[("velocity", None)], sent=SimpleNamespace(names=(joint,))),
             )
-        return Plugin(component, robot, (), outputs, Inbox(), RATE, self._middleware)
+        return Plugin(PluginParts(component, robot, (), outputs, Inbox(), RATE, self._middleware))

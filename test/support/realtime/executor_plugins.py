@@ -6,7 +6,7 @@ from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 
 RULES = ExecutorRules(blend=0.5)
 
@@ -33,7 +33,7 @@ class Layer:
             EmergencyStopLatch(folder),
             rules=rules,
             polls=self._polls,
-            nanoseconds=lambda: round(1e9 * bus.time) + self._extra,
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * bus.time) + self._extra),
         )
         self.begin()
 

@@ -14,7 +14,7 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginSet, Registry
 from solfer.plugins.shared import generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, NoFields
 
@@ -175,7 +175,7 @@ class InLayer(_Listed, XbotWorld):
             self.node("xbot"),
             EmergencyStopLatch(self._folder),
             rules=ExecutorRules(rules.blend, rules.budget, rules.overruns, rules.grace),
-            nanoseconds=lambda: round(1e9 * bus.time),
             polls=[members.sharing.turns.next, *(node.poll for node in nodes)],
             requires=members.requires,
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * bus.time)),
         )

@@ -1,6 +1,6 @@
 """What several tests of xbot bridge share."""
 
-from solfer.middleware.bridge import Bridge, Route, ServiceForward
+from solfer.middleware.bridge import Bridge, BridgeSearch, Route, ServiceForward
 from solfer.middleware.shared_memory.discovery import declared_topics, published_topics, services
 
 
@@ -16,9 +16,12 @@ def made(namespace, inside, outside, inwards, outwards):
         outside,
         inwards,
         outwards,
-        lambda known: [
-            ServiceForward(each.name, each.interface, each.request, each.reply) for each in services(namespace, known)
-        ],
-        lambda known: [Route(each.topic, each.message) for each in published_topics(namespace, known)],
-        wanted,
+        search=BridgeSearch(
+            lambda known: [
+                ServiceForward(each.name, each.interface, each.request, each.reply)
+                for each in services(namespace, known)
+            ],
+            lambda known: [Route(each.topic, each.message) for each in published_topics(namespace, known)],
+            wanted,
+        ),
     )

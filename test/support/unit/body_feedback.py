@@ -7,9 +7,10 @@ from support.unit.endpoints import Told
 
 from solfer.config.records.conventions import ConventionRecord
 from solfer.model import Description, Kinematics, State
-from solfer.pipes.body.feedback import BodyFeedbackPipe
+from solfer.pipes.body.feedback import BodyFeedbackPipe, BodySensor
 from solfer.pipes.body.reading import READINGS
 from solfer.pipes.body.sensor_mount import SensorMount
+from solfer.pipes.feedback_pipe import Reception
 
 SENSOR = (
     '<link name="sensor"/><joint name="glue" type="fixed"><parent link="arm"/><child link="sensor"/>'
@@ -31,7 +32,7 @@ def truth(link, offset=None, turn=None):
     return kinematics.position(link) + lever, rotation if turn is None else rotation * turn, linear, velocity[3:]
 
 
-def make(
+def make(  # noqa: PLR0913, PLR0917 a test names what it changes
     message,
     link,
     fields=("position", "velocity"),
@@ -48,10 +49,10 @@ def make(
     state.position[6:], state.velocity[6:] = Q[6:], V[6:]
     mount = SensorMount(DESCRIPTION, link, state, offset, None if turn is None else turn.as_matrix())
     reading = READINGS[message](link, convention, axes)
-    located = convention.position.type == "FULL"
+    sensor = BodySensor(mount, reading, convention.position.type == "FULL", calibrated)
     reader = reader or Told()
     chart = Kinematics(DESCRIPTION).base
-    pipe = BodyFeedbackPipe("base", reader, state, chart, mount, reading, fields, located, True, low_pass, calibrated)
+    pipe = BodyFeedbackPipe("base", reader, state, chart, sensor, fields, Reception(low_pass=low_pass))
     return pipe, reader, state
 
 

@@ -6,7 +6,7 @@ from support.unit.joint_pipes import RATE, make_robot, published, received
 from solfer.components import Component
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.plugins import Plugin
+from solfer.plugins import Plugin, PluginParts
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
@@ -49,7 +49,9 @@ class Stage:
         self.component = Counting(robot)
         outputs = Outputs([(out, None)], StartBlend("cart", (), robot, RATE), robot, 1.0 / RATE)
         watches = [watch for watch in (self.watch, self.wanted) if watch]
-        self.plugin = Plugin(self.component, robot, watches, outputs, Inbox(), RATE, self.middleware, stall=stall)
+        self.plugin = Plugin(
+            PluginParts(self.component, robot, watches, outputs, Inbox(), RATE, self.middleware, stall=stall)
+        )
         self.sent = MemoryMiddleware(self.bus, "ear").queue("out", "solfer/JointCommand", 10000)
         self.names = robot.dofs
 

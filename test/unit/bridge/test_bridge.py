@@ -11,7 +11,7 @@ from support.unit.declarations import COUNT, CountGoal, CountingNode, counting_c
 from solfer.components.declaration import Service
 from solfer.config import load
 from solfer.errors import MiddlewareError
-from solfer.middleware.bridge import Bridge, Route, ServiceForward, routes
+from solfer.middleware.bridge import Bridge, BridgeSearch, Route, ServiceForward, routes
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport.declared import GoalStatus
 from solfer.transport.declared.goals import GOAL_ID
@@ -44,11 +44,11 @@ ASK = ServiceForward("arm/ask", "package/Ask", Question, Reply, timeout=1.0)
 class Sides:
     """A real-time side, another side, and the bridge between them."""
 
-    def __init__(self, **arguments):
+    def __init__(self, **search):
         self.buses = Bus(), Bus()
         self.rt, self.nrt = MemoryMiddleware(self.buses[0], "rt"), MemoryMiddleware(self.buses[1], "nrt")
         ends = (MemoryMiddleware(bus, "bridge") for bus in self.buses)
-        self.bridge = Bridge(*ends, [JOINTS], [BODY], **arguments)
+        self.bridge = Bridge(*ends, [JOINTS], [BODY], BridgeSearch(**search))
 
     def turn(self, count=1):
         """Run cycles of the bridge, 5 ms each on both sides."""

@@ -13,7 +13,7 @@ from solfer.config import load
 from solfer.dynamics import BIAS, INERTIA
 from solfer.errors import ComponentError
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins import Plugin, PluginState
+from solfer.plugins import Plugin, PluginParts, PluginState
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
@@ -76,7 +76,7 @@ def run(robot):
         for name, value in flags.items():
             setattr(probe, name, value)
         outputs = Outputs([], StartBlend("probe", [], robot, RATE), robot, 1.0 / RATE)
-        plugin = Plugin(probe, robot, [], outputs, Inbox(), RATE, MemoryMiddleware(Bus()))
+        plugin = Plugin(PluginParts(probe, robot, [], outputs, Inbox(), RATE, MemoryMiddleware(Bus())))
         for _ in range(count):
             robot.state.position[2] += 1.0
             plugin.cycle()

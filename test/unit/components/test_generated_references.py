@@ -115,10 +115,10 @@ def test_a_reference_from_outside_takes_over_from_where_it_is(upper, make):
     left = component.targets["left"]
     before = np.array(component.get_reference(GetReference("left")).values)
     component.set_reference(SetReference("left", (0.0, 0.0, 0.0), relative=True))
-    values = [left._value.copy()]
+    values = [np.array(left.reference)]
     for _ in range(100):
         run(component, PERIOD)
-        values.append(left._value.copy())
+        values.append(np.array(left.reference))
     steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
     assert steps.max() < 1.1 * 2.0 * np.pi * RADIUS / TURN * PERIOD
     assert_allclose(values[-1], before, atol=1e-9)

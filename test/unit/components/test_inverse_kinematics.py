@@ -160,7 +160,7 @@ def test_what_gives_way_is_made_up_for(giving_way, robot):
         model.update()
         apart = model.kinematics.position("arm1_7") - model.kinematics.position("torso_2")
         seen = model.kinematics.rotation("torso_2").T @ apart
-        errors.append(np.linalg.norm(seen - pose._desired[:3]))
+        errors.append(np.linalg.norm(seen - np.array(pose.desired[:3])))
     assert max(errors[:20]) > 2e-3 and max(errors[-20:]) < 1e-5
 
 

@@ -35,12 +35,12 @@ class Bench:
     def __init__(self, shifts=0.0, center=(0.0, 0.0)):
         self.places = np.vstack((CORNERS, center)) + shifts
         self.velocity, self.lifted = np.zeros(13), np.zeros(4, dtype=bool)
-        self.rates = TaskRates(*np.zeros((3, 26)))
+        self.rates = TaskRates(ROWS, *np.zeros((3, 26)))
         self._points = [SimpleNamespace(value=np.zeros(3), jacobian=np.zeros((3, 13))) for _ in range(5)]
         for index, point in enumerate(self._points):
             point.jacobian[(0, 1), (2 * index, 2 * index + 1)] = 1.0
         self.polygon = SupportPolygon(self._points[:4], self._points[4], LEAST)
-        self.guard = MotionGuard(self.polygon, self.lifted, WHEELS, ROWS, self.rates, LEGS, TURNING, self.velocity)
+        self.guard = MotionGuard(self.polygon, self.lifted, WHEELS, self.rates, LEGS, TURNING, self.velocity)
 
     def update(self, pace=1.0, is_bound=False):
         for point, place in zip(self._points, self.places, strict=True):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.components.odometry import kalman_kernel as kernel
-from solfer.components.odometry.kalman import PATCH, PLANE, TILT_TIME, UNEVEN, WheelInertialFilter
+from solfer.components.odometry.kalman import PATCH, PLANE, TILT_TIME, UNEVEN, ImuSample, WheelInertialFilter
 from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, TILT
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
@@ -109,7 +109,7 @@ def test_the_tilt_is_as_uncertain_as_it_says():
             # the base does not turn: the IMU turns to right itself, and the gyroscope measures its bias and its noise
             measured = bias - kalman.biases[:2] + NOISE / math.sqrt(PERIOD) * random.standard_normal(2)
             kalman.lean(0.0, *(tilt - before - measured * PERIOD))
-            kalman.predict(0.0, PERIOD, 0.01, arm=arm, imu_time=PERIOD)
+            kalman.predict(0.0, PERIOD, 0.01, arm=arm, sample=ImuSample(time=PERIOD))
             (x, y), z = tilt - before - (kalman.tilt - known), arm[2]
             base += -y * z, x * z
             if k % 5 == 0:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from support.unit.golden import lower_body
 
+from solfer.components.odometry.imu_samples import LAG
 from solfer.components.odometry.samples import SortedSamples
 from solfer.components.odometry.stamps import PERSISTENT, StampCheck
-from solfer.components.odometry.streams import AHEAD, LAG, Streams
+from solfer.components.odometry.streams import AHEAD, Streams
 from solfer.model.history import History
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002

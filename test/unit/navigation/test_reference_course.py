@@ -144,7 +144,7 @@ def test_silence_leaves_the_target_at_its_last_reference(bus, hands, play, way):
         hands.cycle()
     assert len(last) > 50 and np.linalg.norm(last[-1] - last[0]) > 0.01
     assert_allclose(desired(hands), last[-1], atol=1e-12)
-    assert_allclose(hands.component.targets["left"]._value, last[-1], atol=1e-6)
+    assert_allclose(hands.component.targets["left"].reference, last[-1], atol=1e-6)
     assert hands.component.targets["left"].is_still
 
 

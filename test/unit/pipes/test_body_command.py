@@ -10,7 +10,7 @@ from support.unit.endpoints import Kept
 from solfer.config.records.conventions import ConventionRecord
 from solfer.model import Kinematics, State
 from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
-from solfer.pipes.body.command import BodyCommandPipe
+from solfer.pipes.body.command import BodyCommandPipe, PublishedLink
 from solfer.transport import MessageStatus
 
 LINK = "sensor"
@@ -27,7 +27,7 @@ def publish(message, **tags):
     state, writer = State(DESCRIPTION_DOFS), Kept()
     state.position[:], state.velocity[:] = Q, V
     convention = ConventionRecord.model_validate(tags)
-    pipe = BodyCommandPipe("pipe", writer, message, Kinematics(DESCRIPTION), state, LINK, convention)
+    pipe = BodyCommandPipe("pipe", writer, message, Kinematics(DESCRIPTION), state, PublishedLink(LINK, convention))
     pipe.collect()
     pipe.send(2.5)
     return writer.messages[0]
@@ -47,7 +47,9 @@ def test_odometry_carries_the_covariances_of_who_estimates_the_base():
     state, writer = State(DESCRIPTION_DOFS), Kept()
     known = state.add(POSE_COVARIANCE, 36), state.add(TWIST_COVARIANCE, 36)
     kinematics, names = Kinematics(DESCRIPTION), ("nav_msgs/Odometry", LINK)
-    pipe = BodyCommandPipe("pipe", writer, names[0], kinematics, state, LINK, ConventionRecord(), "odom", known)
+    pipe = BodyCommandPipe(
+        "pipe", writer, names[0], kinematics, state, PublishedLink(LINK, ConventionRecord(), "odom", known)
+    )
     state[POSE_COVARIANCE][:], state[TWIST_COVARIANCE][:] = np.arange(36.0), np.arange(36.0, 72.0)
     pipe.collect()
     pipe.send(2.5)

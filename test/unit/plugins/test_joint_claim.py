@@ -9,6 +9,7 @@ from solfer.errors import ClaimRefused
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import JointCommandPipe, PipeContext, factory
 from solfer.pipes.joint.calibration import Calibration
+from solfer.pipes.joint.pipes import JointReceiver
 from solfer.plugins.joint_claim import AGAIN, IGNORED, SETTLE, JointClaim
 from solfer.transport import Inbox
 from solfer.transport.lower_level import (
@@ -98,7 +99,7 @@ def test_a_claim_has_what_is_measured_in_the_numbers_of_the_hardware():
     middleware, mapping = MemoryMiddleware(bus, "cart"), robot.maps["ACTUATED"]
     calibration = Calibration([f"J_{name}" for name in mapping.external], [1, -1], [0.0, 0.3])
     writer = middleware.writer("arm/command", "solfer/JointCommand")
-    pipe = JointCommandPipe("arm", writer, mapping, robot.command, ("position",), calibration)
+    pipe = JointCommandPipe("arm", writer, mapping, robot.command, ("position",), JointReceiver(calibration))
     lower_level = LowerLevel(bus, ClaimAnswer())
     place = np.where(np.array(robot.dofs) == "shoulder", 0.2, np.nan)
     claim = JointClaim("cart", [pipe], middleware, position=lambda: place)

@@ -10,7 +10,7 @@ from solfer.components import Component
 from solfer.errors import ClaimRefused, ComponentError, MiddlewareError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.plugins import Plugin, PluginSet, PluginState
+from solfer.plugins import Plugin, PluginParts, PluginSet, PluginState
 from solfer.plugins.life.budget import BudgetRules
 from solfer.plugins.loop import PluginLoop
 from solfer.plugins.outputs.outputs import Outputs
@@ -36,7 +36,7 @@ class Bent:
             published(**tags, dofs=dofs(mapping="ACTUATED")), PipeContext(robot, self._middleware, {}, RATE)
         )
         outputs = Outputs([(pipe, None)], StartBlend("cart", [pipe], robot, RATE, blend), robot, 1.0 / RATE)
-        self._plugin = Plugin(Component(robot), robot, (), outputs, Inbox(), RATE, self._middleware)
+        self._plugin = Plugin(PluginParts(Component(robot), robot, (), outputs, Inbox(), RATE, self._middleware))
         robot.command.position[robot.dofs.index("shoulder")] = GAP
         self._place = pipe.message.names.index("shoulder")
         self._sent = MemoryMiddleware(self._middleware.bus, "ear").queue("arm/command", "solfer/JointCommand", 10000)

@@ -11,7 +11,7 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
 from solfer.plugins.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.realtime.telemetry.statistics_memory import LoopCount, LoopTime
 
 LATE = round(1.5e9 * PERIOD)  # [ns]
@@ -24,8 +24,7 @@ def patient_for_three(several, folder, interruptions=None):
         MemoryMiddleware(several.bus, "xbot"),
         EmergencyStopLatch(folder),
         rules=ExecutorRules(blend=0.0, overruns=3, grace=0),
-        nanoseconds=lambda: 0,
-        interruptions=interruptions,
+        telemetry=ExecutorTelemetry(nanoseconds=lambda: 0, interruptions=interruptions),
     )
 
 
@@ -94,8 +93,7 @@ class Layer:
             node,
             self.stop,
             rules=ExecutorRules(**{"blend": 0.0, "grace": 0, **rules}),
-            nanoseconds=lambda: self.time + self.several.worked,
-            black_box=box,
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: self.time + self.several.worked, black_box=box),
         )
 
     def start(self):
@@ -220,8 +218,8 @@ def test_work_beside_is_done_ten_times_a_second(tmp_path):
         several.plugins,
         MemoryMiddleware(several.bus, "xbot"),
         EmergencyStopLatch(tmp_path),
-        beside=lambda: done.append(1),
     )
+    executor.beside = lambda: done.append(1)
     several.bus.every(1.0, several._end)
     executor.run()
     assert len(done) == 10 and executor.plugins[0].state is PluginState.CLOSED

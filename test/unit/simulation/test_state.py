@@ -99,6 +99,6 @@ def test_a_base_is_where_it_was_put_to_the_last_digits():
         for _ in range(5):
             position, turn = rng.uniform(-3.0, 3.0, 3), Rotation.random(random_state=rng)
             body.place(np.zeros(len(body.joints)), position, turn.as_quat())
-            body.read(q, v, np.zeros(len(body._motor_rows)))
+            body.read(q, v, np.zeros(len(body._motors.rows)))
             np.testing.assert_allclose(body.position, position, atol=1e-14)
             np.testing.assert_allclose(Rotation.from_quat(body.orientation).as_matrix(), turn.as_matrix(), atol=1e-14)

@@ -12,6 +12,7 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import Accepted, Action, LiveParameter, Outcome, Service, TopicIn, TopicOut
 from solfer.components.following.generated import GeneratedPosture, require_speeds
+from solfer.components.following.quantity import quantity_of
 from solfer.components.following.requests import (
     MESSAGES,
     GetReference,
@@ -26,7 +27,7 @@ from solfer.components.following.requests import (
     pose_of,
 )
 from solfer.components.following.tags import FollowingTags, MotionRecord
-from solfer.components.following.target import WORLD, Target, quantity_of
+from solfer.components.following.target import WORLD, Target
 from solfer.config.records.live import is_live
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import TaskLevelsRecord, TaskRecord
@@ -103,7 +104,17 @@ class ReferenceFollower(Component, abc.ABC):
     def actions(self) -> tuple[Action, ...]:
         """Offer the action `reach`."""
         parts = (ReachGoal, ReachFeedback, ReachResult)
-        return (Action("reach", "solfer/Reach", *parts, self._begin, self._outcome, self._report, self._cancel),)
+        return (
+            Action(
+                "reach",
+                "solfer/Reach",
+                *parts,
+                begin=self._begin,
+                outcome=self._outcome,
+                report=self._report,
+                cancel=self._cancel,
+            ),
+        )
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer how references move, and when a task has arrived."""
@@ -238,8 +249,9 @@ class ReferenceFollower(Component, abc.ABC):
         self._countdown = self._interval = max(round(1.0 / (self.period * RATE)), 1)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
         for index, target in enumerate(self._list):
-            target.connect(self._filter, index, tags.motion_of(target.name, self.period), tolerances)
-            target.residual = self._residuals[index]
+            target.connect(
+                self._filter, index, tags.motion_of(target.name, self.period), tolerances, self._residuals[index]
+            )
         self._tolerances = tolerances
 
     def _task_parameters(self, stack: ConfiguredTasks, keys: Sequence[str]) -> Iterator[LiveParameter]:

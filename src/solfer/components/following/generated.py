@@ -5,10 +5,12 @@ from typing import cast
 
 import numpy as np
 
+from solfer.components.following.quantity import PoseNumbers
 from solfer.components.following.tags import MotionRecord
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import TaskRecord
 from solfer.errors import ComponentError
+from solfer.numerics.planar_move import PlanarMove
 from solfer.points import Constant, Posture
 from solfer.references import ReferenceGenerator, build_reference
 from solfer.tasks import Task
@@ -77,6 +79,48 @@ class GeneratedPosture:
                 where=self._record.where(self._record.kind),
                 expected=f"at most {self._limits[joint]:.4g} rad/s, the velocity limit of the joint",
             )
+
+
+class GeneratedReference:
+    """The reference of a task that is generated until one comes from outside.
+
+    Args:
+        generator: Generates it.
+        numbers: Its numbers.
+
+    Attributes:
+        is_running: Whether it goes on.
+        value: Where it is, shape (numbers.size,).
+    """
+
+    def __init__(self, generator: ReferenceGenerator, numbers: PoseNumbers):
+        self.is_running = False
+        self.value = np.zeros(numbers.size)
+        self._generator = generator
+        self._numbers = numbers
+        self._speeds = np.zeros(3 if numbers.size < 7 else 6)
+        self._time = 0.0
+        self._moves: list[PlanarMove] = []
+
+    def start(self, value: np.ndarray) -> None:
+        """Begin where the point is."""
+        self.is_running = True
+        self._time = 0.0
+        self._moves.clear()
+        self._generator.start(value)
+
+    def advance(self, step: float) -> None:
+        """Go on by some time [s]; it ends where it stays."""
+        self._time += step
+        self._generator.at(self._time, self.value, self._speeds)
+        for move in self._moves:
+            self._numbers.displace(move, self.value)
+        self.is_running = self._time < self._generator.duration
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move with the base."""
+        if self.is_running:
+            self._moves.append(move)
 
 
 def require_speeds(generator: ReferenceGenerator, record: ReferenceRecord, motion: MotionRecord) -> None:

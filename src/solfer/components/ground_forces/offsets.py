@@ -1,6 +1,7 @@
 """What torque sensors show where there is no torque, from the forces that nothing else explains."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,6 +9,28 @@ from solfer.components.ground_forces import kernel
 from solfer.components.ground_forces.tags import OffsetTags
 from solfer.components.ground_forces.weighted_forces import LEAST, weighed
 from solfer.points.contact.contacts import Contact
+
+
+class _Estimate(NamedTuple):
+    """What the kernel keeps and computes, in its order.
+
+    Attributes:
+        factor: Shape (rows, rows).
+        spread: Shape (joints, rows).
+        needed: Shape (rows,).
+        information: Of the offsets, shape (joints, joints).
+        moments: The same times the offsets, shape (joints,).
+        solved: Shape (joints, joints).
+        offsets: Shape (joints,) [Nm, N].
+    """
+
+    factor: np.ndarray
+    spread: np.ndarray
+    needed: np.ndarray
+    information: np.ndarray
+    moments: np.ndarray
+    solved: np.ndarray
+    offsets: np.ndarray
 
 
 class TorqueOffsets:
@@ -45,11 +68,15 @@ class TorqueOffsets:
         self._joints = self._columns[self._first :]
         count = len(self._joints)
         self._jacobian = np.zeros((rows, size))
-        self._needed = np.zeros(rows)
-        self._factor = np.zeros((rows, rows))
-        self._spread = np.zeros((count, rows))
-        self._information, self._solved = np.zeros((2, count, count))
-        self._evidence, self._offsets = np.zeros((2, count))
+        self._estimate = _Estimate(
+            np.zeros((rows, rows)),
+            np.zeros((count, rows)),
+            np.zeros(rows),
+            information=np.zeros((count, count)),
+            moments=np.zeros(count),
+            solved=np.zeros((count, count)),
+            offsets=np.zeros(count),
+        )
         self.value = np.zeros(size)
 
     def start(self, period: float) -> None:
@@ -80,12 +107,6 @@ class TorqueOffsets:
             self._share,
             self._decay,
             self._tags.deviation**-2,
-            self._factor,
-            self._spread,
-            self._needed,
-            self._information,
-            self._evidence,
-            self._solved,
-            self._offsets,
+            *self._estimate,
         )
-        self.value[self._joints] = self._offsets
+        self.value[self._joints] = self._estimate.offsets

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.consensus import COMPARED, WheelConsensus, turn_of
 from solfer.components.odometry.height_map import HeightMap
-from solfer.components.odometry.kalman import WheelInertialFilter
+from solfer.components.odometry.kalman import NO_SAMPLE, ImuSample, WheelInertialFilter
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
@@ -181,7 +181,7 @@ class FilteredOdometry:
         np.subtract(self._wheels.position, self._joints_before, out=self._step)
         keep = AT_REST / (AT_REST + period)
         moved, legs, sway = filter_kernel.joint_motion(self._step, self._wheels.legs, self._sway, keep)
-        shaken, tilt_turn, tilt_time = self._follow_imu(legs / period)
+        shaken, sample = self._follow_imu(legs / period)
         self._weigh()
         self._measure_displacements()
         turn, imu_time, unknown = self._measure_turn()
@@ -193,8 +193,7 @@ class FilteredOdometry:
             shaken,
             arm=self._arm,
             heading=self.heading,
-            tilt_turn=tilt_turn,
-            imu_time=tilt_time,
+            sample=sample,
         )
         self._correct(turn, imu_time, legs / period)
         self._integrate(turn, imu_time, unknown)
@@ -213,29 +212,27 @@ class FilteredOdometry:
         """
         self.kalman.write_covariances(self.heading, self._arm, self._period, pose, twist)
 
-    def _follow_imu(self, leg_speed: float) -> tuple[float, float, float]:
+    def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
 
         Without a sample the base is assumed to tilt on as it did; the next sample measures the difference to that.
 
         Returns:
-            Variance of what the gyroscope misses [rad^2/s^2], the turn of the heading frame [rad], and the time that
-            the sample covers [s]; the latter two are zero without one, and at rest.
+            Variance of what the gyroscope misses [rad^2/s^2], and the sample; none at rest.
         """
         base = self._base
         kalman = self.kalman
         if not base.fresh:
             np.multiply(base.angular[:2], self._period, out=base.turned[:2])
             self._assumed += base.turned[:2]
-            return 0.0, 0.0, 0.0
+            return 0.0, NO_SAMPLE
         time = self._since_imu + self._period
         shaken = filter_kernel.mean_rate(
             base.rotation, base.heading, base.angular, base.turned, time, base.averages,
             self._rate_before, self._rate, kalman.axes,
         )  # fmt: skip
         shaken += (SHAKES * leg_speed) ** 2 * 2.0 * SHAKING / self._period
-        tilt_turn = 0.0
-        tilt_time = 0.0
+        sample = NO_SAMPLE
         x, y, _ = base.turned.tolist()
         before_x, before_y = kalman.tilt.tolist()
         if self._rest > AT_REST:  # a robot at rest does not turn
@@ -244,9 +241,8 @@ class FilteredOdometry:
             base.turned[:2] = 0.0
         else:
             rate_x, rate_y, rate_z = (self._rate - kalman.biases).tolist()
-            tilt_turn = rate_z * time
-            tilt_time = time
-            kalman.lean(tilt_turn, x - rate_x * time, y - rate_y * time)
+            sample = ImuSample(rate_z * time, time)
+            kalman.lean(sample.turn, x - rate_x * time, y - rate_y * time)
             tilt_x, tilt_y = kalman.tilt.tolist()
             base.turned[:2] = x - (tilt_x - before_x), y - (tilt_y - before_y)
         base.angular[0] = base.turned[0] / time
@@ -254,7 +250,7 @@ class FilteredOdometry:
         base.turned[:2] -= self._assumed
         self._assumed[:] = 0.0
         self._wheels.subtract_tilt(*kalman.tilt.tolist())
-        return shaken, tilt_turn, tilt_time
+        return shaken, sample
 
     def _weigh(self) -> None:
         """Weigh the wheels: those that are lifted do not count, unless fewer than two would be left."""
@@ -352,7 +348,13 @@ class FilteredOdometry:
         self.position += about_vertical(displacement, self.heading + 0.5 * turn)
         self.heading = base.heading + self._offset if base.fresh else self.heading + turn
         missing = self._map.missing_height(
-            wheels.arms, wheels.normal, self.position, self.heading, self._trusted, kalman.velocity, turn / period
+            wheels.arms,
+            wheels.normal,
+            self.position,
+            heading=self.heading,
+            weights=self._trusted,
+            velocity=kalman.velocity,
+            turn=turn / period,
         )
         most = RAISING * period
         raised = 0.0 if math.isnan(missing) else min(max(missing * period / (SETTLE + period), -most), most)

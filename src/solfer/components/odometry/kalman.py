@@ -1,6 +1,7 @@
 """The error-state Kalman filter of the base: wheels that roll, a gyroscope, and an IMU's tilt."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,21 @@ SCRUB_SHARE, SCRUB_TIME = 0.0005, 1.0
 
 PLANE = 3e-4
 """Standard deviation of the turn of the plane through contacts, by encoders [rad]."""
+
+
+class ImuSample(NamedTuple):
+    """What a sample of the IMU measures of the tilt.
+
+    Attributes:
+        turn: Turn of H since the sample before that `lean` has followed [rad].
+        time: Time that the sample covers [s]; 0: there is none.
+    """
+
+    turn: float = 0.0
+    time: float = 0.0
+
+
+NO_SAMPLE = ImuSample()
 
 
 class WheelInertialFilter:
@@ -151,8 +167,7 @@ class WheelInertialFilter:
         *,
         arm: np.ndarray | None = None,
         heading: float = 0.0,
-        tilt_turn: float = 0.0,
-        imu_time: float = 0.0,
+        sample: ImuSample = NO_SAMPLE,
     ) -> None:
         """Propagate velocity and errors of the sensors over an interval.
 
@@ -163,9 +178,9 @@ class WheelInertialFilter:
             shaken: Variance of what the gyroscope misses between its samples [rad^2/s^2].
             arm: From the base's origin to the mean of the contacts in H, shape (3,) [m]; None: straight above it.
             heading: Heading [rad].
-            tilt_turn: Turn of H since the sample before that `lean` has followed [rad].
-            imu_time: Time that this sample covers [s]; 0: there is none.
+            sample: Sample of the IMU in the interval.
         """
+        tilt_turn, imu_time = sample
         scrub = -math.expm1(-period / SCRUB_TIME)
         slope = -math.expm1(-rolled / PATCH)
         estimates_tilt = self._tilt > 0.0 and imu_time > 0.0

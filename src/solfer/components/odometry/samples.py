@@ -1,8 +1,13 @@
 """The newest samples of a sensor, in the order of their stamps."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
+
+from solfer.components.odometry.stamps import StampCheck
+from solfer.model.history import History
+from solfer.robot import Robot
 
 
 class SortedSamples:
@@ -54,3 +59,44 @@ class SortedSamples:
         self.count -= number
         self.stamps[: self.count] = self.stamps[number : self.count + number]
         self.rows[: self.count] = self.rows[number : self.count + number]
+
+
+class SensorHistory:
+    """A history of positions and velocities of certain DoFs, in their order.
+
+    Args:
+        history: The history.
+        first: The first of these DoFs, which follow each other.
+    """
+
+    def __init__(self, history: History, first: int):
+        places = history.dofs - first
+        self.history = history
+        self._places = (places, len(places) + places)
+        self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
+
+    @classmethod
+    def find(cls, robot: Robot, dofs: range) -> "SensorHistory | None":
+        """Find the history of all DoFs of a range; None: no pipe has one."""
+        for history in robot.state.histories:
+            if {"position", "velocity"} <= set(history.interfaces) and sorted(history.dofs.tolist()) == list(dofs):
+                return cls(history, dofs.start)
+        return None
+
+    def accepted(self, check: StampCheck, after: float) -> Iterator[tuple[int, float]]:
+        """Iterate over the rows of this cycle whose stamps pass a check and are after a time [s]: row and stamp [s]."""
+        history = self.history
+        for index in range(history.count):
+            stamp = round(float(history.stamps[index]), 6)  # whatever a transport has rounded: they are alike then
+            if check.accepts(stamp, float(history.arrivals[index]), after, history.sender):
+                yield index, stamp
+
+    def copy(self, index: int, out: np.ndarray) -> None:
+        """Copy a row: all positions, then all velocities; what it lacks stays as it is."""
+        for row, places in zip(self._rows, self._places, strict=True):
+            values = self.history.values[index, row]
+            if math.isnan(values.sum()):
+                known = ~np.isnan(values)
+                out[places[known]] = values[known]
+            else:
+                out[places] = values

@@ -14,6 +14,42 @@ from solfer.robot import Robot
 LEVEL = 1.0 - 1e-9
 
 
+class _Ground:
+    """The plane on which wheels roll.
+
+    Args:
+        contacts: Their contacts.
+
+    Attributes:
+        normal: Its normal, shape (3,); live.
+        is_level: Whether that is vertical.
+    """
+
+    def __init__(self, contacts: Handler[RollingContact]):
+        self._contacts = contacts
+        self.normal = np.array((0.0, 0.0, 1.0))
+        self.is_level = True
+
+    def set_normal(self, x: float, y: float, z: float) -> None:
+        """Set the normal, any length."""
+        length = math.sqrt(x * x + y * y + z * z)
+        self.normal[:] = x / length, y / length, z / length
+        was_level = self.is_level
+        self.is_level = bool(self.normal[2] >= LEVEL)
+        if self.is_level and not was_level:
+            self._tilt(self.normal)
+
+    def turn(self, cosine: float, sine: float) -> None:
+        """Let the contacts have the normal, turned about the vertical."""
+        if not self.is_level:
+            x, y, z = self.normal.tolist()
+            self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
+
+    def _tilt(self, normal: ArrayLike) -> None:
+        for contact in self._contacts:
+            contact.set_normal(normal)
+
+
 class Wheels:
     """Contacts of the wheels of a group. They are its own: the ground's normal may change here, unseen by others.
 
@@ -30,9 +66,6 @@ class Wheels:
         arms: From the base's origin to the contacts, shape (k, 3) [m]; live. These axes and those of the others are
             the world's, turned about the vertical as the base is.
         jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
-        normal: Normal of the ground, shape (3,); live.
-        is_level: Whether it is vertical.
-        joints: Number of DoFs without the base.
         legs: Which of them do not roll, shape (joints,).
 
     Raises:
@@ -67,15 +100,14 @@ class Wheels:
         radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records)
         self.radii = radii or (radius or 0.0,) * len(made)
         count = len(self.names)
-        self.joints = robot.size - 6
-        self.arms, self._places = np.zeros((count, 3)), self._contacts.value.reshape(-1, 3)
-        self.jacobian = np.zeros((3 * count, self.joints))
-        self.legs = np.ones(self.joints, dtype=bool)
+        joints = robot.size - 6
+        self.arms = np.zeros((count, 3))
+        self.jacobian = np.zeros((3 * count, joints))
+        self.legs = np.ones(joints, dtype=bool)
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
         self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
-        self.normal = np.array((0.0, 0.0, 1.0))
-        self.is_level = True
+        self._ground = _Ground(self._contacts)
         self._forces = np.zeros(count)
         self.position = robot.state.position[6:]
         self.velocity = robot.state.velocity[6:]
@@ -85,32 +117,37 @@ class Wheels:
 
     def set_normal(self, x: float, y: float, z: float) -> None:
         """Set the normal of the ground, any length."""
-        length = math.sqrt(x * x + y * y + z * z)
-        self.normal[:] = x / length, y / length, z / length
-        was_level = self.is_level
-        self.is_level = bool(self.normal[2] >= LEVEL)
-        if self.is_level and not was_level:
-            self._tilt(self.normal)
+        self._ground.set_normal(x, y, z)
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Normal of the ground, shape (3,); live."""
+        return self._ground.normal
+
+    @property
+    def is_level(self) -> bool:
+        """Whether it is vertical."""
+        return self._ground.is_level
+
+    @property
+    def joints(self) -> int:
+        """Number of DoFs without the base."""
+        return len(self.legs)
 
     def update(self, heading: float) -> None:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)
         sine = math.sin(heading)
-        if not self.is_level:
-            x, y, z = self.normal.tolist()
-            self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
+        self._ground.turn(cosine, sine)
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
+        places = self._contacts.value.reshape(-1, 3)
         jacobian = self._contacts.jacobian
-        filter_kernel.turn_back(self._places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
+        filter_kernel.turn_back(places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
 
     def subtract_tilt(self, x: float, y: float) -> None:
         """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
         filter_kernel.subtract_tilt(self.arms, self.jacobian, x, y)
-
-    def _tilt(self, normal: ArrayLike) -> None:
-        for contact in self._contacts:
-            contact.set_normal(normal)
 
     @property
     def forces(self) -> np.ndarray:

@@ -31,6 +31,59 @@ class _Limits:
     time: float = 0.0
 
 
+class _Deviation:
+    """How far joints are from where they are desired, and whether within tolerances; allocates nothing in a cycle.
+
+    Args:
+        robot: The Robot.
+        dofs: The joints, shape (m,).
+
+    Attributes:
+        desired, speed: Where they are desired, and how fast, shape (m,) [rad, m] and [rad/s, m/s]; written.
+        actual, turning: Where they were measured, and how fast.
+        turn: Turns after which they are where they were, shape (m,) [rad].
+    """
+
+    def __init__(self, robot: Robot, dofs: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import shorten
+
+        self._shorten = shorten
+        self._state = robot.state
+        self._dofs = dofs
+        self.desired, self.speed, self.actual, self.turning = (np.zeros(len(dofs)) for _ in range(4))
+        self.turn = robot.turns[dofs]
+        self._displacements = np.zeros((1, len(dofs)))
+        self._away = self._error = self._displacements[0]
+        self._slip = np.zeros(len(dofs))
+        self._beyond = np.zeros(len(dofs), dtype=bool)
+
+    def measure(self) -> None:
+        """Measure the joints."""
+        np.take(self._state.position, self._dofs, out=self.actual)
+        np.take(self._state.velocity, self._dofs, out=self.turning)
+
+    def is_within(self, tolerances: tuple[np.ndarray, np.ndarray]) -> bool:
+        """Return whether all joints are where they are desired."""
+        self.measure()
+        np.subtract(self.desired, self.actual, out=self._away)
+        np.subtract(self.speed, self.turning, out=self._slip)
+        self._shorten(self._displacements, self.turn)
+        for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
+            np.abs(error, out=error)
+            np.greater(error, tolerance, out=self._beyond)
+            if self._beyond.any():
+                self._error = error
+                return False
+        return True
+
+    def worst(self, names: tuple[str, ...]) -> str:
+        """Name the first joint that is beyond its tolerance, and by how much."""
+        index = int(self._beyond.argmax())
+        unit = "rad" if self._error is self._away else "rad/s"
+        return f"joint '{names[index]}' is {self._error[index]:.6g} {unit} from its trajectory"
+
+
 class TrajectoryFollower:
     """One trajectory of some joints, with or without a goal.
 
@@ -46,19 +99,17 @@ class TrajectoryFollower:
     """
 
     def __init__(self, robot: Robot, joints: np.ndarray, position: np.ndarray, velocity: np.ndarray):
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import shorten
-
-        self._shorten = shorten
-        self._state = robot.state
+        self._robot = robot
         self._joints = joints
         self._position = position
         self._velocity = velocity
-        names = [robot.dofs[dof] for dof in joints]
-        lower = robot.lower_limits.position[joints]
-        upper = robot.upper_limits.position[joints]
-        self._turns = robot.turns[joints]
-        self._check = TrajectoryCheck(names, lower, upper, speed=robot.upper_limits.velocity[joints], turns=self._turns)
+        self._check = TrajectoryCheck(
+            [robot.dofs[dof] for dof in joints],
+            robot.lower_limits.position[joints],
+            robot.upper_limits.position[joints],
+            speed=robot.upper_limits.velocity[joints],
+            turns=robot.turns[joints],
+        )
         self.moving = False
         self.places = np.zeros(0, dtype=int)
         self._motion: ViaPoints | None = None
@@ -66,7 +117,7 @@ class TrajectoryFollower:
         self._names: tuple[str, ...] = ()
         self._supervised: _Limits | None = None
         self._outcome: Outcome | None = None
-        self._size(self.places)
+        self._deviation = _Deviation(robot, joints[self.places])
 
     def begin(self, trajectory: JointTrajectory, now: float, goal: FollowGoal | None = None) -> np.ndarray:
         """Take over a trajectory; nothing changes if any part of it is wrong.
@@ -89,8 +140,8 @@ class TrajectoryFollower:
         supervised = None if goal is None else self._limits(goal, names)
         start = self._position[places]
         velocity = self._velocity[places]
-        measured = self._state.position[self._joints[places]]
-        motion, elapsed = self._check.motion(trajectory, places, start, velocity, measured, now)
+        measured = self._robot.state.position[self._joints[places]]
+        motion, elapsed = self._check.motion(trajectory, places, start, velocity=velocity, measured=measured, now=now)
         self.leave("another trajectory has taken over")
         self._motion = motion
         self._time = elapsed
@@ -99,7 +150,7 @@ class TrajectoryFollower:
         self._names = names
         self._supervised = supervised
         self._outcome = None
-        self._size(places)
+        self._deviation = _Deviation(self._robot, self._joints[places])
         return motion.last
 
     def advance(self, period: float) -> None:
@@ -108,8 +159,10 @@ class TrajectoryFollower:
             return
         self._time += period
         if self.moving:
-            self._motion.at(self._time, self._desired, self._speed)
-            self._position[self.places], self._velocity[self.places] = self._desired, self._speed
+            deviation = self._deviation
+            self._motion.at(self._time, deviation.desired, deviation.speed)
+            self._position[self.places] = deviation.desired
+            self._velocity[self.places] = deviation.speed
             self.moving = self._time < self._motion.end
         if self._supervised is not None and self._outcome is None:
             self._supervise(self._supervised, self._motion)
@@ -139,28 +192,19 @@ class TrajectoryFollower:
 
     def report(self) -> FollowFeedback:
         """Return where the joints are desired and where they are."""
-        self._measure()
+        deviation = self._deviation
+        deviation.measure()
         time = max(self._time, 0.0)
         desired = self._position[self.places]
         speed = self._velocity[self.places]
-        away = desired - self._actual
-        away -= whole_turns(away, self._turn)
+        away = desired - deviation.actual
+        away -= whole_turns(away, deviation.turn)
         return FollowFeedback(
             self._names,
             _point(desired, speed, time),
-            _point(self._actual, self._turning, time),
-            error=_point(away, speed - self._turning, time),
+            _point(deviation.actual, deviation.turning, time),
+            error=_point(away, speed - deviation.turning, time),
         )
-
-    def _size(self, places: np.ndarray) -> None:
-        """Make the arrays for so many joints."""
-        self._dofs = self._joints[places]
-        self._desired, self._speed, self._actual, self._turning = (np.zeros(len(places)) for _ in range(4))
-        self._displacements = np.zeros((1, len(places)))
-        self._slip = np.zeros(len(places))
-        self._turn = self._turns[places]
-        self._away = self._error = self._displacements[0]
-        self._beyond = np.zeros(len(places), dtype=bool)
 
     def _limits(self, goal: FollowGoal, names: tuple[str, ...]) -> _Limits:
         if not 0.0 <= goal.goal_time_tolerance < np.inf:
@@ -173,36 +217,16 @@ class TrajectoryFollower:
 
     def _supervise(self, limits: _Limits, motion: ViaPoints) -> None:
         if self.moving:
-            if limits.path is not None and not self._within(limits.path):
+            if limits.path is not None and not self._deviation.is_within(limits.path):
                 self._fail(PATH_TOLERANCE_VIOLATED, "on the way")
-        elif limits.goal is None or self._within(limits.goal):
+        elif limits.goal is None or self._deviation.is_within(limits.goal):
             self._outcome = Outcome(FollowResult(), True, "the joints are there")
         elif self._time >= motion.end + limits.time:
             self._fail(GOAL_TOLERANCE_VIOLATED, "at the end")
 
-    def _within(self, tolerances: tuple[np.ndarray, np.ndarray]) -> bool:
-        """Return whether all joints are where they are desired; allocates nothing."""
-        self._measure()
-        np.subtract(self._desired, self._actual, out=self._away)
-        np.subtract(self._speed, self._turning, out=self._slip)
-        self._shorten(self._displacements, self._turn)
-        for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
-            np.abs(error, out=error)
-            np.greater(error, tolerance, out=self._beyond)
-            if self._beyond.any():
-                self._error = error
-                return False
-        return True
-
-    def _measure(self) -> None:
-        np.take(self._state.position, self._dofs, out=self._actual)
-        np.take(self._state.velocity, self._dofs, out=self._turning)
-
     def _fail(self, code: int, when: str) -> None:
         """End the goal: the first joint beyond its tolerance is named."""
-        index = int(self._beyond.argmax())
-        unit = "rad" if self._error is self._away else "rad/s"
-        why = f"joint '{self._names[index]}' is {self._error[index]:.6g} {unit} from its trajectory {when}"
+        why = f"{self._deviation.worst(self._names)} {when}"
         self._outcome = Outcome(FollowResult(code, why), False, why)
 
 

@@ -133,7 +133,6 @@ class WheeledMotion(Component):
             self._lifting.polygon,
             references.lifted,
             wheels.links,
-            rows=self.tasks.rows,
             rates=self.tasks.rates,
             legs=wheels.find_legs(self.moved),
             turning=wheels.steering,

@@ -14,7 +14,7 @@ from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.points.compiled.frames import base_pose
 from solfer.points.compiled.registry import Kernel
 from solfer.points.compiled.wheels import camber, caster, rolling_offset
-from solfer.points.program import CompiledPoint, Instruction, folded
+from solfer.points.program import CompiledPoint, Instruction, LinkMotion, folded
 from solfer.robot import Robot
 
 
@@ -45,7 +45,12 @@ class WheelAngles(CompiledPoint, abc.ABC):
         """Return the kernel's instructions for this point alone."""
         own = [
             Instruction(
-                self.kernel, self, numbers=numbers, table=np.array([index]), joint=each.joint, columns=each.columns
+                self.kernel,
+                self,
+                numbers=numbers,
+                table=np.array([index]),
+                motion=LinkMotion(each.joint),
+                columns=each.columns,
             )
             for index, (each, numbers) in enumerate(zip(self._attachments, self._numbers, strict=True))
         ]
@@ -179,7 +184,7 @@ class RollingOffsets(CompiledPoint):
                 (vertex, self._pose),
                 numbers=self._numbers,
                 table=np.array([index, len(self.vertices), address(self.lifted), late]),
-                joint=each.joint,
+                motion=LinkMotion(each.joint),
                 columns=np.union1d(vertex.columns, self._pose.columns),
             )
             one.arrays += [self.lifted, self._base_rows]

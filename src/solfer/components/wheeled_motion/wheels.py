@@ -113,9 +113,9 @@ def make_points(
             wheel.end_frame,
             robot,
             _first(tags.major_axis, wheel.major_axis),
-            _first(tags.minor_axis, wheel.minor_axis),
-            axle,
-            wheel.position,
+            tube=_first(tags.minor_axis, wheel.minor_axis),
+            axis=axle,
+            center=wheel.position,
         )
         for wheel, axle in zip(wheels, axles, strict=True)
     ]

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from solfer.config.loading.configuration import Configuration, Part
-from solfer.config.loading.layering import Layers
+from solfer.config.loading.layering import AS_CONFIGURED, Layers, ModulePlacement
 from solfer.config.loading.reading import Reading, Used
 from solfer.config.loading.shared import Naming, SharedConfiguration, read_shared
 from solfer.config.loading.unused import check_rest
 from solfer.config.records.modules import is_shared
-from solfer.config.yaml.nodes import Mark, YamlNode
+from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.problems import Notice, Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError
@@ -58,8 +58,7 @@ def check(
     system: str | None = None,
     default: Naming = str,
     middleware: str | None = None,
-    layer: str | None = None,
-    shared: YamlNode | None = None,
+    placement: ModulePlacement = AS_CONFIGURED,
 ) -> CheckReport:
     """Check a main configuration with all files that it names; every mistake is reported, none is raised.
 
@@ -71,8 +70,7 @@ def check(
         system: `SM` or `HW` instead of the file's `system`.
         default: Returns the configuration of a plugin that a shared plugin lists without one.
         middleware: Name of a middleware instead of the file's `middleware`.
-        layer: `RT` or `NRT` instead of the modules' `layer`.
-        shared: The shared plugin that lists the modules.
+        placement: Where the modules run.
     """
     report = CheckReport()
     try:
@@ -83,9 +81,7 @@ def check(
     report.modules = layers.names if modules is None else tuple(dict.fromkeys(modules))
     used: Used = set()
     for name in report.modules:
-        _check_module(
-            report, layers, os.fspath(file), name=name, default=default, used=used, layer=layer, shared=shared
-        )
+        _check_module(report, layers, os.fspath(file), name=name, default=default, used=used, placement=placement)
     if modules is None:
         for tree in layers.variants(report.problems):
             check_rest(tree, used, report.problems)
@@ -100,8 +96,7 @@ def _check_module(
     *,
     default: Naming,
     used: Used,
-    layer: str | None,
-    shared: YamlNode | None,
+    placement: ModulePlacement,
 ) -> None:
     found = Problems()
     try:
@@ -114,7 +109,7 @@ def _check_module(
         if group is not None:
             report.shared[name] = group
     else:
-        reading = Reading(layers.tree(name, found, shared, layer), found)
+        reading = Reading(layers.tree(name, found, placement), found)
         report.parts[name] = part = reading.part(file, name)
         used |= reading.used
         if not found:

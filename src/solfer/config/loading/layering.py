@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from solfer.config.records.record import parse
@@ -29,6 +29,24 @@ def module_names(file: str | os.PathLike) -> tuple[str, ...]:
         ConfigError: The file is missing or not YAML, or has no modules.
     """
     return Layers(file, Problems()).names
+
+
+@dataclass(frozen=True)
+class ModulePlacement:
+    """Where modules run, if that is not as their configurations say.
+
+    Attributes:
+        layer: `RT` or `NRT` instead of the layer of the module or the shared plugin.
+        shared: The shared plugin that a module runs in: its layer counts, its mode if that is `idle`, and the module's
+            own block `shared`.
+    """
+
+    layer: str | None = None
+    shared: YamlNode | None = None
+
+
+AS_CONFIGURED = ModulePlacement()
+"""Modules run where their configurations say."""
 
 
 class Layers:
@@ -89,9 +107,7 @@ class Layers:
             raise ConfigError(f"the module '{name}' is empty", where=str(node.head), expected="layer, robot, ...")
         return node
 
-    def tree(
-        self, module: str, problems: Problems, shared: YamlNode | None = None, layer: str | None = None
-    ) -> YamlNode:
+    def tree(self, module: str, problems: Problems, placement: ModulePlacement = AS_CONFIGURED) -> YamlNode:
         """Merge everything below the root key for one module.
 
         Values that cannot be read or merged are noted in `problems` and left out.
@@ -99,9 +115,7 @@ class Layers:
         Args:
             module: Name of the module.
             problems: Receives the mistakes.
-            shared: The shared plugin that the module runs in: its layer counts, its mode if that is `idle`, and the
-                module's own block `shared`.
-            layer: `RT` or `NRT` instead of the layer of the module or the shared plugin.
+            placement: Where it runs.
 
         Raises:
             UnknownName: There is no such module.
@@ -110,6 +124,8 @@ class Layers:
         node = self.module(module)
         own = ("modules", module)
         main = self.main
+        layer = placement.layer
+        shared = placement.shared
         chosen = shared and shared.get("layer")
         mode = shared and shared.get("mode")
         within = shared and node.get("shared")

@@ -4,7 +4,7 @@ import logging
 import os
 
 from solfer.config.loading.configuration import Configuration
-from solfer.config.loading.layering import Layers
+from solfer.config.loading.layering import Layers, ModulePlacement
 from solfer.config.loading.reading import Reading
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
@@ -13,7 +13,7 @@ from solfer.config.yaml.search import Folders
 _LOG = logging.getLogger(__name__)
 
 
-def load(
+def load(  # noqa: PLR0913 for users: what replaces values of the file, by its name
     file: str | os.PathLike,
     module: str,
     *,
@@ -45,7 +45,7 @@ def load(
     """
     problems = Problems()
     tree = Layers(file, problems, system, folders=search_paths, middleware=middleware, over=over).tree(
-        module, problems, shared, layer
+        module, problems, ModulePlacement(layer, shared)
     )
     configuration = Reading(tree, problems).configuration(os.fspath(file), module, class_name)
     problems.log(_LOG)

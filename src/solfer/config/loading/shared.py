@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from solfer.config.loading.configuration import Configuration
-from solfer.config.loading.layering import Layers
+from solfer.config.loading.layering import Layers, ModulePlacement
 from solfer.config.loading.reading import Reading
 from solfer.config.records.modules import SharedRecord, is_shared
 from solfer.config.records.pipes import ControllerRecord
@@ -287,7 +287,9 @@ def _plugin(layers: Layers, file: str, entry: ListedPlugin, problems: Problems) 
     found = Problems()
     name = entry.configuration
     try:
-        configuration = Reading(layers.tree(name, found, entry.shared), found).configuration(file, name)
+        configuration = Reading(layers.tree(name, found, ModulePlacement(shared=entry.shared)), found).configuration(
+            file, name
+        )
     except SolferError as error:
         problems.put(entry.mark, error)
         return None

@@ -29,6 +29,18 @@ CLOSE = 1e-6
 """Distance and speed below which a joint has caught up [rad, rad/s]."""
 
 
+class _Buffers:
+    """What a step computes of each joint, shape (n,).
+
+    Args:
+        size: Number n of joints.
+    """
+
+    def __init__(self, size: int):
+        self.moved, self.work, self.bound, self.time, self.change = (np.zeros(size) for _ in range(5))
+        self.jumped = np.zeros(size, dtype=bool)
+
+
 class CatchUp:
     """Distances between springs' targets and commanded positions, which fade out where those jump.
 
@@ -56,9 +68,8 @@ class CatchUp:
         self._speed = np.zeros(size)
         self._age = np.full(size, LONGEST)
         self._limit = np.array(speed_limit, dtype=float)
-        self._moved, self._work, self._bound, self._time, self._change = (np.zeros(size) for _ in range(5))
+        self._buffers = _Buffers(size)
         self._news = np.zeros(size, dtype=bool)
-        self._jumped = np.zeros(size, dtype=bool)
         self.active = self._any_news = False
 
     def start(self, position: np.ndarray, joints: np.ndarray | slice = ALL_JOINTS) -> None:
@@ -84,34 +95,35 @@ class CatchUp:
 
     def _judge(self, position: np.ndarray) -> None:
         """Compare the command with where its stream was heading."""
-        moved = self._moved
-        extra = self._work
-        time = self._time
+        buffers = self._buffers
+        moved = buffers.moved
+        extra = buffers.work
+        time = buffers.time
         news = self._news
-        jumped = self._jumped
+        jumped = buffers.jumped
         np.minimum(self._age, LONGEST, out=time)
         np.subtract(position, self._last, out=moved)
         # at most the commanded part of the stream's own step: a sender that stood still goes on where it was
         np.multiply(self._speed, time, out=extra)
-        np.minimum(extra, np.maximum(moved, 0.0, out=self._bound), out=extra)
-        np.maximum(extra, np.minimum(moved, 0.0, out=self._bound), out=extra)
+        np.minimum(extra, np.maximum(moved, 0.0, out=buffers.bound), out=extra)
+        np.maximum(extra, np.minimum(moved, 0.0, out=buffers.bound), out=extra)
         np.subtract(moved, extra, out=extra)
-        np.multiply(np.minimum(time, PERIOD, out=self._change), JUMP / PERIOD, out=self._change)
-        np.greater(np.abs(extra, out=self._bound), self._change, out=jumped)
+        np.multiply(np.minimum(time, PERIOD, out=buffers.change), JUMP / PERIOD, out=buffers.change)
+        np.greater(np.abs(extra, out=buffers.bound), buffers.change, out=jumped)
         np.logical_and(jumped, news, out=jumped)
         if jumped.any():
             np.add(self.distance, extra, out=self.distance, where=jumped)
             self.active = True
         # the stream's speed; at a jump its change is bounded by ACCELERATION
-        np.multiply(time, ACCELERATION, out=self._change)
-        np.copyto(self._change, np.inf, where=np.logical_not(jumped, out=jumped))
+        np.multiply(time, ACCELERATION, out=buffers.change)
+        np.copyto(buffers.change, np.inf, where=np.logical_not(jumped, out=jumped))
         np.divide(moved, time, out=moved, where=news)
         np.subtract(moved, self._speed, out=moved)
-        np.minimum(moved, self._change, out=moved)
-        np.maximum(moved, np.negative(self._change, out=self._change), out=moved)
+        np.minimum(moved, buffers.change, out=moved)
+        np.maximum(moved, np.negative(buffers.change, out=buffers.change), out=moved)
         np.add(self._speed, moved, out=self._speed, where=news)
         np.minimum(self._speed, self._limit, out=self._speed)
-        np.maximum(self._speed, np.negative(self._limit, out=self._bound), out=self._speed)
+        np.maximum(self._speed, np.negative(self._limit, out=buffers.bound), out=self._speed)
         np.copyto(self._last, position)
         np.copyto(self._age, 0.0, where=news)
         news.fill(False)
@@ -121,15 +133,16 @@ class CatchUp:
         """Fade for one step, implicit in the speed."""
         distance = self.distance
         rate = self._rate
-        work = self._work
+        buffers = self._buffers
+        work = buffers.work
         np.multiply(distance, -FREQUENCY * FREQUENCY * dt, out=work)
         rate += work
         rate /= 1.0 + 2.0 * FREQUENCY * dt
         # the target moves at the speed of its stream, if that goes on, minus the rate of the distance
-        speed = self._moved
-        bound = self._bound
-        np.less(self._age, LONGEST, out=self._jumped)
-        np.multiply(self._speed, self._jumped, out=speed)
+        speed = buffers.moved
+        bound = buffers.bound
+        np.less(self._age, LONGEST, out=buffers.jumped)
+        np.multiply(self._speed, buffers.jumped, out=speed)
         np.minimum(np.add(speed, self._whole, out=bound), self._fastest, out=bound)
         np.minimum(rate, np.maximum(bound, 0.0, out=bound), out=rate)
         np.minimum(np.subtract(self._whole, speed, out=bound), self._fastest, out=bound)

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from solfer.errors import SolferError
@@ -28,6 +29,21 @@ HEALTH = "xbot_bridge"
 """Name of the health report."""
 
 
+@dataclass(frozen=True)
+class BridgeSearch:
+    """What a bridge finds at present inside; called every `LOOK`, with the names that are known and may be left out.
+
+    Attributes:
+        offers: Returns the services that are offered.
+        topics: Returns the topics that are published, besides those that always go out.
+        requested: Returns the topics that components declare and receive, besides those that always go in.
+    """
+
+    offers: Callable[[Collection[str]], Iterable[ServiceForward]] = lambda known: ()
+    topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()
+    requested: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()
+
+
 class Bridge:
     """Forwards topics in both directions, and requests from outside to services inside.
 
@@ -38,10 +54,7 @@ class Bridge:
         outside: The other side.
         inwards: Topics that are received outside and published inside.
         outwards: Topics that are received inside and published outside.
-        offers: Returns the services that are offered inside at present; called every `LOOK`, with the names of those
-            that are known already and may be left out.
-        topics: Returns the topics that are published inside at present, besides `outwards`; called in the same way.
-        requested: Returns the topics that components inside declare and receive, besides `inwards`; in the same way.
+        search: Finds what there is besides; None: nothing.
         beside: Forwards what else goes out; called in each cycle, before the topics.
 
     Attributes:
@@ -55,16 +68,12 @@ class Bridge:
         outside: Middleware,
         inwards: Sequence[Route],
         outwards: Sequence[Route],
-        offers: Callable[[Collection[str]], Iterable[ServiceForward]] = lambda known: (),
-        topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
-        requested: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
+        search: BridgeSearch | None = None,
         beside: Callable[[], None] = lambda: None,
     ):
         self._inside = inside
         self._outside = outside
-        self._offers = offers
-        self._topics = topics
-        self._requested = requested
+        self._search = search or BridgeSearch()
         self._beside = beside
         self.forwarding = ServiceForwarder(inside, outside)
         self._forwards_in: list[ForwardedTopic] = []
@@ -122,9 +131,7 @@ class Bridge:
         """Refuse the requests that still wait."""
         self.forwarding.close()
 
-    def _open(
-        self, routes: Iterable[Route], source: Middleware, target: Middleware, forwards: list[ForwardedTopic]
-    ) -> None:
+    def _open(self, routes: Iterable[Route], source: Middleware, target: Middleware, forwards: list[ForwardedTopic]) -> None:
         """Start forwarding topics from `source` to `target`; one that crosses already stays as it is."""
         for route in routes:
             if route.topic not in self.crossings:
@@ -134,9 +141,9 @@ class Bridge:
     def _look(self) -> None:
         """Start forwarding topics and services that are new inside since the last search."""
         try:
-            self._open(self._topics(self.crossings), self._inside, self._outside, forwards=self._forwards_out)
-            self._open(self._requested(self.crossings), self._outside, self._inside, forwards=self._forwards_in)
-            self.forwarding.offer(self._offers(self.forwarding.names))
+            self._open(self._search.topics(self.crossings), self._inside, self._outside, forwards=self._forwards_out)
+            self._open(self._search.requested(self.crossings), self._outside, self._inside, forwards=self._forwards_in)
+            self.forwarding.offer(self._search.offers(self.forwarding.names))
         except SolferError as error:
             self._throttle.warning("look", "something is not forwarded: %s", error)
 

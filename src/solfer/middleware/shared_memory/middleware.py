@@ -39,6 +39,39 @@ class ClockProtocol(Protocol):
         """Return at `deadline` [s], or at once when it has passed."""
 
 
+class _ServedCalls:
+    """Services of a node, which receive their calls as soon as a bell of the namespace rings.
+
+    Args:
+        namespace: The namespace.
+    """
+
+    def __init__(self, namespace: Namespace):
+        self._servers: list[ServiceServer] = []
+        self._bell = namespace.any_bell()
+        self._busy = True
+
+    def add(self, server: ServiceServer) -> None:
+        """Add a service."""
+        self._busy = True
+        self._servers.append(server)
+
+    def poll(self) -> None:
+        """Receive calls. Does not block."""
+        bell = self._bell
+        if self._busy or bell.words[bell.place] != bell.received:
+            bell.acknowledge()
+            for server in self._servers:
+                server.poll()
+            self._busy = any(server.busy for server in self._servers)
+
+    def close(self) -> None:
+        """End all services."""
+        for server in self._servers:
+            server.close()
+        self._servers.clear()
+
+
 class XbotMiddleware(Middleware):
     """Topics, services, parameters and reports in the shared memory of a namespace.
 
@@ -65,20 +98,21 @@ class XbotMiddleware(Middleware):
         listens: bool = True,
     ):
         self.namespace = namespace if isinstance(namespace, Namespace) else Namespace(namespace)
-        self.name, self._clock = name, clock or MonotonicClock()
+        self.name = name
+        self._clock = clock or MonotonicClock()
         # without a call in between: a cycle reads the time some thirty times
         self.now = self._clock.now  # type: ignore[method-assign]
         self._parameters = {key.lstrip("/"): value for key, value in (parameters or {}).items()}
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
-        self._offers: list[ServiceServer] = []
         self._provided: dict[str, Segment] = {}
         self._ears = Ears(self.namespace, name) if listens else None
-        self._any = self.namespace.any_bell()
-        self._busy = True
+        self._served = _ServedCalls(self.namespace)
         self._survey = Survey(self.namespace)
-        self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
-        self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
+        self._calls = Calls(self.namespace, name, self.now)
+        self._reports = Reports(self.namespace)
+        self._simulated = SimulatedTime(self.namespace.folder)
+        self._worker = ThreadPoolExecutor(1)
 
     @property
     def rewinds(self) -> int:
@@ -96,11 +130,7 @@ class XbotMiddleware(Middleware):
 
     def poll(self) -> None:
         """Receive calls of services and replies to requests. Does not block."""
-        if self._busy or self._any.words[self._any.place] != self._any.received:
-            self._any.acknowledge()
-            for offer in self._offers:
-                offer.poll()
-            self._busy = any(offer.busy for offer in self._offers)
+        self._served.poll()
         if self._calls.open:
             self._calls.poll()
 
@@ -208,9 +238,8 @@ class XbotMiddleware(Middleware):
         Raises:
             MiddlewareError: Another process or node offers such a service.
         """
-        self._busy = True
         for service in services:
-            self._offers.append(
+            self._served.add(
                 ServiceServer(self.namespace, owner, service, submit=submit, now=self.now, worker=self._worker)
             )
 
@@ -230,11 +259,10 @@ class XbotMiddleware(Middleware):
 
     def close(self) -> None:
         """See `Middleware.close`; nothing is queued here."""
-        owned = (*self._offers, *self._endpoints, *self._provided.values())
+        owned = (self._served, *self._endpoints, *self._provided.values())
         for part in (*owned, self._calls, self._reports, *filter(None, (self._ears,))):
             part.close()
         self._provided.clear()
-        self._offers.clear()
         self._endpoints.clear()
         self._simulated.close()
         self._worker.shutdown(wait=False)

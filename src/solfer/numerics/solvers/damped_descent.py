@@ -1,6 +1,7 @@
 """Levels of tasks by null spaces whose projections are damped like their inverses, as the original program has them."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -256,6 +257,29 @@ descend = cached(
 )
 
 
+class _Buffers(NamedTuple):
+    """What the kernel computes in, in its order, for rows of all levels and the DoFs that move (width).
+
+    Attributes:
+        rows, solved: Shape (rows, width).
+        factor: Shape (rows, rows).
+        numbers: Shape (3, rows).
+        found, held, first: Shape (width,).
+        used: Shape (levels + 1,).
+        is_free: Shape (width,).
+    """
+
+    rows: np.ndarray
+    solved: np.ndarray
+    factor: np.ndarray
+    numbers: np.ndarray
+    found: np.ndarray
+    held: np.ndarray
+    first: np.ndarray
+    used: np.ndarray
+    is_free: np.ndarray
+
+
 class DampedDescent:
     """Joint velocities of levels of tasks, each in the damped null space of all before it.
 
@@ -293,14 +317,20 @@ class DampedDescent:
     def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray, rigid: int = 0):
         rows = int(ends[-1])
         width = len(columns)
-        self._ends, self._columns = ends.astype(np.int64), columns.astype(np.int64)
-        self._rows, self._solved = np.zeros((2, rows, width))
-        self._factor = np.zeros((rows, rows))
-        self._numbers = np.zeros((3, rows))
-        self._found, self._held, self._first = np.zeros((3, width))
+        self._ends = ends.astype(np.int64)
+        self._columns = columns.astype(np.int64)
         self._rigid = rigid
-        self._used = np.zeros(len(ends), dtype=np.int64)
-        self._is_free = np.zeros(width, dtype=np.bool_)
+        self._buffers = _Buffers(
+            np.zeros((rows, width)),
+            np.zeros((rows, width)),
+            np.zeros((rows, rows)),
+            numbers=np.zeros((3, rows)),
+            found=np.zeros(width),
+            held=np.zeros(width),
+            first=np.zeros(width),
+            used=np.zeros(len(ends), dtype=np.int64),
+            is_free=np.zeros(width, dtype=np.bool_),
+        )
         self._unbounded = np.zeros((0, size))
         self.velocity = np.zeros(size)
         self.count = 0
@@ -326,15 +356,7 @@ class DampedDescent:
             self._columns,
             self._rigid,
             self._unbounded if bounds is None else bounds.limits,
-            self._rows,
-            self._solved,
-            self._factor,
-            self._numbers,
-            self._found,
-            self._held,
-            self._first,
-            self._used,
-            self._is_free,
+            *self._buffers,
             self.velocity,
         )
         return self.velocity

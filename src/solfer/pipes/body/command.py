@@ -1,5 +1,7 @@
 """Operational-space command pipes: publish pose and twist of a link."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from solfer.config.records.conventions import ConventionRecord
@@ -18,6 +20,23 @@ SENT = {
 """Messages that can be sent, by their canonical name, with the interfaces that each carries."""
 
 
+@dataclass(frozen=True)
+class PublishedLink:
+    """The link that a command pipe publishes.
+
+    Attributes:
+        name: Its name.
+        convention: How orientation and twist are written.
+        frame: Name of the world in the messages.
+        covariances: Of pose and twist, as a BodyMessage has them, shape (36,) each; live. None: not known.
+    """
+
+    name: str
+    convention: ConventionRecord
+    frame: str = "world"
+    covariances: tuple[np.ndarray, np.ndarray] | None = None
+
+
 class BodyCommandPipe(CommandPipe):
     """Publishes pose and twist of a link of the desired or the measured State.
 
@@ -28,9 +47,6 @@ class BodyCommandPipe(CommandPipe):
         kinematics: Kinematics for this pipe alone.
         state: State that is published.
         link: The link.
-        convention: How orientation and twist are written.
-        frame: Name of the world in the messages.
-        covariances: Of pose and twist, as a BodyMessage has them, shape (36,) each; live. None: not known.
     """
 
     def __init__(
@@ -40,16 +56,15 @@ class BodyCommandPipe(CommandPipe):
         message: str,
         kinematics: Kinematics,
         state: State,
-        link: str,
-        convention: ConventionRecord,
-        frame: str = "world",
-        covariances: tuple[np.ndarray, np.ndarray] | None = None,
+        link: PublishedLink,
     ):
-        self._frame = frame
+        covariances = link.covariances
+        convention = link.convention
+        self._frame = link.frame
         self._covariances = None if covariances is None else tuple(each.reshape(6, 6) for each in covariances)
         self._kinematics = kinematics
         self._state = state
-        self._link = link
+        self._link = link.name
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._twist_frame = convention.twist.frame

@@ -5,8 +5,8 @@ from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError, SolferError
 from solfer.model import Kinematics
 from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
-from solfer.pipes.body.command import SENT, BodyCommandPipe
-from solfer.pipes.body.feedback import BodyFeedbackPipe
+from solfer.pipes.body.command import SENT, BodyCommandPipe, PublishedLink
+from solfer.pipes.body.feedback import BodyFeedbackPipe, BodySensor
 from solfer.pipes.body.reading import MOVING, READINGS, BodyReading, turns
 from solfer.pipes.body.sensor_mount import SensorMount
 from solfer.pipes.context import PipeContext, fields_of, message_of
@@ -35,15 +35,14 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
         context.middleware.reader(record.source, message, record.history or 0),
         state,
         chart=robot.kinematics.base,
-        mount=_mount(record, context, link),
-        reading=reading(_body_name(record, link), convention, turns(record.output_angles)),
+        sensor=BodySensor(
+            _mount(record, context, link),
+            reading(_body_name(record, link), convention, turns(record.output_angles)),
+            located=convention.position.type == "FULL",
+            calibrated=record.calibrate,
+        ),
         fields=fields,
-        located=convention.position.type == "FULL",
-        required=record.initialize,
-        low_pass=context.low_pass(record),
-        calibrated=record.calibrate,
-        measured=record.function != "reference",
-        history=record.history or 0,
+        reception=context.reception(record),
     )
 
 
@@ -74,16 +73,14 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
         )
     state = context.state(record.function)
     known = link == robot.kinematics.base_link and POSE_COVARIANCE in state and TWIST_COVARIANCE in state
+    covariances = (state[POSE_COVARIANCE], state[TWIST_COVARIANCE]) if known else None
     return BodyCommandPipe(
         record.name,
         context.writer(record.sink, message),
         message,
         kinematics=Kinematics(robot.description, robot.kinematics.base is not None),
         state=state,
-        link=link,
-        convention=convention,
-        frame=record.frame_id,
-        covariances=(state[POSE_COVARIANCE], state[TWIST_COVARIANCE]) if known else None,
+        link=PublishedLink(link, convention, record.frame_id, covariances=covariances),
     )
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from solfer.pipes.body.alignment import Alignment
 from solfer.pipes.body.reading import BodyReading
 from solfer.pipes.body.sensor_mount import SensorMount
 from solfer.pipes.body.turn_check import TurnCheck
-from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
+from solfer.pipes.feedback_pipe import Reception, StateFeedbackPipe
 from solfer.transport.endpoints import Reader
 from solfer.transport.messages import Message
 
@@ -27,6 +28,23 @@ STEEP = math.radians(75.0)
 """|ry| above which a warning is logged: the chart of the base is near its singularity [rad]."""
 
 
+@dataclass(frozen=True)
+class BodySensor:
+    """What measures the link of a feedback pipe.
+
+    Attributes:
+        mount: Pose of the sensor on the robot.
+        reading: Reads its messages.
+        located: Whether position and linear velocity are used; else orientation and angular velocity only.
+        calibrated: Whether heading and position of the first message of a start are aligned with those of the State.
+    """
+
+    mount: SensorMount
+    reading: BodyReading
+    located: bool = True
+    calibrated: bool = False
+
+
 class BodyFeedbackPipe(StateFeedbackPipe):
     """Reads the floating base of a State from messages of a link, or of a sensor on it.
 
@@ -37,15 +55,9 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         reader: Receives the messages.
         state: State of which the first six DoFs are written.
         chart: Chart of the base.
-        mount: Pose of the sensor on the robot.
-        reading: Reads the messages.
+        sensor: What measures the link.
         fields: `position` for the pose, `velocity` for its rates.
-        located: Whether position and linear velocity are used; else orientation and angular velocity only.
-        required: Whether the plugin has to wait for this pipe before it starts.
-        low_pass: Makes the filter of one field; None: there is none.
-        calibrated: Whether heading and position of the first message of a start are aligned with those of the State.
-        measured: Whether the State is measured; see `StateFeedbackPipe`.
-        history: See `StateFeedbackPipe`.
+        reception: How it receives.
     """
 
     def __init__(
@@ -54,44 +66,29 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         reader: Reader,
         state: State,
         chart: BaseChart,
-        mount: SensorMount,
-        reading: BodyReading,
+        sensor: BodySensor,
         fields: Sequence[str],
-        located: bool = True,
-        required: bool = True,
-        low_pass: MakeFilter | None = None,
-        calibrated: bool = False,
-        measured: bool = False,
-        history: int = 0,
+        reception: Reception,
     ):
-        used = slice(0 if located else 3, 6)
-        dofs = BASE[used]
-        super().__init__(
-            name,
-            reader,
-            state,
-            fields=fields,
-            dofs=dofs,
-            required=required,
-            low_pass=low_pass,
-            measured=measured,
-            history=history,
-        )
+        used = slice(0 if sensor.located else 3, 6)
+        super().__init__(name, reader, state, fields=fields, dofs=BASE[used], reception=reception)
         # imported here: its compiler takes a while to load
         from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
 
+        mount = sensor.mount
+        reading = sensor.reading
         self._chart = chart
         self._mount = mount
         self._reading = reading
         self._carried = Carried(chart, reading.values, mount.numbers)
         self._own_axes = OWN_AXES
         self._go_on = GO_ON
-        self._alignment = Alignment(self._carried.world) if calibrated else None
+        self._alignment = Alignment(self._carried.world) if sensor.calibrated else None
         self._measures_pose = "position" in fields
         self._known = state.position[:6]
         self._options = (POSE if self._measures_pose else 0) | (TWIST if "velocity" in fields else 0)
         self._oriented = ORIENTED if "orientation" in reading.carries else 0
-        is_turned = measured and self._measures_pose and "orientation" in reading.carries
+        is_turned = reception.measured and self._measures_pose and "orientation" in reading.carries
         self._turn_check = TurnCheck() if is_turned else None
         carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
         self._measured = [(state_field.values, carried[state_field.field]) for state_field in self.state_fields]

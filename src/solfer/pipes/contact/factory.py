@@ -2,23 +2,19 @@
 
 from solfer.config.kinds.contact import ContactControllerRecord, ContactFeedbackRecord
 from solfer.errors import PipeError, SolferError
-from solfer.pipes.contact.pipes import ContactCommandPipe, ContactFeedbackPipe
+from solfer.pipes.contact.pipes import CarriedContacts, ContactCommandPipe, ContactFeedbackPipe
 from solfer.pipes.context import PipeContext, message_of
-from solfer.points.contact.contacts import Contact
 
 
 def feedback(record: ContactFeedbackRecord, context: PipeContext) -> ContactFeedbackPipe:
     """Make a pipe from a topic to the wrenches of the Robot's contacts; see `factory.feedback`."""
-    contacts, names = _contacts(record, context)
     # a pipe that names no contacts reads those of its Robot, and ignores those of other parts
     known = None if record.names is None else context.robot.contacts.names
     return ContactFeedbackPipe(
         record.name,
         context.middleware.reader(record.source, _message(record)),
         context.robot,
-        contacts=contacts,
-        fixed=record.interface == "fixed",
-        names=names,
+        carried=_carried(record, context),
         required=record.initialize,
         known=known,
     )
@@ -26,11 +22,9 @@ def feedback(record: ContactFeedbackRecord, context: PipeContext) -> ContactFeed
 
 def controller(record: ContactControllerRecord, context: PipeContext) -> ContactCommandPipe:
     """Make a pipe from the wrenches of the Robot's contacts to a topic; see `factory.controller`."""
-    contacts, names = _contacts(record, context)
+    carried = _carried(record, context)
     writer = context.writer(record.sink, _message(record))
-    return ContactCommandPipe(
-        record.name, writer, context.robot, contacts=contacts, fixed=record.interface == "fixed", names=names
-    )
+    return ContactCommandPipe(record.name, writer, context.robot, carried=carried)
 
 
 def _message(record: ContactFeedbackRecord | ContactControllerRecord) -> str:
@@ -38,10 +32,8 @@ def _message(record: ContactFeedbackRecord | ContactControllerRecord) -> str:
     return message_of(record, (record.default_message,), what)
 
 
-def _contacts(
-    record: ContactFeedbackRecord | ContactControllerRecord, context: PipeContext
-) -> tuple[tuple[Contact, ...], tuple[str, ...] | None]:
-    """Look up the contacts of a pipe, and their names for a message of several."""
+def _carried(record: ContactFeedbackRecord | ContactControllerRecord, context: PipeContext) -> CarriedContacts:
+    """Look up the contacts of a pipe."""
     found = context.robot.contacts
     if not found.names:
         raise PipeError(
@@ -52,6 +44,7 @@ def _contacts(
     names = found.names if record.contacts is None else record.contacts
     key = "names" if record.space == "CONTACTS" else "contact"
     try:
-        return tuple(found[name] for name in names), names if record.space == "CONTACTS" else None
+        contacts = tuple(found[name] for name in names)
     except SolferError as error:
         raise error.at(record.where(key)) from None
+    return CarriedContacts(contacts, record.interface == "fixed", names if record.space == "CONTACTS" else None)

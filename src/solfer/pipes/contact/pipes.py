@@ -4,12 +4,13 @@ A message has the wrench as a sensor in the link measures it: force, and torque 
 A `Contact` has the torque about the contact itself, in world axes. They differ by the arm from the link to the contact.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
 
 from solfer.components.port import Port
-from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
+from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe, PointFormat
 from solfer.points import Handler, LinearPoint
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -19,8 +20,28 @@ from solfer.transport.messages import Message
 WORLD = "world"
 
 
-def _frame(contacts: Sequence[Contact], fixed: bool) -> str:
-    return contacts[0].link if fixed else WORLD
+@dataclass(frozen=True)
+class CarriedContacts:
+    """Contacts of a Robot in the messages of a pipe.
+
+    Attributes:
+        contacts: The contacts.
+        fixed: Whether the one contact's wrench is in the axes of its link; else in those of the world.
+        names: Their names, for messages of several; None: messages of one contact.
+    """
+
+    contacts: tuple[Contact, ...]
+    fixed: bool = False
+    names: tuple[str, ...] | None = None
+
+    @property
+    def format(self) -> PointFormat:
+        """Format of the messages."""
+        return PointFormat(self.contacts[0].link if self.fixed else WORLD, self.names)
+
+    def port(self) -> Port:
+        """Make a port for the wrenches."""
+        return Port("wrench", None if self.names is None else len(self.contacts))
 
 
 class _Wrenches:
@@ -28,24 +49,23 @@ class _Wrenches:
 
     Args:
         robot: The Robot.
-        contacts: Contacts of it.
-        fixed: Whether the one contact's wrench in the message is in the axes of its link; else in those of the world.
+        carried: Contacts of it.
         published: Numbers of the message, shape (k, 6).
 
     Attributes:
         all: Rows of the message, shape (k,).
     """
 
-    def __init__(self, robot: Robot, contacts: Sequence[Contact], fixed: bool, published: np.ndarray):
+    def __init__(self, robot: Robot, carried: CarriedContacts, published: np.ndarray):
         # imported here: its compiler takes a while to load
         from solfer.numerics.wrenches import shift
 
         self._shift = shift
         self._robot = robot
-        self._contacts = tuple(contacts)
+        self._contacts = carried.contacts
         self._published = published
-        self._turned = np.zeros_like(published) if fixed else published
-        self._origins = Handler(LinearPoint(contact.link, robot) for contact in contacts)
+        self._turned = np.zeros_like(published) if carried.fixed else published
+        self._origins = Handler(LinearPoint(contact.link, robot) for contact in carried.contacts)
         self.all = np.arange(len(published))
         self._members = self.all
         self._memory = np.zeros(0)
@@ -93,9 +113,7 @@ class ContactFeedbackPipe(PointFeedbackPipe):
         name: Name of the pipe in the configuration.
         reader: Receives the messages.
         robot: The Robot.
-        contacts: Its contacts in the messages.
-        fixed: Whether the one contact's wrench is in the axes of its link; else in those of the world.
-        names: Names of the contacts, for messages of several; None: messages of one contact.
+        carried: Its contacts in the messages.
         required: Whether the plugin has to wait for this pipe before it starts.
         known: Other names that a message may contain; None: any.
 
@@ -112,19 +130,17 @@ class ContactFeedbackPipe(PointFeedbackPipe):
         name: str,
         reader: Reader,
         robot: Robot,
-        contacts: Sequence[Contact],
-        fixed: bool = False,
-        names: tuple[str, ...] | None = None,
+        carried: CarriedContacts,
         required: bool = True,
         known: Collection[str] | None = (),
     ):
-        port = Port("wrench", None if names is None else len(contacts))
-        super().__init__(name, reader, port, frame=_frame(contacts, fixed), names=names, required=required, known=known)
+        port = carried.port()
+        super().__init__(name, reader, port, received=carried.format, required=required, known=known)
         rows = port.value.reshape(-1, 6)
-        self._robots = _Wrenches(robot, contacts, fixed, published=rows)
+        self._robots = _Wrenches(robot, carried, rows)
         self._brought = self._robots.all
-        self.frame = _frame(contacts, fixed)
-        self.wrenches = dict(zip(names or ("value",), rows, strict=True))
+        self.frame = carried.format.frame
+        self.wrenches = dict(zip(carried.names or ("value",), rows, strict=True))
 
     def repeat(self, arrival: float) -> None:
         """See `FeedbackPipe.repeat`; writes them to the contacts."""
@@ -151,23 +167,13 @@ class ContactCommandPipe(PointCommandPipe):
         name: Name of the pipe in the configuration.
         writer: Publishes the messages.
         robot: The Robot.
-        contacts: Its contacts in the messages.
-        fixed: Whether the one contact's wrench is in the axes of its link; else in those of the world.
-        names: Names of the contacts, for messages of several; None: messages of one contact.
+        carried: Its contacts in the messages.
     """
 
-    def __init__(
-        self,
-        name: str,
-        writer: Writer,
-        robot: Robot,
-        contacts: Sequence[Contact],
-        fixed: bool = False,
-        names: tuple[str, ...] | None = None,
-    ):
-        port = Port("wrench", None if names is None else len(contacts))
-        super().__init__(name, writer, port, frame=_frame(contacts, fixed), names=names)
-        self._robots = _Wrenches(robot, contacts, fixed, published=port.value.reshape(-1, 6))
+    def __init__(self, name: str, writer: Writer, robot: Robot, carried: CarriedContacts):
+        port = carried.port()
+        super().__init__(name, writer, port, published=carried.format)
+        self._robots = _Wrenches(robot, carried, port.value.reshape(-1, 6))
 
     def collect(self) -> None:
         """See `CommandPipe.collect`."""

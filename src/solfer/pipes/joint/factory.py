@@ -11,7 +11,7 @@ from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import joint_map, select
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.leaps import JointLeaps
-from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
+from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, JointReceiver, JointSender, external_names
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.joint.turns import JointTurns
 from solfer.pipes.state_field import interface_of
@@ -34,21 +34,21 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
     fields, message = _carried(record)
     mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, pipe=record.name)
     dofs = np.array(mapping.robot_indices)
+    reception = context.reception(record)
     return JointFeedbackPipe(
         record.name,
         context.middleware.reader(record.source, message, record.history or 0),
         mapping,
         state=_state(record, context, fields),
         fields=fields,
-        required=record.initialize,
-        calibration=_calibration(record, context, mapping),
-        low_pass=context.low_pass(record),
-        known=_known(record, context),
-        measured=record.function != "reference",
-        limits=_start_limits(record, context, mapping, fields=fields),
-        history=record.history or 0,
-        leaps=JointLeaps(context.robot, dofs) if record.function != "reference" else None,
-        turns=_turns(record, context, dofs),
+        reception=reception,
+        sender=JointSender(
+            _calibration(record, context, mapping),
+            _known(record, context),
+            _start_limits(record, context, mapping, fields=fields),
+            leaps=JointLeaps(context.robot, dofs) if reception.measured else None,
+            turns=_turns(record, context, dofs),
+        ),
     )
 
 
@@ -88,12 +88,14 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         mapping,
         state=state,
         fields=fields,
-        calibration=_calibration(record, context, mapping),
+        receiver=JointReceiver(
+            _calibration(record, context, mapping),
+            (context.robot.turns, context.robot.added_turns),
+            record.leads_to,
+            standing=standing,
+            component=context.component,
+        ),
         low_pass=context.low_pass(record),
-        component=context.component,
-        standing=standing,
-        controller=record.leads_to,
-        turns=(context.robot.turns, context.robot.added_turns),
     )
 
 

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
 from solfer.pipes.command_pipe import CommandPipe
-from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
+from solfer.pipes.feedback_pipe import MakeFilter, Reception, StateFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration, Correction, same
 from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.start_limits import StartLimits
@@ -27,6 +28,25 @@ def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
     return tuple(mapping.external[index] for index in mapping.external_indices)
 
 
+@dataclass(frozen=True)
+class JointSender:
+    """What a feedback pipe knows of the joints of its sender, and what it checks of their values.
+
+    Attributes:
+        calibration: That of the sending hardware, in the map's order; None: it has the model's names, signs and zeros.
+        known: Names beside those of the map that a message may contain; None: any.
+        limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
+        leaps: Finds measurements that cannot be true; None: all are accepted.
+        turns: Adds turns to positions of continuous joints; None: the pipe has none of them.
+    """
+
+    calibration: Calibration | None = None
+    known: Collection[str] | None = None
+    limits: StartLimits | None = None
+    leaps: JointLeaps | None = None
+    turns: JointTurns | None = None
+
+
 class JointFeedbackPipe(StateFeedbackPipe):
     """Reads DoFs of a State from a topic.
 
@@ -39,15 +59,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
         mapping: Map between the Robot and the sender, already restricted to the DoFs of the pipe.
         state: State that is written.
         fields: Fields of the message that are used.
-        required: Whether the plugin has to wait for this pipe before it starts.
-        calibration: That of the sending hardware, in the map's order; None: it has the model's names, signs and zeros.
-        low_pass: Makes the filter of one field; None: there is none.
-        known: Names beside those of the map that a message may contain; None: any.
-        measured: Whether the State is measured; see `StateFeedbackPipe`.
-        limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
-        history: See `StateFeedbackPipe`.
-        leaps: Finds measurements that cannot be true; None: all are accepted.
-        turns: Adds turns to positions of continuous joints; None: the pipe has none of them.
+        reception: How it receives.
+        sender: The joints of the sender.
     """
 
     def __init__(
@@ -57,39 +70,26 @@ class JointFeedbackPipe(StateFeedbackPipe):
         mapping: BidirectionalMap,
         state: State,
         fields: Sequence[str],
-        required: bool = True,
-        calibration: Calibration | None = None,
-        low_pass: MakeFilter | None = None,
-        known: Collection[str] | None = None,
-        measured: bool = False,
-        limits: StartLimits | None = None,
-        history: int = 0,
-        leaps: JointLeaps | None = None,
-        turns: JointTurns | None = None,
+        reception: Reception,
+        sender: JointSender,
     ):
-        dofs = np.array(mapping.robot_indices)
-        required = required or limits is not None
-        super().__init__(
-            name,
-            reader,
-            state,
-            fields=fields,
-            dofs=dofs,
-            required=required,
-            low_pass=low_pass,
-            measured=measured,
-            history=history,
-        )
+        calibration = sender.calibration
+        if sender.limits is not None:
+            reception = replace(reception, required=True)
+        super().__init__(name, reader, state, fields=fields, dofs=np.array(mapping.robot_indices), reception=reception)
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import gather
 
         self._gather = gather
-        self._limits = limits
-        self._leaps, self._turns = (leaps, turns) if "position" in fields else (None, None)
+        self._limits = sender.limits
+        self._leaps = sender.leaps if "position" in fields else None
+        self._turns = sender.turns if "position" in fields else None
         self._of_position = fields.index("position") if "position" in fields else 0
         of_velocity = fields.index("velocity") if "velocity" in fields else len(fields)
         self._velocity = self.values[of_velocity] if of_velocity < len(fields) else np.zeros(0)
-        self._names = NameOrder(calibration.names if calibration else external_names(mapping), known, ignores=True)
+        self._names = NameOrder(
+            calibration.names if calibration else external_names(mapping), sender.known, ignores=True
+        )
         self._carried: tuple[str, ...] = ()
         self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
         self._corrections: list[tuple[Correction, np.ndarray]] = []
@@ -207,6 +207,27 @@ def _unfit(field: str, numbers: np.ndarray | None, count: int) -> PipeError:
     return PipeError(f"{got} in '{field}'", expected=f"{count} numbers, one for each name")
 
 
+@dataclass(frozen=True)
+class JointReceiver:
+    """What a command pipe knows of the joints of its receiver.
+
+    Attributes:
+        calibration: That of the receiving hardware, in the map's order; None: it has the model's names, signs and
+            zeros.
+        turns: `turns` and `added_turns` of the Robot; None: the receiver counts turns as the State does.
+        controller: Name of the controller of the lower level; empty: that of the pipe's name.
+        standing: Stiffness and damping that its joints have without a command, by field, shape (n,) each; those that
+            the pipe carries, of a lower level that publishes them.
+        component: Name of the component whose commands it receives; empty: the node's.
+    """
+
+    calibration: Calibration | None = None
+    turns: tuple[np.ndarray, np.ndarray] | None = None
+    controller: str = ""
+    standing: Mapping[str, np.ndarray] = field(default_factory=dict)
+    component: str = ""
+
+
 class JointCommandPipe(CommandPipe):
     """Writes DoFs of a State to a topic.
 
@@ -216,13 +237,8 @@ class JointCommandPipe(CommandPipe):
         mapping: Map between the Robot and the receiver, already restricted to the DoFs of the pipe.
         state: State that is read.
         fields: Fields of the message that are filled.
-        calibration: That of the receiving hardware, in the map's order; None: it has the model's names, signs and
-            zeros.
+        receiver: The joints of the receiver.
         low_pass: Makes the filter of one field; None: there is none.
-        component: Name of the component that commands; empty: the node does.
-        standing: See below; None: none are known.
-        controller: See below; empty: that of the pipe's name.
-        turns: `turns` and `added_turns` of the Robot; None: the receiver counts turns as the State does.
 
     Attributes:
         controller: Name of the controller of the lower level that gets the commands, if one does.
@@ -231,8 +247,7 @@ class JointCommandPipe(CommandPipe):
         fields: Fields that are filled, each with its values in `message`, shape (n,).
         block: These values one below the other, shape (len(fields), n).
         dofs: The Robot's DoFs in the order of the message, shape (n,).
-        standing: Stiffness and damping that the receiver's joints have without a command, by field, shape (n,) each;
-            those that the pipe carries, of a lower level that published them.
+        standing: That of the receiver.
     """
 
     def __init__(
@@ -242,16 +257,15 @@ class JointCommandPipe(CommandPipe):
         mapping: BidirectionalMap,
         state: State,
         fields: Sequence[str],
-        calibration: Calibration | None = None,
+        receiver: JointReceiver,
         low_pass: MakeFilter | None = None,
-        component: str = "",
-        standing: Mapping[str, np.ndarray] | None = None,
-        controller: str = "",
-        turns: tuple[np.ndarray, np.ndarray] | None = None,
     ):
-        self.standing = dict(standing or {})
+        component = receiver.component
+        calibration = receiver.calibration
+        turns = receiver.turns
+        self.standing = receiver.standing
         self._calibration = calibration
-        self.controller = controller or name
+        self.controller = receiver.controller or name
         message = sent = JointMessage.empty(external_names(mapping), tuple(fields), component)
         (self.block,) = arrays(message)
         self.fields = list(zip(message.rows, self.block, strict=True))

@@ -7,7 +7,7 @@ from solfer.config.kinds.point import PointControllerRecord, PointFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.pipes.context import PipeContext, message_of
 from solfer.pipes.point.notation import PointNotation
-from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
+from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe, PointFormat
 
 
 def feedback(record: PointFeedbackRecord, context: PipeContext) -> PointFeedbackPipe:
@@ -15,9 +15,8 @@ def feedback(record: PointFeedbackRecord, context: PipeContext) -> PointFeedback
     port = _port(record, context, "input", ports=context.inputs)
     reader = context.middleware.reader(record.source, _message(record))
     notation = None if record.convention is None else PointNotation(record.convention, record.output_angles)
-    return PointFeedbackPipe(
-        record.name, reader, port, frame=record.frame, names=record.names, required=record.initialize, notation=notation
-    )
+    received = PointFormat(record.frame, record.names, notation)
+    return PointFeedbackPipe(record.name, reader, port, received=received, required=record.initialize)
 
 
 def controller(record: PointControllerRecord, context: PipeContext) -> PointCommandPipe:
@@ -25,7 +24,7 @@ def controller(record: PointControllerRecord, context: PipeContext) -> PointComm
     port = _port(record, context, "output", ports=context.outputs)
     writer = context.writer(record.sink, _message(record))
     notation = None if record.convention is None else PointNotation(record.convention)
-    return PointCommandPipe(record.name, writer, port, frame=record.frame, names=record.names, notation=notation)
+    return PointCommandPipe(record.name, writer, port, published=PointFormat(record.frame, record.names, notation))
 
 
 def _message(record: PointFeedbackRecord | PointControllerRecord) -> str:

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +19,21 @@ from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
 from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
 
 
+@dataclass(frozen=True)
+class PointFormat:
+    """How messages have the Points of a pipe.
+
+    Attributes:
+        frame: Frame of the values.
+        names: Names of several Points, in the order of the port; None: the sender's order.
+        notation: Notation of the orientations; None: that of the port.
+    """
+
+    frame: str
+    names: tuple[str, ...] | None = None
+    notation: PointNotation | None = None
+
+
 class PointFeedbackPipe(FeedbackPipe):
     """Writes received Points to an input of the component.
 
@@ -25,11 +41,9 @@ class PointFeedbackPipe(FeedbackPipe):
         name: Name of the pipe in the configuration.
         reader: Receives the messages.
         port: The input.
-        frame: Required frame of the values.
-        names: Names of several Points, in the order of the port; None: the sender's order.
+        received: Required format of the messages.
         required: Whether the plugin has to wait for this pipe before it starts.
         known: Other names that a message may contain; None: any.
-        notation: Notation of the orientations on the wire; None: that of the port.
 
     Attributes:
         what: What the names denote, for errors.
@@ -42,17 +56,15 @@ class PointFeedbackPipe(FeedbackPipe):
         name: str,
         reader: Reader,
         port: Port,
-        frame: str,
-        names: tuple[str, ...] | None = None,
+        received: PointFormat,
         required: bool = True,
         known: Collection[str] | None = (),
-        notation: PointNotation | None = None,
     ):
         super().__init__(name, reader, required)
         self._port = port
-        self._frame = frame
-        self._notation = notation
-        self._names = None if names is None else NameOrder(names, known, self.what)
+        self._frame = received.frame
+        self._notation = received.notation
+        self._names = None if received.names is None else NameOrder(received.names, known, self.what)
         self._oriented = port.quantity in ("orientation", "pose")
         self._values = np.zeros_like(port.value)
         self._numbers = self._values.reshape(-1)
@@ -144,26 +156,19 @@ class PointCommandPipe(CommandPipe):
         name: Name of the pipe in the configuration.
         writer: Publishes the messages.
         port: The output.
-        frame: Frame of the values.
-        names: Names of several Points; None: they have none.
-        notation: Notation of the orientations on the wire; None: that of the port.
+        published: Format of the messages.
     """
 
-    def __init__(
-        self,
-        name: str,
-        writer: Writer,
-        port: Port,
-        frame: str,
-        names: tuple[str, ...] | None = None,
-        notation: PointNotation | None = None,
-    ):
-        self._port, self._throttle, self._notation = port, Throttle(logging.getLogger(__name__)), notation
+    def __init__(self, name: str, writer: Writer, port: Port, published: PointFormat):
+        self._port = port
+        self._throttle = Throttle(logging.getLogger(__name__))
+        self._notation = published.notation
+        frame = published.frame
         self._values = np.zeros_like(port.value)
         self._numbers = self._values.reshape(-1)
         self._finite = True
         if port.count is not None:
-            super().__init__(name, writer, PointsMessage(frame, names or (), self._values))
+            super().__init__(name, writer, PointsMessage(frame, published.names or (), self._values))
         elif port.quantity == "wrench":
             super().__init__(name, writer, WrenchMessage(frame, self._values[:3], self._values[3:]))
         else:

@@ -7,6 +7,7 @@ from typing import Any
 
 from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load, read
 from solfer.config.loading.configuration import own_tags
+from solfer.config.loading.layering import ModulePlacement
 from solfer.config.yaml.files import is_file, opened
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.search import Folders
@@ -29,7 +30,7 @@ from solfer.robot.sources import is_robot_read, require_robot
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
 
-def check_file(
+def check_file(  # noqa: PLR0913 for users: what replaces values of the file, by its name
     file: str | os.PathLike,
     modules: Sequence[str] | None = None,
     *,
@@ -69,8 +70,7 @@ def check_file(
         system=system,
         default=registry.configuration,
         middleware=middleware,
-        layer=layer,
-        shared=shared,
+        placement=ModulePlacement(layer, shared),
     )
     if rate is not None:
         _set_rate(report, rate)
@@ -94,26 +94,19 @@ def check_file(
     return report
 
 
-def load_checked(
-    file: str | os.PathLike,
-    name: str,
-    plugin: str,
-    *,
-    search_paths: Folders = (),
-    system: str | None = None,
-    middleware: str | None = None,
-    layer: str | None = None,
-    shared: YamlNode | None = None,
-) -> Configuration:
+def load_checked(file: str | os.PathLike, name: str, plugin: str, **options: Any) -> Configuration:
     """Load a module for a plugin as `load` does; where it has mistakes, all that a check finds is reported.
+
+    Args:
+        file: The main configuration.
+        name: Name of the module.
+        plugin: The plugin that runs it.
+        **options: What `load` and `check_file` replace: `search_paths`, `system`, `middleware`, `layer`, `shared`.
 
     Raises:
         SolferError: The configuration is wrong.
         SolferErrors: In several places.
     """
-    options: dict[str, Any] = {
-        "system": system, "search_paths": search_paths, "middleware": middleware, "layer": layer, "shared": shared
-    }  # fmt: skip
     file = opened(file)
     try:
         return load(file, name, **options)

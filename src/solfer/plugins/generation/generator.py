@@ -26,7 +26,7 @@ from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests, requests_of
 from solfer.plugins.peers import Peer, Peers
-from solfer.plugins.plugin import Plugin
+from solfer.plugins.plugin import Plugin, PluginParts
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.tuning import Tuning
 from solfer.robot import Robot, build
@@ -116,7 +116,7 @@ class Generator:
         outputs = self.make_outputs(robot, controllers)
         claim = self.make_claim(robot, watches, outputs)
         peers = Peers(configuration.module.name, self._peers(watches, controllers), self.middleware)
-        return Plugin(
+        parts = PluginParts(
             component,
             robot,
             watches,
@@ -135,6 +135,7 @@ class Generator:
             requests=self.requests,
             tuning=self.tuning,
         )
+        return Plugin(parts)
 
     def _jumps(self, robot: Robot, component: Component) -> BaseJumps | None:
         """Make what finds jumps of the base; None: the component has no references in the world."""

@@ -41,9 +41,6 @@ class PluginSet:
         polls: Called at the beginning of each cycle: receive calls and replies, `Sharing.turns.next`.
         admit: Raises a MiddlewareError while no plugin may start.
         requires: Names of the others that a plugin needs, by its own name: where one of them ends, it stops with it.
-        interrupted: Measures how long this cycle was kept from running [ns], which counts in no budget.
-        times: Where the durations of the stages of a cycle go, int64, shape (plugins * stages,) [ns]; None: memory of
-            its own.
 
     Attributes:
         plugins: The plugins with their lives.
@@ -54,6 +51,7 @@ class PluginSet:
         cycles: Cycles since the start.
         failures: What ended the runs of plugins that have failed and were not started again, the first one first.
         changed: Called after each change of a plugin's state or reason, and each overrun, with its index.
+        interrupted: Measures how long this cycle was kept from running [ns], which counts in no budget.
 
     Raises:
         MiddlewareError: There is no plugin, two have one name, or their rates differ.
@@ -67,23 +65,20 @@ class PluginSet:
         nanoseconds: Callable[[], int] = monotonic_ns,
         polls: Sequence[Callable[[], None]] = (),
         admit: Callable[[], None] = lambda: None,
-        interrupted: Callable[[], int] = lambda: 0,
-        times: np.ndarray | None = None,
         requires: Mapping[str, Sequence[str]] = NOTHING,
     ):
         _check(plugins)
         self.rate = plugins[0].rate
         self.cycles = 0
         self._polls = tuple(polls)
-        self._interrupted = interrupted
         period = round(1e9 / self.rate)
         self.plugins = tuple(ManagedPlugin(plugin, blend) for plugin in plugins)
         self.budgets = tuple(Budget(budget, period) if budget is not None else None for _ in plugins)
-        words = times if times is not None else np.zeros(len(plugins) * len(STAGES), dtype=np.int64)
-        self.times = _measure(plugins, nanoseconds, words)
-        self._rows = tuple(zip(self.plugins, self.times, self.budgets, strict=True))
-        self.inbox, self.switchboard = Inbox(), Switchboard(self.plugins, admit)
+        self.measure(nanoseconds, np.zeros(len(plugins) * len(STAGES), dtype=np.int64))
+        self.inbox = Inbox()
+        self.switchboard = Switchboard(self.plugins, admit)
         self.changed: Callable[[int, ManagedPlugin], None] = lambda index, managed: None
+        self.interrupted: Callable[[], int] = lambda: 0
         self.failures: dict[str, BaseException] = {}
         self._needed_by = {
             each.name: tuple(other for other in self.plugins if each.name in requires.get(other.name, ()))
@@ -91,6 +86,11 @@ class PluginSet:
         }
         for index, managed in enumerate(self.plugins):
             managed.changed = partial(self._note, index)
+
+    def measure(self, nanoseconds: Callable[[], int], durations: np.ndarray) -> None:
+        """Write the durations of the stages of a cycle, by a clock [ns], to int64 of shape (plugins * stages,) [ns]."""
+        self.times = _measure([managed.plugin for managed in self.plugins], nanoseconds, durations)
+        self._rows = tuple(zip(self.plugins, self.times, self.budgets, strict=True))
 
     @property
     def failure(self) -> BaseException | None:
@@ -138,7 +138,7 @@ class PluginSet:
 
     def _charge(self, managed: ManagedPlugin, budget: Budget, took: int) -> None:
         """Count a cycle in which a component `took` so long [ns]; abort its plugin if it is too slow too often."""
-        if not managed.active or (took > budget.limit >= took - self._interrupted()):
+        if not managed.active or (took > budget.limit >= took - self.interrupted()):
             return
         before = budget.overruns.total
         often = budget.exceeded(took, self.cycles)

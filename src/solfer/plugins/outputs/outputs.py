@@ -9,6 +9,7 @@ from solfer.errors import NotFinite
 from solfer.pipes import CommandPipe, JointCommandPipe
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.outputs.following import JointFollowing
+from solfer.plugins.outputs.sent_joints import SentJoints
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
@@ -17,9 +18,6 @@ from solfer.transport.middleware import HealthReport
 
 Claim = tuple[str, str, str]
 """A number of a command: controller, field and joint."""
-
-NEAR = 0.2
-"""Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
 
 
 class Outputs:
@@ -38,7 +36,6 @@ class Outputs:
         controllers: The pipes with their gates.
         commanding: Those that command the lower level.
         blend: See above.
-        distance: Sum over all cycles of the largest commanded step of a joint [rad, m].
         following: See above.
         start_position: Where joints are at a start, shape (robot.size,) [rad, m]; live.
     """
@@ -54,43 +51,33 @@ class Outputs:
         following: JointFollowing | None = None,
     ):
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import finite, keep
+        from solfer.numerics.kernels import finite
 
         self._finite = finite
-        self._keep = keep
         self._requests = requests
         self.controllers = tuple(controllers)
         self.blend = blend
         self._robot = robot
-        self._sent = False
         self._idle = idle
         self._reported = [0] * len(self.controllers)
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
-        # in joint space: the numbers to send, and those sent last
-        self._blocks = [
-            (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if self._moves(pipe) else None))
-            for pipe in joints
-        ]
-        self.distance = 0.0
+        self._joints = SentJoints(joints, self._moves, period)
         # joints that go to other plugins have no gate, but nobody shall follow what is not a number
         self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
-        self._positions = [
-            (pipe.dofs, sent[row])
-            for pipe, (_, sent, _) in zip(joints, self._blocks, strict=True)
-            for row, (field, _) in enumerate(pipe.fields)
-            if field == "position"
-        ]
         self.following = following
         self.start_position = np.array(robot.state.position)
-        self._are_followed = False
-        self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
 
     def _moves(self, pipe: JointCommandPipe) -> bool:
         """Return whether joints move by what a pipe sends, if only by way of another plugin."""
         return not self._idle and bool(np.isin(pipe.dofs, self._robot.actuated).any())
+
+    @property
+    def distance(self) -> float:
+        """Sum over all cycles of the largest commanded step of a joint [rad, m]."""
+        return self._joints.distance
 
     @property
     def claims(self) -> frozenset[Claim]:
@@ -110,7 +97,7 @@ class Outputs:
     def start(self) -> None:
         """Start where the joints are, without earlier commands; to be called before the component starts."""
         self._find_start()
-        self._sent = False
+        self._joints.is_sent = False
         self.blend.start(self.start_position)
         if self.following is not None:
             self.following.start()
@@ -121,7 +108,7 @@ class Outputs:
 
     def forget(self) -> None:
         """Forget what was sent last: others move the joints now, or the robot is in another state."""
-        self._are_followed = False
+        self._joints.forget()
 
     def collect(self) -> None:
         """Collect the commands of the component, check them and blend them in.
@@ -140,10 +127,7 @@ class Outputs:
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        distance = max([self._keep(*block) for block in self._blocks], default=0.0)
-        if self._sent:
-            self.distance += distance
-        self._sent = self._are_followed = True
+        self._joints.keep()
         for pipe, _ in self.controllers:
             pipe.send(stamp)
 
@@ -151,21 +135,18 @@ class Outputs:
         """Collect and send, but with all velocities at zero."""
         self._robot.command.velocity[:] = 0.0
         self.collect()
-        for values in self._velocities:  # a filter still carries the earlier velocity
-            values.fill(0.0)
+        self._joints.stop()
         self.send(stamp)
 
     def hold(self, stamp: float) -> None:
         """Send the last positions and efforts of the joints again with zero velocity; nothing if none was sent yet."""
-        if not self._sent:
+        if not self._joints.is_sent:
             return
         self._robot.command.velocity[:] = 0.0
         for pipe in self._others:
             pipe.collect()
-        for block, sent, _ in self._blocks:
-            block[...] = sent
-        for values in self._velocities:
-            values.fill(0.0)
+        self._joints.restore()
+        self._joints.stop()
         self.send(stamp)
 
     def counts(self) -> dict[str, float | str]:
@@ -196,15 +177,7 @@ class Outputs:
         again with each further start.
         """
         self.start_position[:] = self._robot.state.position
-        for dofs, sent in self._positions if self._are_followed else ():
-            follow = np.abs(sent - self.start_position[dofs]) <= NEAR
-            self.start_position[dofs[follow]] = sent[follow]
-
-
-def _steps(pipe: JointCommandPipe, period: float | None) -> np.ndarray:
-    """Return what makes a way of each row of a pipe, see `solfer.numerics.kernels.keep`; None: no joint moves by it."""
-    steps = {} if period is None else {"position": 0.0, "velocity": period}
-    return np.array([steps.get(field, -1.0) for field, _ in pipe.fields])
+        self._joints.follow(self.start_position)
 
 
 def _refuse(pipe: JointCommandPipe) -> None:

@@ -138,7 +138,7 @@ class RollingContact(SupportVertex, Contact):
 
     kernels = (rolling,)
 
-    def __init__(
+    def __init__(  # noqa: PLR0913, PLR0917 for users: the shape of a wheel, by its names
         self,
         link: str,
         robot: RobotView,

@@ -88,7 +88,9 @@ class BlackBox:
         for plugin in plugins if truth is not None else ():
             link = plugin.robot.kinematics.base_link or ""
             units = with_units(NAMED[TRUTH], UNITS)
-            Logger(plugin.name, loop.sources).add("truth", self._true, NAMED[TRUTH], units, "world", TRUTH, link)
+            Logger(plugin.name, loop.sources).add(
+                "truth", self._true, NAMED[TRUTH], unit=units, frame="world", kind=TRUTH, child=link
+            )
         sources = [*loop.sources, *(source for log in logs for source in log.sources)]
         files: dict[str, str] = {}
         texts = versions()

@@ -11,14 +11,14 @@ from solfer.errors import SimulationError
 from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
-from solfer.numerics.rotations import quaternion_product, rotated
+from solfer.simulation.robot_body.base import FloatingBase
 from solfer.simulation.robot_body.body_urdf import body_urdf
 from solfer.simulation.robot_body.differences import warn_of_differences
+from solfer.simulation.robot_body.motors import LARGEST_EFFORT, BodyMotors
 from solfer.simulation.world.engine import STDERR, STDOUT, Engine, decimal_points, redirected
 from solfer.simulation.world.records import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
-LARGEST_EFFORT = 1e6  # [Nm], of motors without a limit
 MOST_JOINTS = 127  # of which PyBullet measures the state
 REACH = 100.0  # [m], how far away other bodies are searched for
 
@@ -40,8 +40,6 @@ class Body:
         links: Name of each of PyBullet's links; the base is the last, so that index -1 finds it.
         owner: For each link of the description, the link of PyBullet's that it became part of.
         base_link: Link that `position`, `orientation`, `linear` and `angular` belong to.
-        position, orientation: Pose of that link's origin in the world, shape (3,) [m] and (4,), (x, y, z, w).
-        linear, angular: Velocity of its origin [m/s] and angular velocity [rad/s] in world axes, shape (3,) each.
 
     Raises:
         SimulationError: PyBullet cannot load the robot, it has more than MOST_JOINTS joints, or `friction` names a link
@@ -57,43 +55,27 @@ class Body:
         friction: Friction,
         lossless: Collection[str] = (),
     ):
-        self._engine = engine
         self._bullet = engine.bullet
         self._client = engine.client
-        self._chart = kinematics.base
-        self._first = 0 if self._chart is None else 6
+        floats = kinematics.base is not None
+        self._first = 6 if floats else 0
         self.joints = tuple(kinematics.dofs[self._first :])
         if len(self.joints) > MOST_JOINTS:
             what = f"the robot has {len(self.joints)} moving joints, more than PyBullet can take"
             raise SimulationError(what, where=description.where, expected=f"at most {MOST_JOINTS}")
-        motion = np.zeros(13)
-        self.orientation, self.position, self.linear, self.angular = np.split(motion, (4, 7, 10))
-        self.orientation[3] = 1.0
-        if self._chart is not None:
-            # imported here: its compiler takes a while to load
-            from solfer.numerics.twist_transport import ORIENTED, POSE, TWIST, Carried
-
-            at_base = np.concatenate((np.eye(3).ravel(), np.zeros(9)))
-            self._in_chart = Carried(self._chart, motion, at_base)
-            self._whole = ORIENTED | POSE | TWIST
         with tempfile.TemporaryDirectory() as folder:
-            urdf = body_urdf(description, self._chart is not None, Path(folder))
+            urdf = body_urdf(description, floats, Path(folder))
             self.base_link = urdf.base
             self.owner = urdf.owner
-            self.id = self._load(urdf.text, Path(folder, "robot.urdf"), description.where)
+            self.id = self._load(urdf.text, Path(folder, "robot.urdf"), description.where, floats=floats)
         self._name_links(urdf.base)
         warn_of_differences(engine, self.id, urdf.text, where=description.where)
         self._set_dynamics(friction, urdf.owner)
-        self._set_losses(description, lossless)
-        self._set_motors(kinematics, motors)
+        losses = self._set_losses(description, lossless)
+        self._motors = BodyMotors(engine, self.id, self._indices, kinematics=kinematics, motors=motors, losses=losses)
         self._followers = Followers(self.joints, description.mimics)
-        self._follows = bool(self._followers)
         self._set_gears()
-        self._to_com = tuple(self._bullet.getDynamicsInfo(self.id, -1, self._client)[3:5])
-        # not by PyBullet's own functions of transforms, which compute with single precision
-        x, y, z, w = self._to_com[1]
-        self._turn_from_com = -x, -y, -z, w
-        self._from_com = rotated([-each for each in self._to_com[0]], self._turn_from_com)
+        self._base = FloatingBase(engine, self.id, kinematics.base)
         self.place(np.zeros(len(self.joints)))
 
     def place(
@@ -103,25 +85,39 @@ class Body:
         orientation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0, 1.0),
     ) -> None:
         """Put the robot somewhere at rest: joint positions [rad], pose of the base link's origin in the world."""
-        bullet = self._bullet
-        client = self._client
-        bullet.resetJointStatesMultiDof(
+        self._bullet.resetJointStatesMultiDof(
             self.id,
             self._indices,
             [[float(value)] for value in joints],
             [[0.0]] * len(self._indices),
-            physicsClientId=client,
+            physicsClientId=self._client,
         )
-        if self._chart is not None:
-            offset, turn = self._to_com
-            com = np.add(position, rotated(offset, orientation)).tolist()
-            bullet.resetBasePositionAndOrientation(self.id, com, quaternion_product(orientation, turn), client)
-            bullet.resetBaseVelocity(self.id, [0.0] * 3, [0.0] * 3, client)
+        self._base.place(position, orientation)
 
     @property
     def floating(self) -> bool:
         """Whether the base moves."""
-        return self._chart is not None
+        return self._base.floats
+
+    @property
+    def position(self) -> np.ndarray:
+        """Position of the base link's origin in the world, shape (3,) [m]; live."""
+        return self._base.position
+
+    @property
+    def orientation(self) -> np.ndarray:
+        """Orientation of the base link, shape (4,), (x, y, z, w); live."""
+        return self._base.orientation
+
+    @property
+    def linear(self) -> np.ndarray:
+        """Velocity of its origin in world axes, shape (3,) [m/s]; live."""
+        return self._base.linear
+
+    @property
+    def angular(self) -> np.ndarray:
+        """Angular velocity of the base link in world axes, shape (3,) [rad/s]; live."""
+        return self._base.angular
 
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
         """Compute the corners of a box in world axes around all shapes, shape (3,) each [m]."""
@@ -170,39 +166,19 @@ class Body:
         """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
         states = self._bullet.getJointStates(self.id, self._indices, self._client)
         q[self._first :], v[self._first :], _, torques = zip(*states, strict=True)
-        if self._follows:
+        if self._followers:
             self._follow(q[self._first :], v[self._first :])
-        if self._motor_rows:
-            motor_torque[:] = [torques[row] for row in self._motor_rows]
-        if self._chart is not None:
-            self._read_base()
-            self._in_chart.update(self._whole)
-            q[:6], v[:6] = self._in_chart.base, self._in_chart.rates
+        if self._motors.rows:
+            motor_torque[:] = [torques[row] for row in self._motors.rows]
+        self._base.read(q, v)
 
     def apply(self, torque: np.ndarray, speed: np.ndarray) -> None:
         """Set what the next step does: torques of the model's DoFs, shape (model size,); speeds of the motors."""
-        if self._torque_indices:
-            self._bullet.setJointMotorControlArray(
-                self.id,
-                self._torque_indices,
-                self._bullet.TORQUE_CONTROL,
-                forces=torque[self._torque_dofs].tolist(),
-                physicsClientId=self._client,
-            )
-        if self._motor_indices:
-            self._bullet.setJointMotorControlArray(
-                self.id,
-                self._motor_indices,
-                self._bullet.VELOCITY_CONTROL,
-                targetVelocities=speed.tolist(),
-                forces=self._motor_efforts,
-                physicsClientId=self._client,
-            )
+        self._motors.apply(torque, speed)
 
     def push_motors(self) -> None:
         """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
-        self._torque_dofs = np.arange(self._first, self._first + len(self.joints))
-        self._torque_indices = list(self._indices)
+        self._motors.push()
 
     def mass(self) -> float:
         """Sum up the mass of the whole body as PyBullet has it [kg]."""
@@ -239,28 +215,13 @@ class Body:
             )
             self._bullet.changeConstraint(gear, gearRatio=-ratio, maxForce=LARGEST_EFFORT, physicsClientId=self._client)
 
-    def _read_base(self) -> None:
-        """Read the base link; PyBullet has pose and velocity of the base's centre of mass, in its principal axes."""
-        com, orientation = self._bullet.getBasePositionAndOrientation(self.id, self._client)
-        (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self.id, self._client)
-        x, y, z = rotated(self._from_com, orientation)  # from the centre of mass to the origin
-        cx = -x
-        cy = -y
-        cz = -z
-        self.position[:] = com[0] + x, com[1] + y, com[2] + z
-        self.orientation[:] = quaternion_product(orientation, self._turn_from_com)
-        self.linear[:] = vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)
-        self.angular[:] = wx, wy, wz
-
-    def _load(self, text: str, path: Path, where: str) -> int:
+    def _load(self, text: str, path: Path, where: str, floats: bool) -> int:
         bullet = self._bullet
         flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
         path.write_text(text, encoding="utf-8")
         try:
             with redirected((STDOUT,), STDERR), decimal_points():
-                return bullet.loadURDF(
-                    str(path), useFixedBase=self._chart is None, flags=flags, physicsClientId=self._client
-                )
+                return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags, physicsClientId=self._client)
         except bullet.error as error:
             raise SimulationError(
                 f"PyBullet cannot load the robot: {error}", where=where, expected="a URDF that PyBullet can load"
@@ -298,27 +259,10 @@ class Body:
                 physicsClientId=client,
             )
 
-    def _set_losses(self, description: Description, lossless: Collection[str]) -> None:
-        """Set the damping of the joints, and prepare their friction, which motors make that hold them back."""
+    def _set_losses(self, description: Description, lossless: Collection[str]) -> list[float]:
+        """Set the damping of the joints; return their friction, which motors make that hold them back [Nm]."""
         joints = [description.joints[name] for name in self.joints]
-        self._losses = [0.0 if joint.name in lossless else joint.friction for joint in joints]
         for index, joint in zip(self._indices, joints, strict=True):
             if joint.damping and joint.name not in lossless:
                 self._bullet.changeDynamics(self.id, index, jointDamping=joint.damping, physicsClientId=self._client)
-
-    def _set_motors(self, kinematics: Kinematics, motors: np.ndarray) -> None:
-        """Leave only friction to PyBullet's motors, which every joint starts with, except where a speed is held."""
-        self._torque_dofs = np.array(
-            [dof for dof in range(self._first, kinematics.size) if dof not in motors], dtype=np.intp
-        )
-        self._torque_indices = [self._indices[dof - self._first] for dof in self._torque_dofs]
-        self._motor_rows = [int(dof) - self._first for dof in motors]
-        self._motor_indices = [self._indices[row] for row in self._motor_rows]
-        self._motor_efforts = np.minimum(kinematics.effort_limit[motors], LARGEST_EFFORT).tolist()
-        self._bullet.setJointMotorControlArray(
-            self.id,
-            self._indices,
-            self._bullet.VELOCITY_CONTROL,
-            forces=self._losses,
-            physicsClientId=self._client,
-        )
+        return [0.0 if joint.name in lossless else joint.friction for joint in joints]

@@ -3,21 +3,18 @@
 import logging
 import math
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
-from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.lower_level import LowerLevelServer
-from solfer.simulation.rendering.camera import Camera, Scene, Shot
 from solfer.simulation.rendering.pictures import Pictures
 from solfer.simulation.sensors import Rates
 from solfer.simulation.server.pace import Pace
 from solfer.simulation.server.publications import publications
 from solfer.simulation.server.rates import every
+from solfer.simulation.server.screenshots import Screenshots
 from solfer.simulation.server.services import SIMULATOR, screenshot_service, simulator_services
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
@@ -32,12 +29,44 @@ HEALTH = "simulation"
 """Name of the health report."""
 
 HEALTH_RATE = 1.0  # [Hz] of simulated time
-STANDSTILL = 2.0  # [s] without a cycle until a picture fails
-WAITING = 4  # pictures that may wait to be drawn
 AGAIN = 1.0  # [s] of simulated time; a simulation that diverges twice within it has no good state
 REST = 1.0  # [s] of simulated time in which a robot without commands comes to rest
 AT_REST = 0.05  # [rad/s] largest speed of a joint of a robot at rest
 IDLE = 0.02  # [s] between two checks for requests and commands while paused
+
+
+class _Losses:
+    """What has gone wrong since the last report.
+
+    Args:
+        simulation: The simulation.
+        pace: Measures the time lost.
+
+    Attributes:
+        faults: Faults of the simulation since then.
+    """
+
+    def __init__(self, simulation: Simulation, pace: Pace):
+        self._lower_level = simulation.lower_level
+        self._pace = pace
+        self._refused = simulation.lower_level.refused
+        self._lost = 0.0
+        self.faults: list[str] = []
+
+    def since_last(self) -> tuple[Health, str]:
+        """Return the health since the last call, and what has gone wrong; empty: nothing."""
+        refused = self._lower_level.refused
+        lost = self._pace.lost
+        news = self.faults
+        level = Health.ERROR if news else Health.WARNING
+        self.faults = []
+        if refused > self._refused:
+            news.append(f"{refused - self._refused} commands refused")
+        if lost > self._lost:
+            news.append(f"{lost - self._lost:.3f} s lost")
+        self._refused = refused
+        self._lost = lost
+        return (level if news else Health.GOOD), ", ".join(news)
 
 
 class SimulationServer:
@@ -89,20 +118,14 @@ class SimulationServer:
         self.stands = False
         self._idle = 0.0
         self._followers = followers or StepHook()
-        self._refused = simulation.lower_level.refused
-        self._lost = 0.0
+        self._losses = _Losses(simulation, self.pace)
         self._diverged = -math.inf
-        self._news: list[str] = []
         self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
         middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
-        description = simulation.kinematics.description
-        floating = simulation.floating
-        self._camera = Camera(Scene(description.text, description.where, floating, world=simulation.world.record))
-        self._drawing, self._pictures = ThreadPoolExecutor(1), pictures or Pictures()
-        self._drawings: list[Future[Any]] = []
-        middleware.serve(SIMULATOR, (screenshot_service(self),), self._draw)
+        self._screenshots = Screenshots(simulation, self.inbox, pictures or Pictures())
+        middleware.serve(SIMULATOR, (screenshot_service(self),), self._screenshots.submit)
 
     def cycle(self) -> None:
         """Receive commands and service calls, make one step unless time stands still, publish what is due.
@@ -157,21 +180,11 @@ class SimulationServer:
         Raises:
             SimulationError: The name is wrong, the file cannot be written, or the simulation does not run.
         """
-        simulation = self.simulation
-        path = self._pictures.place(name)
-        moment = self.inbox.submit(lambda: Shot(simulation.q.copy(), simulation.world.poses(), path))
-        try:
-            shot = moment.result(STANDSTILL)
-        except FutureTimeout as error:
-            moment.cancel()
-            raise SimulationError("the simulation does not run", expected="a simulation that makes steps") from error
-        self._camera.take(shot)
-        return path
+        return self._screenshots.take(name)
 
     def close(self) -> None:
         """End the process that draws."""
-        self._camera.close()
-        self._drawing.shutdown()
+        self._screenshots.close()
 
     def wait(self) -> None:
         """Return when the next cycle is due."""
@@ -218,16 +231,6 @@ class SimulationServer:
                 return "the simulation ends"
         return ""
 
-    def _draw(self, call: Callable[[], Any]) -> "Future[Any]":
-        """Pass a call to the thread that draws pictures, unless too many wait there."""
-        self._drawings = [drawing for drawing in self._drawings if not drawing.done()]
-        if len(self._drawings) < WAITING:
-            self._drawings.append(self._drawing.submit(call))
-            return self._drawings[-1]
-        refused: Future[Any] = Future()
-        refused.set_exception(SimulationError(f"{WAITING} pictures wait to be drawn", expected="a request later on"))
-        return refused
-
     def _recover(self, error: SimulationError) -> None:
         """Put the robot into its start, as a reset does; raises `error` if that was done less than AGAIN ago."""
         time = self.simulation.time
@@ -236,7 +239,7 @@ class SimulationServer:
         logger.error("%s: the robot is put into its start", error)
         self._diverged = time
         self.simulation.recover()
-        self._news.append(str(error))
+        self._losses.faults.append(str(error))
 
     def _repeat(self) -> None:
         """Publish the last measurements once more."""
@@ -249,26 +252,17 @@ class SimulationServer:
     def _report(self) -> None:
         """Report the health: how fast, what was lost, what was refused, what touches the ground."""
         pace = self.pace
-        refused = self.simulation.lower_level.refused
-        news = self._news
-        level = Health.ERROR if self._news else Health.WARNING
-        self._news = []
-        if refused > self._refused:
-            news.append(f"{refused - self._refused} commands refused")
-        if pace.lost > self._lost:
-            news.append(f"{pace.lost - self._lost:.3f} s lost")
-        self._refused = refused
-        self._lost = pace.lost
+        level, news = self._losses.since_last()
         life = "paused" if self.paused else "running"
         self.middleware.report(
             self._name,
-            level if news else Health.GOOD,
-            ", ".join(news) or life,
+            level,
+            news or life,
             {
                 "time [s]": self.simulation.time,
                 "real-time factor": pace.measured,
                 "time lost [s]": pace.lost,
-                "commands refused": refused,
+                "commands refused": self.simulation.lower_level.refused,
                 "commands dropped": self._lower_level.dropped,
                 "contacts": " ".join(self.simulation.contact_links()),
             },

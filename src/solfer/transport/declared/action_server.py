@@ -7,17 +7,10 @@ from typing import Any
 from solfer.components.declaration import Action, Outcome, full_name
 from solfer.errors import SolferError, described
 from solfer.throttle import Throttle
-from solfer.transport.declared.fields import message_of, value_of
-from solfer.transport.declared.goals import (
-    GOAL_ID,
-    STATUS,
-    GoalName,
-    GoalStatus,
-    StatusEntry,
-    StatusList,
-    envelopes,
-    interface_of,
-)
+from solfer.transport.declared.action_topics import ActionTopics
+from solfer.transport.declared.fields import value_of
+from solfer.transport.declared.goals import GoalName, GoalStatus, StatusEntry
+from solfer.transport.endpoints import Queue
 from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
@@ -42,7 +35,6 @@ class ActionServer:
 
     Attributes:
         active: The goal that is under way; None: there is none.
-        queues: Where goals and cancels wait.
 
     Raises:
         SolferError: A dataclass does not fit the interface.
@@ -53,26 +45,18 @@ class ActionServer:
         self._now = middleware.now
         self._throttle = Throttle(logger)
         self._stamp_time = middleware.stamp_time
-        self._types = envelopes(action.goal, action.feedback, action.result)
-        self._name = name = full_name(owner, action.name)
-        goal, feedback, result = (interface_of(action.interface, part) for part in ("goal", "feedback", "result"))
-        for interface, message in (
-            (goal, self._types.goal), (feedback, self._types.feedback), (result, self._types.result)
-        ):  # fmt: skip
-            middleware.require_fields(interface, message)
-        self._goals = middleware.declared_queue(f"{name}/goal", goal)
-        self._cancels = middleware.declared_queue(f"{name}/cancel", GOAL_ID)
-        self.queues = self._goals, self._cancels
-        self._status = middleware.writer(f"{name}/status", STATUS)
-        self._feedback = middleware.writer(f"{name}/feedback", feedback)
-        self._feedback_type = feedback
-        self._result = middleware.writer(f"{name}/result", result)
-        self._result_type = result
+        self._name = full_name(owner, action.name)
+        self._topics = ActionTopics(self._name, action, middleware)
         self.active: GoalName | None = None
         self._past: dict[str, StatusEntry] = {}
         self._next_status = self._next_feedback = self._before = -float("inf")
         self._last_cancel = self._last_taken = 0.0
         self._count = 0
+
+    @property
+    def queues(self) -> tuple[Queue, ...]:
+        """Where goals and cancels wait."""
+        return self._topics.goals, self._topics.cancels
 
     def receive(self, refusal: str) -> None:
         """Carry out what clients want, between two cycles; with a `refusal` the goal is aborted and others rejected."""
@@ -85,9 +69,9 @@ class ActionServer:
         if refusal and self.active is not None:
             self._end(self.active, GoalStatus.ABORTED, refusal)
         # a goal and its cancel may have come together: the goal is first
-        for message in self._goals.drain():
+        for message in self._topics.goals.drain():
             self._take(message, refusal)
-        for message in self._cancels.drain():
+        for message in self._topics.cancels.drain():
             self._cancel(message)
         if now >= self._next_status:
             self._publish_status()
@@ -105,8 +89,7 @@ class ActionServer:
         elif now >= self._next_feedback:
             self._next_feedback = now + 1.0 / self._action.rate
             entry = StatusEntry(self.active, GoalStatus.ACTIVE)
-            feedback = self._types.feedback(entry, self._action.report())
-            self._feedback.write(message_of(self._feedback_type, feedback))
+            self._topics.publish_feedback(entry, self._action.report())
 
     def _finish(self, outcome: Outcome) -> None:
         state = GoalStatus.SUCCEEDED if outcome.success else GoalStatus.ABORTED
@@ -116,7 +99,7 @@ class ActionServer:
     def _take(self, message: Any, refusal: str) -> None:
         """Take over a goal, or reject it."""
         try:
-            received = value_of(self._types.goal, message)
+            received = value_of(self._topics.goal, message)
         except SolferError as error:
             self._throttle.warning(message.sender, "%s: a goal of %s is refused: %s", self._name, message.sender, error)
             return
@@ -187,12 +170,11 @@ class ActionServer:
             self.active = None
         entry = StatusEntry(name, int(state), text)
         self._remember(entry)
-        answer = self._types.result(entry, self._action.result() if result is None else result)
-        self._result.write(message_of(self._result_type, answer))
+        self._topics.publish_result(entry, self._action.result() if result is None else result)
         self._publish_status()
 
     def _publish_status(self) -> None:
         """Publish the states of the goals."""
         self._next_status = self._now() + BEAT
         in_progress = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
-        self._status.write(message_of(STATUS, StatusList((*self._past.values(), *in_progress))))
+        self._topics.publish_status((*self._past.values(), *in_progress))

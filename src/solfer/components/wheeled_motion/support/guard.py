@@ -35,11 +35,13 @@ class TaskRates(NamedTuple):
     """Rows of the tasks, live, each of shape (rows,).
 
     Attributes:
+        rows: Rows of each task, by its name.
         error: Desired less present values.
         away: Rates by which errors of base and vertices go away.
         forward: Desired rates of base and vertices, whole.
     """
 
+    rows: dict[str, slice]
     error: np.ndarray
     away: np.ndarray
     forward: np.ndarray
@@ -52,8 +54,7 @@ class MotionGuard:
         polygon: The support polygon.
         lifted: Which wheels are lifted; live, shape (m,).
         wheels: Names of the wheels.
-        rows: Rows of each task of the stack; the first ones of camber, caster and vertices are one a wheel.
-        rates: Rows of the tasks.
+        rates: Rows of the tasks; the first ones of camber, caster and vertices are one a wheel.
         legs: DoFs of the legs but for wheels and their steering, by their names.
         turning: DoFs that steer the wheels, shape (m,).
         velocity: Joint velocities, which it shortens; live, shape (n,).
@@ -68,12 +69,12 @@ class MotionGuard:
         polygon: SupportPolygon,
         lifted: np.ndarray,
         wheels: Sequence[str],
-        rows: dict[str, slice],
         rates: TaskRates,
         legs: dict[str, int],
         turning: np.ndarray,
         velocity: np.ndarray,
     ):
+        rows = rates.rows
         self.polygon = polygon
         self.is_held = False
         self._throttle = Throttle(log)

@@ -1,0 +1,122 @@
+"""How far a task is from its reference, and whether it still comes nearer."""
+
+import math
+
+import numpy as np
+
+from solfer.components.following.quantity import PoseNumbers
+
+CHECK, CHECKS = 0.02, 5
+"""Time between two looks at whether a task still comes nearer to its reference [s], and how many it may not."""
+
+CREEP, GROWTH = 1e-3, 0.2
+"""Share of the rate that its gain asks for below which it does not: the rest would take a thousand times as long. It
+grows by the factor e in each time of the second number [s] that the reference has been at rest: what an arm gains by
+swinging on gets less and less, and it comes to rest in any case."""
+
+GROWN = math.exp(CHECK / GROWTH)
+"""Growth of that share from one look to the next."""
+
+
+class Residual:
+    """Distance and angle of a task's point from its reference.
+
+    Args:
+        error: Error of the task; live.
+        numbers: Numbers of the reference.
+        tolerances: Those of a task that has arrived [m, rad], shape (2,); live.
+        values: Where they are written, as of the last cycle [m, rad], shape (2,).
+
+    Attributes:
+        values: See above.
+    """
+
+    def __init__(self, error: np.ndarray, numbers: PoseNumbers, tolerances: np.ndarray, values: np.ndarray):
+        self.values = values
+        self._place = error[numbers.place]
+        self._turn = error[numbers.turn]
+        self._tolerances = tolerances
+
+    def measure(self) -> None:
+        """Measure them."""
+        place = self._place
+        turn = self._turn
+        self.values[0] = math.sqrt(float(place.dot(place))) if len(place) else 0.0
+        self.values[1] = math.sqrt(float(turn.dot(turn))) if len(turn) else 0.0
+
+    def is_beyond(self) -> bool:
+        """Return whether one of them is beyond its tolerance."""
+        return bool((self.values > self._tolerances).any())
+
+    def __str__(self) -> str:
+        far = [f"{self.values[0]:.4g} m"] if len(self._place) else []
+        return " and ".join(far + ([f"{self.values[1]:.4g} rad"] if len(self._turn) else []))
+
+
+class TaskProgress:
+    """Whether a task comes nearer to a reference that is at rest, or has come to rest away from it.
+
+    Args:
+        period: Period of the control cycle [s].
+        gain: Gain of the task [1/s].
+
+    Attributes:
+        gain: See above.
+        period: See above.
+        stays: Whether the distance does not change any more.
+        is_unreachable: Whether the task has come to rest away from its reference.
+    """
+
+    def __init__(self, period: float, gain: float):
+        self.gain = gain
+        self.period = period
+        self.stays = False
+        self.is_unreachable = False
+        self._is_reported = False
+        self._checks = round(CHECK / period)
+        self._creep = CREEP
+        self._last = math.inf
+        self._cycles = 0
+        self._looks = 0
+
+    @property
+    def step(self) -> float:
+        """Share of an error that a cycle corrects."""
+        return self.gain * self.period
+
+    def look(self, distance: float) -> None:
+        """Look whether a distance from the reference has become less; called in each cycle."""
+        self._cycles += 1
+        if self._cycles < self._checks:
+            return
+        self._cycles = 0
+        is_creeping = abs(distance - self._last) < self._creep * self.gain * distance * CHECK
+        self._creep = min(self._creep * GROWN, 1.0)
+        self._looks = self._looks + 1 if is_creeping else 0
+        self._last = distance
+        self.stays = self._looks >= CHECKS
+
+    def judge(self, is_beyond: bool) -> bool:
+        """Note whether the task has come to rest beyond its tolerances; return whether to report it, once."""
+        self.is_unreachable = is_beyond
+        is_new = is_beyond and not self._is_reported
+        self._is_reported = self._is_reported or is_beyond
+        return is_new
+
+    def look_again(self) -> None:
+        """Look from the beginning."""
+        self._last = math.inf
+        self._cycles = 0
+        self._looks = 0
+        self.stays = False
+
+    def restart(self) -> None:
+        """Begin with a reference that moves."""
+        self.look_again()
+        self.is_unreachable = False
+        self._creep = CREEP
+
+    def forget(self) -> None:
+        """Begin with another reference."""
+        self.restart()
+        self._is_reported = False

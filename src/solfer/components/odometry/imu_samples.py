@@ -1,0 +1,129 @@
+"""Samples of the IMU: what it measured at any time that lies between two of them."""
+
+import math
+
+import numpy as np
+
+from solfer.components.odometry.samples import SensorHistory, SortedSamples
+from solfer.components.odometry.stamps import StampCheck
+from solfer.model.state import State
+from solfer.numerics.base_chart import BaseChart
+
+LAG = 0.03
+"""Longest time for which joints wait for what the IMU measures at their time [s]."""
+
+KEPT = 0.1
+"""Time for which samples of the IMU are kept, for others that come late [s]."""
+
+CAPACITY = 256
+"""Samples that are kept of each sensor: half a second of an IMU at 500 Hz."""
+
+ANGLES, RATES, TURNED = slice(0, 3), slice(3, 6), slice(6, 9)
+"""Numbers of a sample of the IMU: angles of the base, their rates, and the integral of the rates."""
+
+
+class ImuSamples:
+    """The newest samples of the IMU.
+
+    Args:
+        chart: Chart of the base.
+        offset: Time by which the IMU's stamps are behind those of the joints [s].
+        stamps: Check of its stamps.
+
+    Attributes:
+        stamps: See above.
+        measured_at: Time of the newest measurement [s]; NaN before the first.
+    """
+
+    def __init__(self, chart: BaseChart, offset: float, stamps: StampCheck):
+        self.stamps = stamps
+        self.measured_at = math.nan
+        self._chart = chart
+        self._offset = offset
+        self._samples = SortedSamples(CAPACITY, 9)
+        self._turned = np.zeros(3)
+        self._angles = np.zeros(3)
+        self._angles_before = np.zeros(3)
+        self._base = np.zeros(6)
+
+    @property
+    def newest(self) -> float:
+        """Time of the newest sample [s]."""
+        return self._samples.newest
+
+    def start(self) -> None:
+        """Begin without samples."""
+        self._samples.count = 0
+        self.measured_at = math.nan
+        self.stamps.start()
+
+    def receive(self, history: SensorHistory) -> None:
+        """Sort the samples of a cycle in, with the integral of the rates up to each."""
+        samples = self._samples
+        for index, stamp in history.accepted(self.stamps, -math.inf):
+            row = samples.insert(stamp + self._offset)
+            if row < 0:
+                continue
+            history.copy(index, samples.rows[row, :6])
+            for later in range(max(row, 1), samples.count):
+                samples.rows[later, TURNED] = self._turned_at(later - 1, later, 1.0)
+
+    def turned_since(self, time: float) -> np.ndarray | None:
+        """Return how the base has turned since the measurement of a time [s], in its axes; None: not known."""
+        samples = self._samples
+        base = self._base
+        if self.measured_at != time or not samples.newest > time:
+            return None
+        base[3:] = self._angles
+        before = self._chart.to_rotation(base)
+        base[3:] = samples.rows[samples.count - 1, ANGLES]
+        return before.T @ self._chart.to_rotation(base)
+
+    def measure(self, time: float, state: State) -> bool:
+        """Write the base's angles at a time [s], and the mean of their rates since they were measured the last time.
+
+        Args:
+            time: The time [s].
+            state: Where they are written.
+
+        Returns:
+            Whether a sample of the IMU is at that time, or samples are on both sides of it.
+        """
+        samples = self._samples
+        after = int(np.searchsorted(samples.stamps[: samples.count], time))
+        before = after if samples.stamps[after] == time else after - 1
+        if before < 0:
+            return False
+        first = samples.rows[before]
+        second = samples.rows[after]
+        span = float(samples.stamps[after] - samples.stamps[before])
+        share = (time - float(samples.stamps[before])) / span if span else 0.0
+        self._angles_before[:] = self._angles
+        for axis in range(3):
+            turn = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
+            self._angles[axis] = first[axis] + share * turn
+        state.position[3:6] = self._angles
+        turned = self._turned_at(before, after, share)
+        passed = time - self.measured_at
+        if not passed > 0.0:
+            state.velocity[3:6] = first[RATES]
+        elif samples.stamps[0] <= self.measured_at:
+            state.velocity[3:6] = (turned - self._turned) / passed
+        else:  # the samples since then are gone, but for their angles
+            turned_by = self._angles - self._angles_before
+            state.velocity[3:6] = (turned_by - 2.0 * math.pi * np.round(turned_by / (2.0 * math.pi))) / passed
+        self._turned[:] = turned
+        self.measured_at = time
+        samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - KEPT)) - 1))
+        return True
+
+    def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
+        """Return the integral of the rates at a share of the time from one sample to the next, shape (3,) [rad]."""
+        samples = self._samples
+        first = samples.rows[before]
+        second = samples.rows[after]
+        span = samples.stamps[after] - samples.stamps[before]
+        if span > LAG:  # too long for rates: angles do not drift in it
+            turn = second[ANGLES] - first[ANGLES]
+            return first[TURNED] + share * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
+        return first[TURNED] + share * span * (first[RATES] + 0.5 * share * (second[RATES] - first[RATES]))

@@ -1,0 +1,104 @@
+"""A component's part of a cycle of its plugin."""
+
+from collections.abc import Callable, Sequence
+
+from solfer.components import Component
+from solfer.plugins.base_jumps import BaseJumps
+from solfer.plugins.measured_guard import MeasuredGuard
+from solfer.plugins.robot_time import RobotTime
+from solfer.recording.log import Logger
+
+
+class ComponentCycle:
+    """Runs a component: its dynamics and its time, jumps of its base, its failures, what it declares and logs.
+
+    Args:
+        component: The component.
+        robot_time: Its time.
+        jumps: Finds jumps of the base; None: it has no references in the world.
+        guard: Keeps what it does to its Robot, if it fails, away from others; None: nobody shares it.
+        publish: Publish what it declares.
+
+    Attributes:
+        robot_time: See above.
+    """
+
+    def __init__(
+        self,
+        component: Component,
+        robot_time: RobotTime,
+        jumps: BaseJumps | None,
+        guard: MeasuredGuard | None,
+        publish: Sequence[Callable[[], None]],
+    ):
+        self.robot_time = robot_time
+        self._component = component
+        self._jumps = jumps
+        self._guard = guard
+        self._publish = tuple(publish)
+        # made before the first cycle: importing its modules takes a while
+        self._dynamics = component.model.dynamics if component.dynamics else None
+        self._logger: Logger | None = None
+        self._began = 0.0  # [s]
+
+    def start(self, now: float) -> None:
+        """Begin at the time `now` [s], after the component's `init`."""
+        self._began = now
+        self.robot_time.restart(now)
+
+    def start_log(self, logger: Logger) -> None:
+        """Let the component declare what it logs; from now on its `log`, if it has one, is called by `log`."""
+        self._component.start_log(logger)
+        self._logger = logger if type(self._component).log is not Component.log else None
+
+    def advance(self, now: float) -> float:
+        """Let time pass for the component until `now` [s]; return how much has passed [s]."""
+        component = self._component
+        component.passed = passed = self.robot_time.advance(now)
+        component.time_lost = self.robot_time.lost
+        return passed
+
+    def update_dynamics(self) -> None:
+        """Compute the dynamics, if the component asks for them."""
+        if self._dynamics is not None:
+            self._dynamics.update()
+
+    def jump(self) -> None:
+        """Move the component's references with a base whose estimate has jumped."""
+        if self._jumps is not None and (move := self._jumps.find(self._component.passed)):
+            self._component.move_world(move)
+
+    def forget_jumps(self) -> None:
+        """Begin with the base where it is."""
+        if self._jumps is not None:
+            self._jumps.restart()
+
+    def work(self) -> None:
+        """Run the component; if it fails, or leaves numbers that are not finite, others see what was before."""
+        guard = self._guard
+        if guard is None:
+            self._component.update()
+            self._component.send()
+            return
+        guard.keep()
+        try:
+            self._component.update()
+            self._component.send()
+            guard.check()
+        except BaseException:
+            guard.restore()
+            raise
+
+    def publish(self) -> None:
+        """Publish what the component declares."""
+        for publish in self._publish:
+            publish()
+
+    def log(self, now: float) -> None:
+        """Let the component log the cycle of the time `now` [s]."""
+        if self._logger is not None:
+            self._component.log(self._logger, now - self._began)
+
+    def figures(self) -> dict[str, float | str]:
+        """Return figures for health reports."""
+        return {} if self._jumps is None else {"jumps of the base": self._jumps.count}

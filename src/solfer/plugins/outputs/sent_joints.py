@@ -1,0 +1,76 @@
+"""What a plugin has sent to joints last, and how far it has commanded them to move."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from solfer.pipes import JointCommandPipe
+
+NEAR = 0.2
+"""Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
+
+
+class SentJoints:
+    """Commands in joint space: the numbers to send, and those sent last.
+
+    Args:
+        pipes: The pipes.
+        moves: Returns whether joints move by what a pipe sends.
+        period: Time of a control cycle [s].
+
+    Attributes:
+        is_sent: Whether anything was sent since the start.
+        way: How far joints have been commanded to move so far, of each cycle that one which moves farthest [rad, m].
+    """
+
+    def __init__(self, pipes: Sequence[JointCommandPipe], moves: Callable[[JointCommandPipe], bool], period: float):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import keep
+
+        self._keep = keep
+        self._blocks = [
+            (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if moves(pipe) else None)) for pipe in pipes
+        ]
+        self._positions = [
+            (pipe.dofs, sent[row])
+            for pipe, (_, sent, _) in zip(pipes, self._blocks, strict=True)
+            for row, (field, _) in enumerate(pipe.fields)
+            if field == "position"
+        ]
+        self._velocities = [values for pipe in pipes for field, values in pipe.fields if field == "velocity"]
+        self._are_followed = False
+        self.is_sent = False
+        self.way = 0.0
+
+    def keep(self) -> None:
+        """Keep what is sent in this cycle."""
+        way = max([self._keep(*block) for block in self._blocks], default=0.0)
+        if self.is_sent:
+            self.way += way
+        self.is_sent = self._are_followed = True
+
+    def restore(self) -> None:
+        """Let what was sent last be sent again."""
+        for block, sent, _ in self._blocks:
+            block[...] = sent
+
+    def stop(self) -> None:
+        """Let all velocities be zero: a filter still carries the earlier ones."""
+        for values in self._velocities:
+            values.fill(0.0)
+
+    def forget(self) -> None:
+        """Forget what joints follow: others move them now, or the robot is in another state."""
+        self._are_followed = False
+
+    def follow(self, position: np.ndarray) -> None:
+        """Write where joints are that follow what was sent last, beside where they are measured [rad, m]: there."""
+        for dofs, sent in self._positions if self._are_followed else ():
+            follow = np.abs(sent - position[dofs]) <= NEAR
+            position[dofs[follow]] = sent[follow]
+
+
+def _steps(pipe: JointCommandPipe, period: float | None) -> np.ndarray:
+    """Return what makes a way of each row of a pipe, see `solfer.numerics.kernels.keep`; None: no joint moves by it."""
+    steps = {} if period is None else {"position": 0.0, "velocity": period}
+    return np.array([steps.get(field, -1.0) for field, _ in pipe.fields])
