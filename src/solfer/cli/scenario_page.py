@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.cli.tables.scenario import ScenarioTrace
-from solfer.recording.pictures.canvas import FIRST, SECOND, DESIRED, draw, dress, new_figure, outline
+from solfer.recording.pictures.canvas import DESIRED, FIRST, SECOND, draw, dress, new_figure, outline
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

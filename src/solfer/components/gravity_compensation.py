@@ -11,7 +11,6 @@ from solfer.components.base import Component
 from solfer.components.declaration import LiveParameter, Service
 from solfer.components.desired_positions import DesiredPositions
 from solfer.components.gains import GainsOfGroup, configured_gains, live_gains
-from solfer.components.desired_positions import DesiredPositions
 from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.dynamics import BIAS, CarryingTorques

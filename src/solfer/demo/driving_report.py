@@ -132,8 +132,8 @@ def table(
     times = recorder.clock.times(seen.time)
     distance = float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
-    wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
-    base = np.linalg.norm(wanted - wanted[0] - (seen.tracked - seen.tracked[0]), axis=1)
+    desired = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
+    base = np.linalg.norm(desired - desired[0] - (seen.tracked - seen.tracked[0]), axis=1)
     names = tuple(f"{wheel}.{axis}" for wheel in WHEELS for axis in "xy")
     vertices = _at(recording["locomotion/log/vertex_reference"], times, names).reshape(-1, 4, 2) - seen.vertices
     names = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")

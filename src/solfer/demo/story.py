@@ -93,7 +93,9 @@ def drive(distance: float, radius: float, forward: dict[str, float], speed: floa
     turn = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
     direction = "forward" if distance > 0.0 else "back"
     return [
-        StoryStep(f"{abs(distance):g} m {direction}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed),
+        StoryStep(
+            f"{abs(distance):g} m {direction}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed
+        ),
         StoryStep("wheels stop", {LOWER: MoveJoints(joints=joints, velocities=(0.0,) * len(joints))}),
     ]
 

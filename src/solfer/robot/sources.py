@@ -68,7 +68,7 @@ def read_semantics(
 
 
 def is_robot_read(configuration: Configuration) -> bool:
-    """Whether what is said of the robot could be read; if not, the reason has been reported, and its name is not known."""
+    """Whether the robot could be read; if not, the reason has been reported, and its name is not known."""
     robot = configuration.robot
     return robot is not None and (bool(robot.name) or _head_of_name(configuration).path[-1] != "name")
 

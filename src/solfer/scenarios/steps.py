@@ -126,7 +126,9 @@ class _Move(PlayedStep):
         far = np.abs(self._base - script.base)
         distances = np.where(far <= self._base_near, 0.0, far).tolist()
         speeds = script.base_speed.tolist()
-        base = max(_straight(distance, speed * script.period) for distance, speed in zip(distances, speeds, strict=True))
+        base = max(
+            _straight(distance, speed * script.period) for distance, speed in zip(distances, speeds, strict=True)
+        )
         left = np.abs(self._vertices - script.vertices).ravel().tolist()
         shares = script.vertex_speed.ravel().tolist()
         return max(base, *(_exponential(*each, script.period) for each in zip(left, shares, strict=True)))

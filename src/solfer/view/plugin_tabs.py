@@ -104,7 +104,7 @@ class _PluginTab:
             buttons = self._gui.add_button_group("life", ("start", "stop", "abort"), disabled=self._control is None)
             with self._gui.add_folder("parameters", expand_by_default=False):
                 for index, name in enumerate(reply.names):
-                    self._add_parameter(name, reply, index)
+                    self._controls[name] = self._make_control(name, reply, index)
 
         @buttons.on_click
         async def _(event: GuiEvent[Any]) -> None:
@@ -118,7 +118,7 @@ class _PluginTab:
         else:
             self._requests.call(f"{self._name}/switch", SWITCH_ONE, Flag(verb == "start"), Answer)
 
-    def _add_parameter(self, name: str, reply: ParametersReply, index: int) -> None:
+    def _make_control(self, name: str, reply: ParametersReply, index: int) -> Control:
         value = reply.values[index]
         unit = reply.units[index]
         description = reply.descriptions[index]
@@ -145,6 +145,8 @@ class _PluginTab:
             if event.client is not None:
                 text = control.value if isinstance(control.value, str) else json.dumps(control.value)
                 self._requests.submit(partial(self._set, event.client_id, name, text))
+
+        return control
 
     def _set(self, client: int | None, name: str, text: str) -> None:
         if self._control is not None and self._control.may_command(client):

@@ -79,7 +79,9 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
     return 0.25 * square / 3.0
 
 
-def _measure_displacements(jacobian, before, arms, arms_before, step, turned, weights, displacements, mean, arm, tilting):
+def _measure_displacements(
+    jacobian, before, arms, arms_before, step, turned, weights, displacements, mean, arm, tilting
+):
     """Write the ways that wheels measure, with mean Jacobians and arms, and the way of the ground point by tilting."""
     px = turned[0]
     py = turned[1]
@@ -182,7 +184,11 @@ def height_above_others(weights, arms, normal, i, slope):
 @part
 def along_normal(displacements, arms, i, turn, x, y, z):
     """Return what a wheel measures of the base's way along a normal x, y, z, with a turn about the vertical [m]."""
-    return x * (displacements[i, 0] + turn * arms[i, 1]) + y * (displacements[i, 1] - turn * arms[i, 0]) + z * displacements[i, 2]
+    return (
+        x * (displacements[i, 0] + turn * arms[i, 1])
+        + y * (displacements[i, 1] - turn * arms[i, 0])
+        + z * displacements[i, 2]
+    )
 
 
 @part
@@ -272,7 +278,9 @@ turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
 joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
 mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_V}, {_V}, {_M})", _mean_rate)
-measure_displacements = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_displacements)
+measure_displacements = cached(
+    f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_displacements
+)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
 learn_spreads = cached(f"void({_M}, {_M}, {_V}, {_F}, {_B}, {_F}, {_V}, {_V}, {_V})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)

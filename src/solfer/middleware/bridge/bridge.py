@@ -131,7 +131,9 @@ class Bridge:
         """Refuse the requests that still wait."""
         self.forwarding.close()
 
-    def _open(self, routes: Iterable[Route], source: Middleware, target: Middleware, forwards: list[ForwardedTopic]) -> None:
+    def _open(
+        self, routes: Iterable[Route], source: Middleware, target: Middleware, forwards: list[ForwardedTopic]
+    ) -> None:
         """Start forwarding topics from `source` to `target`; one that crosses already stays as it is."""
         for route in routes:
             if route.topic not in self.crossings:

@@ -115,7 +115,9 @@ class Switchboard:
             if plugin in switch.start:
                 raise MiddlewareError(f"'{plugin.name}' is to start and to stop", expected="one of the two")
             if not plugin.active:
-                raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.explanation}", expected="a plugin that runs")
+                raise MiddlewareError(
+                    f"'{plugin.name}' does not run: {plugin.explanation}", expected="a plugin that runs"
+                )
         for plugin in switch.start:
             if plugin.state not in STARTABLE:
                 raise MiddlewareError(

@@ -20,7 +20,7 @@ class SentJoints:
 
     Attributes:
         is_sent: Whether anything was sent since the start.
-        way: How far joints have been commanded to move so far, of each cycle that one which moves farthest [rad, m].
+        distance: Sum over all cycles of the largest commanded step of a joint [rad, m].
     """
 
     def __init__(self, pipes: Sequence[JointCommandPipe], moves: Callable[[JointCommandPipe], bool], period: float):
@@ -40,13 +40,13 @@ class SentJoints:
         self._velocities = [values for pipe in pipes for field, values in pipe.fields if field == "velocity"]
         self._are_followed = False
         self.is_sent = False
-        self.way = 0.0
+        self.distance = 0.0
 
     def keep(self) -> None:
         """Keep what is sent in this cycle."""
-        way = max([self._keep(*block) for block in self._blocks], default=0.0)
+        farthest = max([self._keep(*block) for block in self._blocks], default=0.0)
         if self.is_sent:
-            self.way += way
+            self.distance += farthest
         self.is_sent = self._are_followed = True
 
     def restore(self) -> None:
@@ -71,6 +71,6 @@ class SentJoints:
 
 
 def _steps(pipe: JointCommandPipe, period: float | None) -> np.ndarray:
-    """Return what makes a way of each row of a pipe, see `solfer.numerics.kernels.keep`; None: no joint moves by it."""
+    """Return the time that each row of a pipe acts [s], see `solfer.numerics.kernels.keep`; 0: places, -1: neither."""
     steps = {} if period is None else {"position": 0.0, "velocity": period}
     return np.array([steps.get(field, -1.0) for field, _ in pipe.fields])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.recording.model import Channel, Recording
-from solfer.recording.pictures.canvas import FIRST, FONT, DESIRED, WRONG, draw, dress, new_figure
+from solfer.recording.pictures.canvas import DESIRED, FIRST, FONT, WRONG, draw, dress, new_figure
 from solfer.recording.pictures.tracks import Track, tracks_of
 from solfer.recording.requests import EventGroup, grouped
 

@@ -55,7 +55,9 @@ def message_of(interface: str, value: Any) -> Message:
     header = fields.get("header", {})
     frame = header.get("frame_id", "")
     stamp = header.get("stamp", 0.0)
-    numbers = np.array([float(_at(fields, path).get(name, 0.0)) for path, names in _PLACES[interface] for name in names])
+    numbers = np.array(
+        [float(_at(fields, path).get(name, 0.0)) for path, names in _PLACES[interface] for name in names]
+    )
     if interface in WRENCH_MESSAGES:
         return WrenchMessage(frame, numbers[:3], numbers[3:], stamp=stamp)
     return VectorMessage(frame, numbers, stamp)

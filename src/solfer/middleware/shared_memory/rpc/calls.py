@@ -95,7 +95,9 @@ class Calls:
         if pending.answer.done():
             return
         if not pending.sent and self._offered(pending):
-            pending.sent = self._channel(pending).requests.send(pending.number, [pending.latest, packed(pending.request)])
+            pending.sent = self._channel(pending).requests.send(
+                pending.number, [pending.latest, packed(pending.request)]
+            )
         if self._now() < pending.latest:
             return
         if not pending.sent and not self._offered(pending):
