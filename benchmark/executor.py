@@ -27,7 +27,7 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
 from solfer.supervision import supervise
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -185,7 +185,7 @@ def report(figures: Figures, statistics: RuntimeStatistics, before, skipped: int
     count = histograms.count(0)
     print(statistics.text(), file=sys.stderr)
     figures.row("layer", rate=statistics.rate, plugins=len(statistics.plugins), cycles=count)
-    for row, name in enumerate(LOOP):
+    for row, name in enumerate(LOOP_HISTOGRAMS):
         p50, p99 = (1e-3 * histograms.quantile(row, share) for share in (0.5, 0.99))
         left_out = skipped if name == "lateness" else None
         figures.row(name, p50_us=p50, p99_us=p99, max_us=1e-3 * histograms.longest(row), skipped=left_out)

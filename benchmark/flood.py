@@ -23,7 +23,7 @@ import rosgraph
 import rospy
 from sensor_msgs.msg import JointState
 
-from solfer.middleware.ros.codecs.packed_message import LENGTH
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 from solfer.msg import JointCommand
 from solfer.srv import ClaimJoints, ClaimJointsRequest
 from solfer.supervision import supervise
@@ -36,7 +36,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 class Large(JointCommand):
     """A command with 1e6 names, packed once."""
 
-    BYTES = bytes(16) + LENGTH.pack(10**6) + 10**6 * (LENGTH.pack(1) + b"x") + bytes(20)
+    BYTES = bytes(16) + MESSAGE_LENGTH.pack(10**6) + 10**6 * (MESSAGE_LENGTH.pack(1) + b"x") + bytes(20)
 
     def serialize(self, buffer) -> None:
         """Write the bytes."""

@@ -117,15 +117,15 @@ class Kept:
         self._before, distance = desired, abs(error)
         if desired:
             self._rest = 0.0
-        elif distance < (kernel.AWAKE if self._rest else kernel.SMALL):
-            self._rest = kernel.PERSISTENT
+        elif distance < (kernel.AWAKE if self._rest else kernel.STEERING_SMALLNESS):
+            self._rest = kernel.STEERING_PERSISTENT
         else:
             self._rest = max(self._rest - self._period, 0.0)
         if not self._rest:
             velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.RESTING / max(distance, 1e-300))
             aim = nearest(cmath.phase(velocity), self.angle)
             way = abs(velocity) * self._period
-            self.angle += (1.0 - math.exp(-way / steering.RELAXATION)) * (aim - self.angle)
+            self.angle += (1.0 - math.exp(-way / steering.STEERING_RELAXATION)) * (aim - self.angle)
         return self.angle
 
 
@@ -204,7 +204,7 @@ class WheeledLaw:
             lower, upper, begun = bounds.lower_position[dof], bounds.upper_position[dof], self._ways[index]
             angle = math.atan2(state.rolling[index, 1], state.rolling[index, 0])
             way = begun + soft(aims[index], angle + begun, math.pi, math.pi)
-            end, step = state.position[dof] + row * way, kernel.AHEAD * self._period * self.velocity[dof]
+            end, step = state.position[dof] + row * way, kernel.STEERING_LEAD * self._period * self.velocity[dof]
             is_inside = lower < end < upper
             is_next_inside = lower < self.position[dof] + step < upper
             other = way - math.copysign(math.pi, step * row if is_inside and not is_next_inside else way)

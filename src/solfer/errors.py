@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-LONGEST = 200  # characters of a name that could be a typing error; a long one takes long to compare
+LONGEST_NAME = 200  # characters of a name that could be a typing error; a long one takes long to compare
 
 
 def nearest(name: str, names: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
@@ -20,7 +20,7 @@ def nearest(name: str, names: Iterable[str], count: int = 3, likeness: float = 0
         count: Most names that are returned.
         likeness: Least likeness of a name that is returned, of 1.
     """
-    if len(str(name)) > LONGEST:
+    if len(str(name)) > LONGEST_NAME:
         return []
     by_folded: dict[str, str] = {}
     for candidate in names:
@@ -221,7 +221,7 @@ def _quoted(error: SolferError) -> set[str]:
 FRAMES = 4
 """Most places of an error in the code of others."""
 
-_OWN = os.path.dirname(__file__) + os.sep
+_NAME_OWN = os.path.dirname(__file__) + os.sep
 _LIBRARIES = ("/site-packages/", "/dist-packages/", "/lib/python3")
 
 LONGEST_TEXT = 2000
@@ -265,7 +265,7 @@ def _places(error: BaseException) -> list[str]:
     import traceback
 
     walked = [(frame.f_code, line) for frame, line in traceback.walk_tb(error.__traceback__)]
-    foreign = [(code, line) for code, line in walked if not code.co_filename.startswith((_OWN, "<frozen"))]
+    foreign = [(code, line) for code, line in walked if not code.co_filename.startswith((_NAME_OWN, "<frozen"))]
     authors = [each for each in foreign if not any(folder in each[0].co_filename for folder in _LIBRARIES)]
     shown = (authors or foreign)[-FRAMES:] or ([] if isinstance(error, SolferError) else walked[-1:])
     return [f"{code.co_filename}:{line} in {code.co_name}" for code, line in shown]

@@ -5,7 +5,7 @@ import os
 import stat
 from typing import BinaryIO
 
-LARGEST = 64 << 20
+FILE_BYTES = 64 << 20
 """Most bytes of a file that is read whole."""
 
 
@@ -25,15 +25,15 @@ def open_regular(path: str | os.PathLike) -> BinaryIO:
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:
-    """Read a whole file of up to `LARGEST` bytes; see `open_regular`.
+    """Read a whole file of up to `FILE_BYTES` bytes; see `open_regular`.
 
     Raises:
         OSError: The file cannot be read, or is larger.
     """
     with open_regular(path) as file:
-        content = file.read(LARGEST + 1)
+        content = file.read(FILE_BYTES + 1)
     if content is None:
         raise OSError(errno.EAGAIN, "there is nothing to read yet", str(path))
-    if len(content) > LARGEST:
-        raise OSError(errno.EFBIG, f"more than {LARGEST >> 20} MiB", str(path))
+    if len(content) > FILE_BYTES:
+        raise OSError(errno.EFBIG, f"more than {FILE_BYTES >> 20} MiB", str(path))
     return content

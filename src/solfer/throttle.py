@@ -6,7 +6,7 @@ import time
 KEYS = 64
 """Number of keys that are distinguished."""
 
-OTHERS = "others"
+OTHER_KEYS = "others"
 
 
 class Throttle:
@@ -27,7 +27,7 @@ class Throttle:
         """Log `text` (with `args`, as in logging) unless `key` was logged less than `interval` ago."""
         now = time.monotonic()
         if key not in self._last and len(self._last) >= KEYS and not self._make_room(now):
-            key = OTHERS
+            key = OTHER_KEYS
         if now - self._last.get(key, -float("inf")) < self._interval:
             self._held[key] = self._held.get(key, 0) + 1
             return

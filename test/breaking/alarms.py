@@ -10,7 +10,7 @@ from breaking.sensors import PERIOD, Saying, logged
 from solfer.demo.waving import Waving
 from solfer.middleware.memory import FaultsRecord, MemoryMiddleware, read_faults
 from solfer.simulation import Simulation, SimulationServer, read_bundle
-from solfer.transport.lower_level import REFUSED
+from solfer.transport.lower_level import REFUSALS_TOPIC
 from solfer.transport.messages import FieldsMessage
 
 ALARMS = (
@@ -70,7 +70,7 @@ def find_alarms(seed: int, duration: float) -> tuple[list[tuple[float, str]], bo
         The alarms, each with its time [s], and whether the robot lies in the end. A joint that is named because it is
         faster than it may be, and was, as in a fall on it, is no false alarm.
     """
-    faults = _without_loss(read_faults(CONFIG / "transport" / "bad.yaml"), REFUSED) if seed % 2 else None
+    faults = _without_loss(read_faults(CONFIG / "transport" / "bad.yaml"), REFUSALS_TOPIC) if seed % 2 else None
     draw = np.random.default_rng(seed)
     with closing(Noisy(None, faults)) as world:
         log = Saying(lambda: world.bus.time)

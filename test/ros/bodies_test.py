@@ -14,7 +14,7 @@ from system import START, Robot, numbers, wait_for, wait_for_plugin
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.table import codec
 from solfer.msg import RobotPoints
-from solfer.transport.messages import POINTS
+from solfer.transport.messages import ROBOT_POINTS
 
 HAND = "arm1_7"
 NEAR = 3e-3
@@ -67,12 +67,12 @@ class BodiesTest(unittest.TestCase):
     def test_several_points_are_decoded(self):
         points = RobotPoints(name=["a", "b"], count=2, value=[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
         points.header.frame_id = "pelvis"
-        read = codec(POINTS).decode(self.packed(points), "/sender")
+        read = codec(ROBOT_POINTS).decode(self.packed(points), "/sender")
         self.assertEqual((read.frame, read.names, read.sender), ("pelvis", ("a", "b"), "/sender"))
         np.testing.assert_array_equal(read.values, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
         for wrong in (RobotPoints(), RobotPoints(count=2, value=[1.0]), RobotPoints(name=["a"], count=2, value=[1, 2])):
             with self.assertRaises(PipeError):
-                codec(POINTS).decode(self.packed(wrong), "")
+                codec(ROBOT_POINTS).decode(self.packed(wrong), "")
 
     @staticmethod
     def packed(message):

@@ -13,7 +13,7 @@ from std_srvs.srv import Trigger
 from system import START, Robot, insist, move, soak, wait_for, wait_for_plugin
 
 from solfer.lower_level.records import RationRecord
-from solfer.middleware.ros.codecs.packed_message import LENGTH
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 from solfer.msg import JointCommand
 from solfer.srv import ClaimJoints, ClaimJointsRequest, ListControllers
 
@@ -24,7 +24,7 @@ RATION = RationRecord()
 class Large(JointCommand):
     """A command with many names, packed once."""
 
-    BYTES = bytes(16) + LENGTH.pack(NAMES) + NAMES * (LENGTH.pack(1) + b"x") + bytes(20)
+    BYTES = bytes(16) + MESSAGE_LENGTH.pack(NAMES) + NAMES * (MESSAGE_LENGTH.pack(1) + b"x") + bytes(20)
 
     def serialize(self, buffer):
         buffer.write(self.BYTES)

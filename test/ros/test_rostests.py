@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from solfer.realtime.telemetry.recordings import KEPT, write_kept
+from solfer.realtime.telemetry.recordings import RECORDINGS_VARIABLE, write_kept
 from solfer.supervision import descendants
 
 FOLDER = Path(__file__).parent
@@ -74,7 +74,7 @@ def check(path: Path, repository: Path, tmp_path: Path, **environment: str) -> N
     """Run the tests of a file, and leave what its nodes have recorded if one of them fails."""
     # Not --text: in that mode rostest reports success whatever happens.
     options = ["--pkgdir", str(repository), "--package", "solfer", "--results-base-dir", str(tmp_path)]
-    environment[KEPT] = str(tmp_path / "recordings")
+    environment[RECORDINGS_VARIABLE] = str(tmp_path / "recordings")
     code, output = run(["rostest", *options, str(path)], tmp_path / "output", **environment)
     count, failures = results(tmp_path)
     if code or not count:

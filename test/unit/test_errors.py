@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.errors import (
-    LONGEST,
+    LONGEST_NAME,
     LONGEST_TEXT,
     ConfigError,
     SolferErrors,
@@ -74,9 +74,9 @@ def test_an_error_repeats_another_at_its_place(what, where, repeated):
 
 
 def test_long_names_are_not_compared():
-    known = ["a" * LONGEST, "b"]
-    assert nearest("a" * LONGEST, known) == known[:1]
-    assert nearest("a" * (LONGEST + 1), known) == []
+    known = ["a" * LONGEST_NAME, "b"]
+    assert nearest("a" * LONGEST_NAME, known) == known[:1]
+    assert nearest("a" * (LONGEST_NAME + 1), known) == []
 
 
 @pytest.mark.parametrize("length", [LONGEST_TEXT, LONGEST_TEXT + 1])

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from solfer.errors import SolferError
 
-SCRIPT = """_solfer() {
+BASH_SCRIPT = """_solfer() {
   local IFS=$'\\n'
   COMPREPLY=($(solfer completion -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null))
   [[ ${#COMPREPLY[@]} -ne 1 || ${COMPREPLY[0]} != */ ]] || compopt -o nospace

@@ -16,7 +16,7 @@ from importlib import import_module
 
 from solfer.errors import SolferError, SolferErrors
 
-COMMANDS = {
+SUB_COMMANDS = {
     "check": "commands.check",
     "show": "commands.show",
     "list": "commands.listing",
@@ -85,7 +85,7 @@ def _open_streams() -> None:
 def _run(words: Sequence[str]) -> int:
     """Run a command; see `main`."""
     # a parser of one command is there in a fifth of the time: an emergency stop waits for it
-    known = words[:1] if words and words[0] in COMMANDS else COMMANDS
+    known = words[:1] if words and words[0] in SUB_COMMANDS else SUB_COMMANDS
     options, unknown = parser(known).parse_known_args(words)
     if unknown:  # the sub-command prints its usage; the root's parser knows only the names of commands
         options.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -98,7 +98,7 @@ def _run(words: Sequence[str]) -> int:
         return error.exit_code
 
 
-def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
+def parser(names: Iterable[str] = SUB_COMMANDS) -> argparse.ArgumentParser:
     """Build the parser of the command line, with some of the sub-commands."""
     parser = argparse.ArgumentParser(
         prog="solfer",
@@ -106,7 +106,7 @@ def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name in names:
-        module = import_module(f"solfer.cli.{COMMANDS[name]}")
+        module = import_module(f"solfer.cli.{SUB_COMMANDS[name]}")
         summary, _, text = (module.__doc__ or "").partition("\n")
         command = commands.add_parser(
             name, help=summary, description=f"{summary}\n{text}".strip(),

@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.cli.tables.scenario import ScenarioTrace
-from solfer.recording.pictures.canvas import DESIRED, FIRST, SECOND, draw, dress, new_figure, outline
+from solfer.recording.pictures.canvas import (
+    DESIRED_LINE_COLOR,
+    FIRST_COLOR,
+    SECOND_COLOR,
+    draw,
+    dress,
+    new_figure,
+    outline,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,10 +30,12 @@ def scenario_page(trace: ScenarioTrace) -> "Figure":
     for leg in range(trace.scenario.legs):
         along = trace.vertices[:, leg, 0]
         across = trace.vertices[:, leg, 1]
-        above.plot(x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED, linewidth=0.7)
-    above.plot(x, y, color=FIRST)
+        above.plot(
+            x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED_LINE_COLOR, linewidth=0.7
+        )
+    above.plot(x, y, color=FIRST_COLOR)
     ends = np.cumsum((0, *trace.scenario.periods))
-    above.plot(x[ends], y[ends], "o", color=SECOND, markersize=3)
+    above.plot(x[ends], y[ends], "o", color=SECOND_COLOR, markersize=3)
     above.set_aspect("equal", adjustable="datalim")
     dress(above, "base (blue) and vertices from above [m]")
     times = trace.times

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-LARGEST = 65536
+REQUEST_BYTES = 65536
 """Bytes of a request, unless its service wants it otherwise."""
 
 
@@ -52,7 +52,7 @@ class Service:
     handler: Callable[[Any], Any]
     timeout: float = 2.0
     prepare: Callable[[Any], Any] | None = None
-    largest: int = LARGEST
+    largest: int = REQUEST_BYTES
     urgent: bool = False
     quick: bool = False
 

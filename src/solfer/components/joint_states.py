@@ -26,7 +26,7 @@ from solfer.errors import ComponentError, SolferError, UnknownName, described
 from solfer.numerics.ramp import Ramp
 from solfer.numerics.turns import whole_turns
 from solfer.recording.log import Logger
-from solfer.recording.model import JOINTS
+from solfer.recording.model import JOINTS_KIND
 from solfer.robot import Robot
 
 
@@ -181,12 +181,12 @@ class JointStates(Component):
     def start_log(self, logger: Logger) -> None:
         """Declare the ramp: where the joints are on it, where it leads and how far they are from it; and the wheels."""
         names, wheels = ([self.model.dofs[dof] for dof in part] for part in (self._joints, self._wheels))
-        logger.add("ramp/position", self._position, names, "rad", kind=JOINTS)
-        logger.add("ramp/velocity", self._velocity, names, "rad/s", kind=JOINTS)
-        logger.add("goal/position", self._goal, names, "rad", kind=JOINTS)
-        logger.add("error/position", self._error, names, "rad", kind=JOINTS)
-        logger.add("wheels/velocity", self._speeds.velocity, wheels, "rad/s", kind=JOINTS)
-        logger.add("wheel_goal/velocity", self._speeds.goal, wheels, "rad/s", kind=JOINTS)
+        logger.add("ramp/position", self._position, names, "rad", kind=JOINTS_KIND)
+        logger.add("ramp/velocity", self._velocity, names, "rad/s", kind=JOINTS_KIND)
+        logger.add("goal/position", self._goal, names, "rad", kind=JOINTS_KIND)
+        logger.add("error/position", self._error, names, "rad", kind=JOINTS_KIND)
+        logger.add("wheels/velocity", self._speeds.velocity, wheels, "rad/s", kind=JOINTS_KIND)
+        logger.add("wheel_goal/velocity", self._speeds.goal, wheels, "rad/s", kind=JOINTS_KIND)
 
     def log(self, logger: Logger, time: float) -> None:
         """See `Component.log`: how far the measured joints are from the ramp."""

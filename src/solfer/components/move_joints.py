@@ -63,7 +63,7 @@ class CmndReply:
     message: str = ""
 
 
-FASTEST = 2.0
+ORIGINAL_TOP_SPEED = 2.0
 """Speed to which `JointStateCmnd` is limited, as in the original program [rad/s]."""
 
 
@@ -104,7 +104,7 @@ class JointGoals:
             raise NotFinite(f"velocity or pos_step of '{name}' is not a finite number")
         if command.pos_step < 0.0:
             raise ComponentError(f"pos_step {command.pos_step:g} rad", expected="a positive number, or 0")
-        speed = min(command.pos_step / period, FASTEST)
+        speed = min(command.pos_step / period, ORIGINAL_TOP_SPEED)
         if name == RESET or name in self._robot.semantics.states:
             return MoveJoints(state=name, speed=speed)
         if name in self._wheel_place:

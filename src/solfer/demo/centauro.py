@@ -19,13 +19,13 @@ HIGH = "mammal_wide_high"
 DISTANCE = 0.5
 """Distance that the robot drives [m]."""
 
-REACH = {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}
+UPPER_BODY_GOAL = {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}
 """Goal of the upper body while the legs rise [rad]."""
 
-DRAWN = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
+DRAWN_JOINTS = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
 """Joints whose tracking is drawn."""
 
-SIMULATOR = "simulation"
+SIMULATION_REPORT = "simulation"
 """Name of its health report."""
 
 INTERRUPTED = 130
@@ -101,7 +101,7 @@ def steps_of(robot: Robot, recorder: MotionRecorder) -> list[story.StoryStep]:
     """Return the story: legs rise while the torso turns, both go back, and the robot drives there and back."""
     forward, radius = wheels(robot, recorder)
     return [
-        *story.raised(HIGH, REACH),
+        *story.raised(HIGH, UPPER_BODY_GOAL),
         *story.posture(LOW),
         *story.drive(DISTANCE, radius, forward),
         *story.drive(-DISTANCE, radius, forward),
@@ -116,10 +116,10 @@ def conclude(show: story.Show, robot: Robot, recorder: MotionRecorder, plugin: s
     tracking = show.output / "demo_tracking.png"
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
         renderer.save(posture(robot, recorder), picture)
-    report.plot(recorder, DRAWN, tuple(forward), path=tracking)
+    report.plot(recorder, DRAWN_JOINTS, tuple(forward), path=tracking)
     print(
         report.format_table(
-            report.table(recorder, parts(robot), show.middleware.reports(), plugin=plugin, simulator=SIMULATOR)
+            report.table(recorder, parts(robot), show.middleware.reports(), plugin=plugin, simulator=SIMULATION_REPORT)
         )
     )
     print(f"pictures: {picture}, {tracking}")

@@ -20,10 +20,10 @@ from solfer.transport.plugin_state import SAFE_STOP
 COURSE = "package://solfer/config/figures/course.yaml"
 """The scenario that is played."""
 
-RATE = 50.0
+COURSE_RATE = 50.0
 """Of navigation and of what waves [Hz]."""
 
-BRAKING, AT_REST, MANY = 3.0, 0.05, 20
+BRAKING_TIME, REST_SPEED, MANY = 3.0, 0.05, 20
 """Longest time in which it comes to rest, on a busy machine [s], and the largest speed of a wheel there [rad/s], in so
 many messages: a body that rocks on its legs turns the wheels to and fro, and they stand for a moment between."""
 
@@ -33,7 +33,13 @@ NEARLY = 0.999
 FORGIVING = 5.0
 """How long a part of the system may be in error [s]."""
 
-TITLES = {2: "drives, becomes narrower", 3: "through the gate", 4: "becomes wider", 5: "along a circle", 6: "stands"}
+STEP_TITLES = {
+    2: "drives, becomes narrower",
+    3: "through the gate",
+    4: "becomes wider",
+    5: "along a circle",
+    6: "stands",
+}
 """What the steps of the course are, by their numbers."""
 
 
@@ -97,7 +103,7 @@ class Driving:
         self.taken = 0.0
         self.robot = robot
         self.legs = legs
-        self._player = Player(read_scenario(course), 1.0 / RATE)
+        self._player = Player(read_scenario(course), 1.0 / COURSE_RATE)
 
     def run(self, progress: Progress, check: Callable[[], None] = lambda: None) -> int:
         """Drive to the end of the course; return the exit code.
@@ -108,7 +114,7 @@ class Driving:
         """
         middleware = self._middleware
         course = ScenarioCourse(middleware, self._player, "locomotion", odometry="odometry/odom", positions=True)
-        navigation = Navigation(middleware, course, "navigation", rate=RATE)
+        navigation = Navigation(middleware, course, "navigation", rate=COURSE_RATE)
         waving = Waving(middleware, "hands", hands_of(self.robot))
         begin = middleware.now()
         whole = course.left
@@ -125,7 +131,9 @@ class Driving:
             if cycles % 10 == 0:
                 check()
                 complaints.check()
-                title = f"waits for {navigation.waits}" if navigation.waits else TITLES.get(course.number, course.name)
+                title = (
+                    f"waits for {navigation.waits}" if navigation.waits else STEP_TITLES.get(course.number, course.name)
+                )
                 if title != shown:
                     progress.end()
                     shown = title
@@ -133,7 +141,7 @@ class Driving:
             cycles += 1
 
         try:
-            FixedRateLoop(middleware, RATE).run(cycle, lambda: middleware.running() and not navigation.done)
+            FixedRateLoop(middleware, COURSE_RATE).run(cycle, lambda: middleware.running() and not navigation.done)
         finally:
             self._rest(course)
         self.taken = middleware.now() - begin
@@ -145,11 +153,11 @@ class Driving:
 
     def _rest(self, course: ScenarioCourse) -> None:
         """Let the robot come to rest, as far as it does so soon."""
-        end = time.monotonic() + BRAKING
+        end = time.monotonic() + BRAKING_TIME
         looks = 0
-        while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(MANY) >= AT_REST):
+        while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(MANY) >= REST_SPEED):
             course.rest()
-            time.sleep(1.0 / RATE)
+            time.sleep(1.0 / COURSE_RATE)
             self._recorder.look()
             looks += 1
 

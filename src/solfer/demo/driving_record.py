@@ -4,7 +4,7 @@ from solfer.demo.record import ArrivalClock
 from solfer.transport import BodyMessage, JointMessage, Middleware
 from solfer.transport.messages import PointsMessage
 
-TOPICS = {
+RECORDED_TOPICS = {
     "measured": ("joint_states", "sensor_msgs/JointState", "joint states of the robot"),
     "base": ("floating_base", "nav_msgs/Odometry", "true base of a simulated robot"),
     "odometry": ("odometry/odom", "nav_msgs/Odometry", "estimate of the base"),
@@ -14,7 +14,7 @@ TOPICS = {
 }
 """Topics that are received: topic, message, and what it is for people."""
 
-WHEEL = "j_wheel_"
+WHEEL_PREFIX = "j_wheel_"
 """Beginning of the names of the wheels' joints."""
 
 
@@ -31,8 +31,12 @@ class DrivingRecorder:
     def __init__(self, middleware: Middleware):
         self.clock = ArrivalClock()
         self._now = middleware.now
-        self._queues = {name: middleware.queue(topic, carries, 4000) for name, (topic, carries, _) in TOPICS.items()}
-        self._messages: dict[str, list[JointMessage | BodyMessage | PointsMessage]] = {name: [] for name in TOPICS}
+        self._queues = {
+            name: middleware.queue(topic, carries, 4000) for name, (topic, carries, _) in RECORDED_TOPICS.items()
+        }
+        self._messages: dict[str, list[JointMessage | BodyMessage | PointsMessage]] = {
+            name: [] for name in RECORDED_TOPICS
+        }
 
     def look(self) -> None:
         """Keep what has arrived."""
@@ -44,13 +48,13 @@ class DrivingRecorder:
 
     def missing(self) -> str:
         """Return what has not been received yet; empty: nothing."""
-        for name, (topic, _, what) in TOPICS.items():
+        for name, (topic, _, what) in RECORDED_TOPICS.items():
             if not self._messages[name]:
                 return f"the {what}, on {topic}"
         return ""
 
     def newest(self, name: str) -> JointMessage | BodyMessage | PointsMessage | None:
-        """Return the newest message of one of `TOPICS`; None before the first."""
+        """Return the newest message of one of `RECORDED_TOPICS`; None before the first."""
         return self._messages[name][-1] if self._messages[name] else None
 
     def fastest_wheel(self, count: int) -> float:
@@ -60,10 +64,10 @@ class DrivingRecorder:
             for message in self._messages["measured"][-count:]
             if isinstance(message, JointMessage)
             for name, speed in zip(message.names, message.velocity, strict=True)
-            if name.startswith(WHEEL)
+            if name.startswith(WHEEL_PREFIX)
         )
         return max(wheels, default=0.0)
 
     def messages(self, name: str) -> list[JointMessage | BodyMessage | PointsMessage]:
-        """Return all messages of one of `TOPICS`."""
+        """Return all messages of one of `RECORDED_TOPICS`."""
         return self._messages[name]

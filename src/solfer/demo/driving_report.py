@@ -13,22 +13,22 @@ from solfer.recording.model import Channel, Recording
 from solfer.robot import Robot
 from solfer.transport.middleware import HealthReport
 
-EVERY = 0.04
+LIMIT_PERIOD = 0.04
 """Time between two looks at the robot [s]."""
 
 RING, TUBE = 0.01, 0.068
 """Radii of a wheel [m]."""
 
-SLOW, LEFT_OUT = 0.95, 0.1
+REAL_TIME_FACTOR, LEFT_OUT = 0.95, 0.1
 """Real-time factor below which, and share of left-out periods above which, real time was not held."""
 
-DRIFT, HEADING, HANDS, TILT = 0.3, 0.8, 50.0, 30.0
+DRIFT, LIMIT_HEADING, LIMIT_HANDS, LIMIT_TILT = 0.3, 0.8, 50.0, 30.0
 """Largest figures: odometry against truth [% of the way, degrees], hands [mm], and lean of what stands [degrees]."""
 
-OUTSIDE = "  <-- more than "
+EXCESS_MARK = "  <-- more than "
 """Marks a figure that is larger than it may be."""
 
-WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
+WHEEL_NAMES = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
 PLUGINS = ("hands", "odometry", "ground_forces", "locomotion", "full_compensation")
 
 
@@ -66,7 +66,7 @@ def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
     rows = []
     last = -math.inf
     for message in recorder.messages("base"):
-        if message.stamp - last < EVERY or message.stamp > times[-1]:
+        if message.stamp - last < LIMIT_PERIOD or message.stamp > times[-1]:
             continue
         last = message.stamp
         q = robot.state.position
@@ -83,7 +83,7 @@ def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
         tracked = legs.kinematics.center_of_mass[:2].copy()
         robot.center_of_mass.update()
         center = turn.T @ (robot.center_of_mass.value - place)
-        vertices = np.array([(_vertex(robot, wheel) - place) @ turn for wheel in WHEELS])[:, :2]
+        vertices = np.array([(_vertex(robot, wheel) - place) @ turn for wheel in WHEEL_NAMES])[:, :2]
         hands = np.array(list(hands_of(robot).values()))
         rows.append((last, q.copy(), np.array((place[0], place[1], heading)), tracked, center, vertices, hands))
     time, position, base, *others = (np.array(column) for column in zip(*rows, strict=True))
@@ -134,7 +134,7 @@ def table(
     turned = math.degrees(float(seen.base[-1, 2]))
     desired = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
     base = np.linalg.norm(desired - desired[0] - (seen.tracked - seen.tracked[0]), axis=1)
-    names = tuple(f"{wheel}.{axis}" for wheel in WHEELS for axis in "xy")
+    names = tuple(f"{wheel}.{axis}" for wheel in WHEEL_NAMES for axis in "xy")
     vertices = _at(recording["locomotion/log/vertex_reference"], times, names).reshape(-1, 4, 2) - seen.vertices
     names = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")
     hands = _at(recording["hands/log/reference"], times, names).reshape(-1, 2, 3) - seen.hands
@@ -143,11 +143,11 @@ def table(
     lean = math.degrees(float(np.abs(seen.position[:, 3:5]).max()))
     driven = f"{distance:.2f} m, turned by {turned:.0f} degrees"
     rows = [
-        ("driven", driven + bounded(lean, TILT, "degrees of lean: it fell")),
+        ("driven", driven + bounded(lean, LIMIT_TILT, "degrees of lean: it fell")),
         ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
         ("centre of mass of the legs, from its reference", _size(base)),
         ("vertices", _size(np.linalg.norm(vertices, axis=2))),
-        ("hands", _size(off := np.linalg.norm(hands, axis=2)) + bounded(1e3 * float(off.max()), HANDS, "mm")),
+        ("hands", _size(off := np.linalg.norm(hands, axis=2)) + bounded(1e3 * float(off.max()), LIMIT_HANDS, "mm")),
         ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),
         ("odometry against truth", _drift(recorder, seen, distance)),
         ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),
@@ -166,12 +166,12 @@ def _drift(recorder: DrivingRecorder, seen: Seen, distance: float) -> str:
     part = 100.0 * off / distance if distance > 0.1 else 0.0
     share = f", {part:.2f} % of the way" if part else ""
     figure = f"{1e3 * off:.1f} mm{share}, {turned:.2f} degrees at the end"
-    return figure + bounded(part, DRIFT, "%") + bounded(abs(turned), HEADING, "degrees")
+    return figure + bounded(part, DRIFT, "%") + bounded(abs(turned), LIMIT_HEADING, "degrees")
 
 
 def bounded(value: float, most: float, unit: str) -> str:
     """Return what marks a figure: nothing where it is no larger than it may be."""
-    return "" if value <= most else f"{OUTSIDE}{most:g} {unit}"
+    return "" if value <= most else f"{EXCESS_MARK}{most:g} {unit}"
 
 
 def _heading(quaternion: np.ndarray) -> float:
@@ -189,7 +189,7 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
     last = -math.inf
     slid = gone = 0.0
     for message in recorder.messages("base"):
-        if message.stamp - last < EVERY or message.stamp > times[-1]:
+        if message.stamp - last < LIMIT_PERIOD or message.stamp > times[-1]:
             continue
         last = message.stamp
         q = robot.state.position
@@ -202,7 +202,7 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
         place = kinematics.position("pelvis")
         linear = message.linear
         angular = message.angular
-        for wheel in WHEELS:
+        for wheel in WHEEL_NAMES:
             rates = kinematics.jacobian(wheel) @ v
             center = rates[:3] + linear + np.cross(angular, kinematics.position(wheel) - place)
             spin = rates[3:] + angular
@@ -249,7 +249,11 @@ def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waite
         return ""
     share = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
     lost = float(reports["simulation"].values.get("time lost [s]", 0.0)) if "simulation" in reports else 0.0
-    reasons = [f"{lost:.1f} s of simulated time were lost"] if share < SLOW or lost > (1.0 - SLOW) * taken else []
+    reasons = (
+        [f"{lost:.1f} s of simulated time were lost"]
+        if share < REAL_TIME_FACTOR or lost > (1.0 - REAL_TIME_FACTOR) * taken
+        else []
+    )
     for name in (*PLUGINS, LAYER):
         values = reports[name].values if name in reports else {}
         skipped, cycles = (float(values.get(key, 0.0)) for key in ("skipped periods", "cycles"))

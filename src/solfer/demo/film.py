@@ -10,10 +10,10 @@ from solfer.robot import Robot
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.records import WorldRecord
 
-SIZE, DENSITY = (320, 240), 100.0
+FILM_SIZE, FILM_DENSITY = (320, 240), 100.0
 """Width and height [pixel], and pixels of an inch."""
 
-STEP, PICTURES = 0.7, 7
+FILM_STEP, PICTURES = 0.7, 7
 """Time from one picture to the next [s], and how many are shown a second."""
 
 
@@ -39,14 +39,14 @@ def film(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    moments = np.arange(times[0], times[-1], STEP)
+    moments = np.arange(times[0], times[-1], FILM_STEP)
     rows = np.minimum(np.searchsorted(times, moments), len(times) - 1)
-    figure = Figure(figsize=(SIZE[0] / DENSITY, SIZE[1] / DENSITY), dpi=DENSITY)
+    figure = Figure(figsize=(FILM_SIZE[0] / FILM_DENSITY, FILM_SIZE[1] / FILM_DENSITY), dpi=FILM_DENSITY)
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=PICTURES)
     with (
-        closing(Renderer(robot.description, robot.kinematics, *SIZE, yaw=60.0, world=world)) as renderer,
-        writer.saving(figure, path, DENSITY),
+        closing(Renderer(robot.description, robot.kinematics, *FILM_SIZE, yaw=60.0, world=world)) as renderer,
+        writer.saving(figure, path, FILM_DENSITY),
     ):
         for done, row in enumerate(rows, 1):
             figure.clear()

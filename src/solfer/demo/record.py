@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.transport import BodyMessage, JointMessage, Middleware
 
-WINDOW = 0.5
+CLOCK_WINDOW = 0.5
 """Time to both sides in which the fastest message counts [s]; it takes a millisecond or two."""
 
 
@@ -30,8 +30,8 @@ class ArrivalClock:
         known = np.array(self._stamps)
         arrivals = np.array(self._arrivals)
         delays = arrivals - known
-        begins = np.searchsorted(arrivals, arrivals - WINDOW)
-        ends = np.searchsorted(arrivals, arrivals + WINDOW)
+        begins = np.searchsorted(arrivals, arrivals - CLOCK_WINDOW)
+        ends = np.searchsorted(arrivals, arrivals + CLOCK_WINDOW)
         fastest = [delays[begin:end].min() for begin, end in zip(begins, ends, strict=True)]
         return stamps + np.interp(stamps, known, fastest)
 

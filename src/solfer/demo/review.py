@@ -20,13 +20,18 @@ from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.world import find_world, read_world
 from solfer.transport.middleware import HealthReport
 
-WORLD = "gate"
+COURSE_WORLD = "gate"
 """The world of the course."""
 
 MISSED = 3
 """Exit code of a demonstration that ran to its end, with figures that are not what they are to be."""
 
-DRAWN = ("locomotion/log/base_reference", "locomotion/log/vertex_reference", "hands/log/reference", "locomotion/timing")
+DRAWN_CHANNELS = (
+    "locomotion/log/base_reference",
+    "locomotion/log/vertex_reference",
+    "hands/log/reference",
+    "locomotion/timing",
+)
 """Channels of the recording that are drawn."""
 
 
@@ -62,7 +67,7 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
     """
     robot = found.robot
     recording = read(file)
-    world = read_world(find_world(WORLD))
+    world = read_world(find_world(COURSE_WORLD))
     seen = driving_report.see(robot, found.legs, found.recorder)
     rows = driving_report.table(robot, found.recorder, seen, recording=recording, reports=found.reports)
     if warning := driving_report.warning(found.reports, seen, found.taken, waited=found.waited):
@@ -71,7 +76,7 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
     narrowest = int(np.argmin(seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]))
     with closing(Renderer(robot.description, robot.kinematics, yaw=60.0, world=world)) as renderer:
         renderer.save(seen.position[narrowest], output / "demo.png")
-    pages = [("columns", columns_page(select(recording, list(DRAWN), str(file))))]
+    pages = [("columns", columns_page(select(recording, list(DRAWN_CHANNELS), str(file))))]
     plots = list(canvas.saved(pages, output / "demo_plots.png"))
     print(f"pictures: {', '.join(map(str, (output / 'demo.png', *plots)))}")
     if films:
@@ -86,4 +91,4 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
             progress=lambda done, count: progress("draws the film", done, count),
         )
         print(f"film: {path}")
-    return MISSED if warning or any(driving_report.OUTSIDE in figure for _, figure in rows) else 0
+    return MISSED if warning or any(driving_report.EXCESS_MARK in figure for _, figure in rows) else 0

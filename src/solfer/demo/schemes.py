@@ -124,4 +124,6 @@ SCHEMES = {
 }
 """The schemes, by their names on the command line."""
 
-JOINTS = Scheme("Fig. 4 without torques", "figure_4.launch", joints("whole_body"), arguments={"merging": "whole_body"})
+WITHOUT_TORQUES = Scheme(
+    "Fig. 4 without torques", "figure_4.launch", joints("whole_body"), arguments={"merging": "whole_body"}
+)

@@ -11,14 +11,14 @@ from solfer.demo.record import MotionRecorder
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.transport import Middleware
 
-INTERFACE = "solfer/MoveJoints"
+MOVE_JOINTS = "solfer/MoveJoints"
 UPPER, LOWER = "upper_body", "lower_body"
 """The plugins that get the requests."""
 
-PATIENCE = 3.0
+STORY_PATIENCE = 3.0
 """How long a request is repeated that a plugin refuses: the machine may have stood still for a moment [s]."""
 
-ACCELERATION = 3.0
+STORY_ACCELERATION = 3.0
 """Configured rate of change of the wheels' speed [rad/s2]."""
 
 
@@ -88,7 +88,7 @@ def drive(distance: float, radius: float, forward: dict[str, float], speed: floa
         speed: Speed of the wheels [rad/s].
     """
     angle = abs(distance) / radius
-    speed = min(speed, float(np.sqrt(angle * ACCELERATION)))
+    speed = min(speed, float(np.sqrt(angle * STORY_ACCELERATION)))
     joints = tuple(forward)
     turn = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
     direction = "forward" if distance > 0.0 else "back"
@@ -184,7 +184,7 @@ class StoryTeller:
 
     def _insist(self, plugin: str, request: MoveJoints) -> Reply:
         """Ask until the plugin agrees, or time is up; return its last reply."""
-        end = self._middleware.now() + PATIENCE
+        end = self._middleware.now() + STORY_PATIENCE
         while not (reply := self._request(plugin, request)).success:
             if self._middleware.now() >= end or not self._middleware.running():
                 break
@@ -192,7 +192,7 @@ class StoryTeller:
         return reply
 
     def _request(self, plugin: str, request: MoveJoints) -> Reply:
-        return self._middleware.call(f"{plugin}/trajectory", INTERFACE, request, Reply, timeout=3.0)
+        return self._middleware.call(f"{plugin}/trajectory", MOVE_JOINTS, request, Reply, timeout=3.0)
 
     def _pass(self, end: float) -> None:
         self._middleware.sleep_until(end)

@@ -6,7 +6,7 @@ from scipy.linalg import lapack
 from solfer.dynamics.carrying_kernel import bear, carry
 from solfer.dynamics.dynamic_model import DynamicModel
 from solfer.errors import SizeMismatch
-from solfer.numerics.solvers.null_space import TOLERANCE
+from solfer.numerics.solvers.null_space import RANK_TOLERANCE
 
 WEAK = 1e-3
 """How well contacts hold a motion of the DoFs without torque, from 0 to 1; below this they carry less and less of it.
@@ -72,7 +72,7 @@ class CarryingTorques:
             jacobian,
             bias,
             self._free,
-            TOLERANCE,
+            RANK_TOLERANCE,
             WEAK,
             self._span,
             self._squares,

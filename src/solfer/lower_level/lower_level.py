@@ -26,7 +26,7 @@ logger = logging.getLogger(__name__)
 
 RELEASES = "a call of lower_level/reset_emergency_stop, which releases it"
 STARTS = "a start by lower_level/switch"
-FAR = 0.05
+FIRST_COMMAND_FAR_DISTANCE = 0.05
 """Distance of a first command from the held position above which a warning is logged [rad, m]; springs sag by less."""
 NOWHERE: Mapping[str, float] = MappingProxyType({})
 """No joint is measured."""
@@ -286,7 +286,7 @@ class LowerLevel:
     ) -> None:
         """Warn when a sender's first command is far from where the joints are held."""
         joint, distance = target.away(indices, given)
-        if distance > FAR:
+        if distance > FIRST_COMMAND_FAR_DISTANCE:
             self._throttle.warning(
                 target.name,
                 "'%s' begins %.3f away from where joint '%s' is held: it goes there smoothly",

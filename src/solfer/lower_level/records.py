@@ -7,17 +7,17 @@ from pydantic import Field, model_validator
 
 from solfer.config import Record
 from solfer.config.records.bounds import DURATION, PATIENCE
-from solfer.lower_level.laws.controllers import TIMEOUT
+from solfer.lower_level.laws.controllers import CONTROLLER_TIMEOUT
 from solfer.transport.messages import LARGEST_GAIN
 
 LEASE = 0.3  # [s]
-FADE = 0.5  # [s]
-TILT = 1.0472
-TILT_TIME = 0.5  # 60 degrees [rad], [s]
+RECORD_FADE = 0.5  # [s]
+TILT_LIMIT = 1.0472
+TILT_DURATION = 0.5  # 60 degrees [rad], [s]
 OVERSPEED = 2.0
 OVERSPEED_TIME = 0.05  # [s]
 
-MOST, LARGEST = 10_000, 2**24
+RATION_MESSAGES, RATION_BYTES = 10_000, 2**24
 """Largest numbers of a ration: of messages, and of bytes."""
 
 ALL = "all"
@@ -34,7 +34,7 @@ class JointControllerRecord(Record):
     group: str = Field(default=ALL, min_length=1, description="group of the SRDF that it controls, or `all`")
     except_: str | None = Field(default=None, alias="except", min_length=1, description="group that it leaves out")
     timeout: float = Field(
-        default=TIMEOUT, **PATIENCE, description="age at which a commanded velocity becomes zero [s]"
+        default=CONTROLLER_TIMEOUT, **PATIENCE, description="age at which a commanded velocity becomes zero [s]"
     )
 
 
@@ -44,22 +44,26 @@ class RationRecord(Record):
     owners: int = Field(
         default=16,
         ge=1,
-        le=MOST,
+        le=RATION_MESSAGES,
         description="commands of a controller in a cycle from senders that have a lease; they come first",
     )
-    others: int = Field(default=2, ge=1, le=MOST, description="the same from all other senders")
-    requests: int = Field(default=2, ge=1, le=MOST, description="requests in a cycle; an emergency stop needs none")
-    waiting: int = Field(default=64, ge=1, le=MOST, description="commands of one sender, and requests, that may wait")
+    others: int = Field(default=2, ge=1, le=RATION_MESSAGES, description="the same from all other senders")
+    requests: int = Field(
+        default=2, ge=1, le=RATION_MESSAGES, description="requests in a cycle; an emergency stop needs none"
+    )
+    waiting: int = Field(
+        default=64, ge=1, le=RATION_MESSAGES, description="commands of one sender, and requests, that may wait"
+    )
     command: int | None = Field(
         default=None,
         ge=64,
-        le=LARGEST,
+        le=RATION_BYTES,
         description="bytes of a command (default: twice those of one for all joints of the controller, and 1024)",
     )
     request: int | None = Field(
         default=None,
         ge=64,
-        le=LARGEST,
+        le=RATION_BYTES,
         description="bytes of a request (default: twice those of the names of all joints, and 4096)",
     )
 
@@ -76,16 +80,16 @@ class LowerLevelRecord(Record):
         "positions hold; stop: hold, and senders without a claim have to claim, too; damp: emergency stop",
     )
     fade: float = Field(
-        default=FADE, ge=1e-3, le=60.0, description="time in which springs vanish in an emergency stop [s]"
+        default=RECORD_FADE, ge=1e-3, le=60.0, description="time in which springs vanish in an emergency stop [s]"
     )
     tilt: float = Field(
-        default=TILT,
+        default=TILT_LIMIT,
         ge=0.0,
         lt=math.pi,
         description="tilt of a floating base against the vertical "
         "beyond which the robot has fallen, and holds [rad]; 0: no tilt is too large",
     )
-    tilt_time: float = Field(default=TILT_TIME, **DURATION, description="how long it has to be tilted so far [s]")
+    tilt_time: float = Field(default=TILT_DURATION, **DURATION, description="how long it has to be tilted so far [s]")
     overspeed: float = Field(
         default=OVERSPEED,
         ge=0.0,

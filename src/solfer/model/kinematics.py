@@ -17,7 +17,7 @@ from solfer.model.view import Attachment, KinematicTree
 from solfer.model.working_data import working_data
 from solfer.numerics import BaseChart
 
-LARGEST = 1000
+MAX_DOFS = 1000
 """Most DoFs of a robot, and most joints from its root to a link: Pinocchio follows them by calls in calls, and more of
 them end the process."""
 
@@ -302,8 +302,8 @@ def _check_size(description: Description) -> None:
             (description.joints[name].child for name in description.links[link].children), depth[link] + 1
         )
     for count, what in ((len(description.moving_joints), "moving joints"), (max(depth.values()), "joints in a row")):
-        if count > LARGEST:
-            raise ModelError(f"the robot has {count} {what}", where=description.where, expected=f"at most {LARGEST}")
+        if count > MAX_DOFS:
+            raise ModelError(f"the robot has {count} {what}", where=description.where, expected=f"at most {MAX_DOFS}")
 
 
 def _build(description: Description, floating_base: bool | None) -> pin.Model:

@@ -5,7 +5,7 @@ import numpy as np
 from solfer.model.kinematics import Kinematics
 
 ITERATIONS = 50
-CLOSE = 1e-9  # [m]
+LINK_CLOSENESS = 1e-9  # [m]
 
 
 def neutral_posture(kinematics: Kinematics) -> np.ndarray:
@@ -27,7 +27,7 @@ def neutral_posture(kinematics: Kinematics) -> np.ndarray:
     for _ in range(ITERATIONS):
         kinematics.update(posture)
         away = goal - _ground_plan(kinematics, tips)
-        if np.abs(away).max() < CLOSE:
+        if np.abs(away).max() < LINK_CLOSENESS:
             break
         jacobian = np.concatenate([kinematics.jacobian(tip)[:2, free] for tip in tips])
         posture[free] += np.linalg.lstsq(jacobian, away, rcond=1e-6)[0]

@@ -9,19 +9,19 @@ from solfer.transport import BodyMessage, Middleware, Reader, Writer
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.messages import FieldsMessage
 
-STALE = 0.5
+COURSE_STALE_AGE = 0.5
 """Age from which on odometry does not count [s]."""
 
 SMOOTHED = 5.0
 """Time constant with which corrections of a localisation are followed [s]."""
 
-STILL = 0.005
+COURSE_STILLNESS = 0.005
 """How far a base moves that stands still [m, rad]."""
 
-ELSEWHERE, TURNED = 0.5, 0.5
+ELSEWHERE, COURSE_TURN_LIMIT = 0.5, 0.5
 """Corrections beyond which a robot is elsewhere, and not located more precisely [m, rad]."""
 
-SILENT = 0.3
+COURSE_SILENCE_LIMIT = 0.3
 """Age from which on the pace does not count [s]: the lower level has brought the robot to rest by then."""
 
 
@@ -97,7 +97,7 @@ class MeasuredPose:
         x, y: [m].
         z: Height in the frame of the odometry [m].
         heading: [rad], continuous.
-        still: Time for which the odometry has stayed within `STILL` [s].
+        still: Time for which the odometry has stayed within `COURSE_STILLNESS` [s].
     """
 
     def __init__(self, middleware: Middleware, topic: str, localisation: Localisation | None = None):
@@ -114,7 +114,7 @@ class MeasuredPose:
     def awaits(self) -> str:
         """Read the newest message; returns what is missing."""
         self._reader.read()
-        if self._reader.age() > STALE:
+        if self._reader.age() > COURSE_STALE_AGE:
             return f"odometry on {self._reader.topic}"
         message: BodyMessage = self._reader.message
         qx, qy, qz, qw = message.orientation
@@ -136,7 +136,7 @@ class MeasuredPose:
 
     def _measure_rest(self, place: tuple[float, float, float]) -> None:
         now = self._now()
-        if max(abs(new - old) for new, old in zip(place, self._stood, strict=True)) > STILL:
+        if max(abs(new - old) for new, old in zip(place, self._stood, strict=True)) > COURSE_STILLNESS:
             self._stood = place
             self._stood_since = now
         self.still = now - self._stood_since
@@ -165,7 +165,7 @@ class MeasuredPose:
         passed = 0.0 if self._located_at is None else min(max(now - self._located_at, 0.0), SMOOTHED)
         self._located_at = now
         self._age = min(self._age + passed, SMOOTHED)
-        if math.hypot(dx, dy) > ELSEWHERE or abs(left) > TURNED:
+        if math.hypot(dx, dy) > ELSEWHERE or abs(left) > COURSE_TURN_LIMIT:
             self._age = 0.0
         share = passed / self._age if self._age else 1.0
         self._move_to(self.x + share * dx, self.y + share * dy, self.heading + share * left)
@@ -201,7 +201,7 @@ class FollowedPace:
             self._is_known = True
         if not self._is_known:
             return ""
-        if self._reader.age() > SILENT:
+        if self._reader.age() > COURSE_SILENCE_LIMIT:
             return f"the pace on {self.topic}"
         message: FieldsMessage = self._reader.message
         pace = float(message.fields["data"])

@@ -7,13 +7,13 @@ import numpy as np
 
 from solfer.scenarios import Player, Scenario
 
-FADE = 1.0
+LOOKAHEAD_FADE = 1.0
 """Time in which the pace goes from 1 to 0 before a jump, and back after it [s]."""
 
-JUMPS = (0.02, 0.05, 0.02)
+LOOKAHEAD_JUMPS = (0.02, 0.05, 0.02)
 """Smallest changes that are jumps: of the base [m/s], of its heading [rad/s], of a vertex [m/s]."""
 
-SLOWEST = 0.1
+LOOKAHEAD_LOWEST_SPEED = 0.1
 """Pace at which a jump is passed."""
 
 
@@ -33,13 +33,13 @@ class Lookahead:
 
     def most(self, elapsed: float) -> float:
         """Return the largest pace at a time of the scenario [s], which never goes back."""
-        while not self._scout.is_over and self._scout.elapsed <= elapsed + 0.5 * FADE:
+        while not self._scout.is_over and self._scout.elapsed <= elapsed + 0.5 * LOOKAHEAD_FADE:
             self._look()
         while self._jumps and self._jumps[0] <= elapsed:
             self._jumps.popleft()
         if not self._jumps:
             return 1.0
-        return min(1.0, max(SLOWEST, math.sqrt(2.0 * (self._jumps[0] - elapsed) / FADE)))
+        return min(1.0, max(LOOKAHEAD_LOWEST_SPEED, math.sqrt(2.0 * (self._jumps[0] - elapsed) / LOOKAHEAD_FADE)))
 
     def _look(self) -> None:
         """Go on by a period of the file."""
@@ -48,7 +48,7 @@ class Lookahead:
         now = self._velocities()
         before = self._before
         self._before = now
-        if any(np.abs(new - old).max() > most for new, old, most in zip(now, before, JUMPS, strict=True)):
+        if any(np.abs(new - old).max() > most for new, old, most in zip(now, before, LOOKAHEAD_JUMPS, strict=True)):
             self._jumps.append(begin)
 
     def _velocities(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from concurrent.futures import Future
 from solfer.components.declaration import Accepted, Service
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.navigation.course import Course
-from solfer.navigation.lookahead import FADE
+from solfer.navigation.lookahead import LOOKAHEAD_FADE
 from solfer.throttle import Throttle
 from solfer.transport import Inbox, Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
@@ -18,19 +18,19 @@ logger = logging.getLogger(__name__)
 
 PROGRESS = "solfer/NavigationProgress"
 
-PATIENCE = 30.0
+NAVIGATION_PATIENCE = 30.0
 """Longest wait for a subscriber of what is published [s]."""
 
-SETTLED = 0.5
+NAVIGATION_SETTLED_TIME = 0.5
 """Time from the first sight of the subscribers on until all connections are there for certain [s]."""
 
 CONNECTIONS = "connections"
 """What it waits for in that time."""
 
-EVERY = 0.1
+NAVIGATION_PERIOD = 0.1
 """Time between two messages of progress [s]."""
 
-SOON = 2.0
+NAVIGATION_QUIET_TIME = 2.0
 """Time from the beginning on before which what it waits for is not logged [s]."""
 
 MOST_SKIPPED = 10
@@ -39,10 +39,10 @@ MOST_SKIPPED = 10
 STOP = 0.5
 """Time in which the pace goes from 1 to 0 at a pause [s]."""
 
-STUCK, HELD = 60.0, 0.01
+NAVIGATION_STUCK_DISTANCE, NAVIGATION_HOLD_PACE = 60.0, 0.01
 """Longest time that the robot does not go on at all [s], and the pace below which it does not."""
 
-RESTS = 5
+ZERO_MESSAGES = 5
 """How often zero velocities are published at the end."""
 
 
@@ -85,11 +85,11 @@ class _Subscribers:
             missing = topics.missing_subscriber(writer.topic, writer.carries)
             if missing is None:
                 continue
-            if now - self.begin > PATIENCE:
+            if now - self.begin > NAVIGATION_PATIENCE:
                 raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
             self._lacked = now
             return f"a subscriber on {writer.topic}"
-        self._are_connected = now - max(self._lacked, self.begin) >= SETTLED
+        self._are_connected = now - max(self._lacked, self.begin) >= NAVIGATION_SETTLED_TIME
         return "" if self._are_connected else CONNECTIONS
 
 
@@ -123,7 +123,7 @@ class Navigation:
         self.elapsed = 0.0
         self.waits = ""
         self._progress = middleware.writer(f"{name}/progress", PROGRESS)
-        self._reported = -EVERY
+        self._reported = -NAVIGATION_PERIOD
         self._number = -1
         self._subscribers = _Subscribers(middleware, course)
         self._went = self._subscribers.begin
@@ -141,7 +141,7 @@ class Navigation:
                 lambda _, skipped: self.cycle(skipped), lambda: self._middleware.running() and not self.done
             )
         finally:
-            for _ in range(RESTS):
+            for _ in range(ZERO_MESSAGES):
                 self._course.rest()
             self._publish_progress()
         if self.done:
@@ -159,13 +159,13 @@ class Navigation:
         if not self.waits or (self._course.has_dialogue and self.waits == CONNECTIONS):
             self.waits = self._course.awaits() or self.waits
         if self.waits:
-            if self._middleware.now() - self._subscribers.begin > SOON:
+            if self._middleware.now() - self._subscribers.begin > NAVIGATION_QUIET_TIME:
                 self._throttle.warning(self.waits, "waits for %s", self.waits)
             self.pace, self._went = 0.0, self._middleware.now()
             self._course.rest()
         else:
             change = (0.0 if self.paused else self._course.most) - self.pace
-            self.pace += min(max(change, -period / STOP), period / FADE)
+            self.pace += min(max(change, -period / STOP), period / LOOKAHEAD_FADE)
             self.done = not self._course.step(period, self.pace)
             self.elapsed += period * self.pace * self._course.share
             self._require_progress()
@@ -178,11 +178,11 @@ class Navigation:
             ComponentError: It has not for a long time.
         """
         now = self._middleware.now()
-        if self.paused or self._course.share >= HELD:
+        if self.paused or self._course.share >= NAVIGATION_HOLD_PACE:
             self._went = now
-        elif now - self._went > STUCK:
+        elif now - self._went > NAVIGATION_STUCK_DISTANCE:
             raise ComponentError(
-                f"the robot has not gone on for {STUCK:g} s: its pace is {self._course.share:.2f}",
+                f"the robot has not gone on for {NAVIGATION_STUCK_DISTANCE:g} s: its pace is {self._course.share:.2f}",
                 expected="a motion that the robot can follow; its own log says what holds it",
             )
 
@@ -197,7 +197,7 @@ class Navigation:
             self._number = course.number
             logger.info("%d of %d, %s: %.1f s left", course.number, course.count, course.name, course.left)
         now = self._middleware.now()
-        if now - self._reported >= EVERY or self.done:
+        if now - self._reported >= NAVIGATION_PERIOD or self.done:
             self._reported = now
             self._publish_progress()
 

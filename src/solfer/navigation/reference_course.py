@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.components.following.requests import MESSAGES, GetReference, ReferenceReply
+from solfer.components.following.requests import REFERENCE_MESSAGES, GetReference, ReferenceReply
 from solfer.components.trajectories.messages import TRAJECTORY, JointTrajectory, TrajectoryPoint
 from solfer.config import read
 from solfer.config.tasks.references import ReferenceRecord, ReferencesRecord
 from solfer.errors import UnknownName
-from solfer.navigation.course import STALE, Course
+from solfer.navigation.course import COURSE_STALE_AGE, Course
 from solfer.references import ReferenceGenerator, build_reference, joints_of
 from solfer.transport import JointMessage, Middleware, Reader
 from solfer.transport.declared.fields import message_of
@@ -18,10 +18,10 @@ from solfer.transport.messages import VectorMessage
 
 GET = "solfer/GetReference"
 
-PATIENCE = 30.0
+REFERENCE_PATIENCE = 30.0
 """Longest time until a target says where a reference is [s]."""
 
-AHEAD = 0.1
+REFERENCE_LEAD = 0.1
 """By how much a message is ahead of the joints [s]; without another one they brake in the same time after it."""
 
 
@@ -54,14 +54,14 @@ class _TaskReference(_Reference):
         super().__init__(name, record, build_reference(record, quantity))
         self._middleware = middleware
         self._service = f"{target}/get_reference"
-        self.writer = middleware.declared_writer(f"{target}/{name}/reference", MESSAGES[quantity][0])
+        self.writer = middleware.declared_writer(f"{target}/{name}/reference", REFERENCE_MESSAGES[quantity][0])
         self._answer: Future[ReferenceReply] | None = None
 
     def awaits(self) -> str:
         """Ask where the reference is; returns what is missing."""
         if self._answer is None:
             request = GetReference(self.name)
-            self._answer = self._middleware.request(self._service, GET, request, ReferenceReply, PATIENCE)
+            self._answer = self._middleware.request(self._service, GET, request, ReferenceReply, REFERENCE_PATIENCE)
         if not self._answer.done():
             return f"an answer of {self._service}"
         reply = self._answer.result()
@@ -88,7 +88,7 @@ class _JointReference(_Reference):
     def awaits(self) -> str:
         """Read where the joints are; returns what is missing."""
         self._reader.read()
-        if self._reader.age() > STALE:
+        if self._reader.age() > COURSE_STALE_AGE:
             return f"positions of joints on {self._reader.topic}"
         message: JointMessage = self._reader.message
         for name in self._names:
@@ -104,12 +104,12 @@ class _JointReference(_Reference):
 
     def publish(self, time: float, pace: float) -> None:
         """Publish where the joints are to be a little after a time [s], and where they come to rest without another."""
-        position = self.at(time + pace * AHEAD)
+        position = self.at(time + pace * REFERENCE_LEAD)
         velocity = pace * self._velocity
-        rest = position + 0.5 * AHEAD * velocity
+        rest = position + 0.5 * REFERENCE_LEAD * velocity
         points = (
-            TrajectoryPoint(tuple(position.tolist()), tuple(velocity.tolist()), time_from_start=AHEAD),
-            TrajectoryPoint(tuple(rest.tolist()), (0.0,) * len(rest), time_from_start=2.0 * AHEAD),
+            TrajectoryPoint(tuple(position.tolist()), tuple(velocity.tolist()), time_from_start=REFERENCE_LEAD),
+            TrajectoryPoint(tuple(rest.tolist()), (0.0,) * len(rest), time_from_start=2.0 * REFERENCE_LEAD),
         )
         self.writer.write(message_of(TRAJECTORY, JointTrajectory(joint_names=self._names, points=points)))
 

@@ -14,9 +14,9 @@ from solfer.scenarios import Player, Scenario
 from solfer.scenarios.records import LegRecord
 from solfer.transport import Middleware
 
-LIFT = "solfer/LiftContacts"
+LIFT_CONTACTS = "solfer/LiftContacts"
 
-PATIENCE = 120.0
+CONTACT_PATIENCE = 120.0
 """Longest time until a contact is lifted or carries again [s]."""
 
 
@@ -63,7 +63,7 @@ class ContactChanges:
             return ""
         self._changing = int(changed[0])
         request = LiftContacts((self._names[self._changing],), bool(self._grounded[self._changing]))
-        self._answer = self._middleware.request(self._service, LIFT, request, LiftReply, PATIENCE)
+        self._answer = self._middleware.request(self._service, LIFT_CONTACTS, request, LiftReply, CONTACT_PATIENCE)
         return f"an answer of {self._service}"
 
 

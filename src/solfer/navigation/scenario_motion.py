@@ -11,19 +11,19 @@ from solfer.components.following.requests import GetReference, ReferenceReply
 from solfer.components.wheeled_motion.targets import BASE_PORT, LEAD, VERTICES_PORT
 from solfer.errors import SolferError
 from solfer.navigation.course import MeasuredPose
-from solfer.navigation.reference_course import GET, PATIENCE
+from solfer.navigation.reference_course import GET, REFERENCE_PATIENCE
 from solfer.numerics.planar_move import PlanarMove
 from solfer.scenarios import Player
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage, PointsMessage, VectorMessage
 
 SUPPORT = "solfer/WheelsSupport"
-STATE = "solfer/WheelsState"
+WHEELS_STATE = "solfer/WheelsState"
 
-JUMP, SPEED = (0.05, 0.1), (2.0, 3.0)
+JUMP_MARGINS, TOP_SPEEDS = (0.05, 0.1), (2.0, 3.0)
 """Margins [m, rad], and largest speeds [m/s, rad/s], beyond which an odometry has jumped, as plugins have them."""
 
-ARRIVING, STANDING = 4.0 * LEAD, 0.3
+ARRIVING, STANDING_TIME = 4.0 * LEAD, 0.3
 """Time after the last motion for which places are published [s], and that for which the base stands then."""
 
 
@@ -66,7 +66,7 @@ class ScenarioVelocities(ScenarioMotion):
     def __init__(self, middleware: Middleware, player: Player, name: str, odometry: str):
         self._player = player
         self._support = middleware.writer(f"{name}wheels_support", SUPPORT)
-        self._state = middleware.writer(f"{name}wheels_state", STATE)
+        self._state = middleware.writer(f"{name}wheels_state", WHEELS_STATE)
         self._pose = MeasuredPose(middleware, odometry) if odometry else None
         self._cos = 1.0
         self._sin = 0.0
@@ -119,7 +119,10 @@ class OdometryJumps:
         self._measured_at = now
         turn = float(measured[3] - expected[3])
         move = PlanarMove(expected[:3], measured[:3], turn)
-        has_jumped = move.distance > JUMP[0] + SPEED[0] * passed or abs(turn) > JUMP[1] + SPEED[1] * passed
+        has_jumped = (
+            move.distance > JUMP_MARGINS[0] + TOP_SPEEDS[0] * passed
+            or abs(turn) > JUMP_MARGINS[1] + TOP_SPEEDS[1] * passed
+        )
         if has_jumped or passed == math.inf:
             self._step[:] = 0.0
         return move if has_jumped else None
@@ -193,12 +196,14 @@ class ScenarioPositions(ScenarioMotion):
     def arrives(self, period: float) -> bool:
         """See `ScenarioMotion.arrives`."""
         self._ended += period
-        return self._ended < ARRIVING or self._pose.still < STANDING
+        return self._ended < ARRIVING or self._pose.still < STANDING_TIME
 
     def _request(self, task: str) -> str:
         """Ask where a reference begins; returns what is missing."""
         if self._answer is None:
-            self._answer = self._middleware.request(self._service, GET, GetReference(task), ReferenceReply, PATIENCE)
+            self._answer = self._middleware.request(
+                self._service, GET, GetReference(task), ReferenceReply, REFERENCE_PATIENCE
+            )
         if not self._answer.done():
             return f"an answer of {self._service}"
         reply = self._answer.result()

@@ -9,7 +9,7 @@ from solfer.transport.messages import FieldsMessage
 
 TWIST = "geometry_msgs/Twist"
 
-SETTLED = 0.3
+WAYPOINT_SETTLED_TIME = 0.3
 """Time for which the base stands still in the end [s]."""
 
 
@@ -63,7 +63,7 @@ class WaypointCourse(Course):
         self._publish(cos * x + sin * y, cos * y - sin * x, rate)
         if moves:
             return True
-        if self._rested >= self._settles and pose.still >= SETTLED:
+        if self._rested >= self._settles and pose.still >= WAYPOINT_SETTLED_TIME:
             return False
         follower.stay(place)
         return True

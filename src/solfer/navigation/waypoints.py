@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from solfer.errors import SolferError
 
-ARRIVED, TURNED = 0.01, 0.01
+WAYPOINT_ARRIVAL_DISTANCE, WAYPOINT_TURN_LIMIT = 0.01, 0.01
 """Distance from the last way-point [m], and from its heading [rad], that is near enough."""
 
 STRAYED = 0.02
@@ -15,10 +15,10 @@ STRAYED = 0.02
 PASSED = 0.05
 """Distance at which a way-point on the way counts as passed [m]."""
 
-GAIN = 1.5
+WAYPOINT_GAIN = 1.5
 """Rate at which what is left of a way decreases near its end [1/s]."""
 
-SHARE = 0.8
+DECELERATION_SHARE = 0.8
 """Share of the largest deceleration with which it is planned to brake."""
 
 
@@ -108,10 +108,14 @@ class WaypointFollower:
         goal = self.waypoints[self.index]
         distance = self._distance(x, y)
         limits = self.limits
-        arrived = self.index == len(self.waypoints) - 1 and distance <= ARRIVED
+        arrived = self.index == len(self.waypoints) - 1 and distance <= WAYPOINT_ARRIVAL_DISTANCE
         speed = 0.0 if arrived else pace * self._speed(distance)
         turn = self._turn(heading)
-        rate = 0.0 if abs(turn) <= TURNED else pace * _approach(turn, limits.turn_speed, limits.turn_acceleration)
+        rate = (
+            0.0
+            if abs(turn) <= WAYPOINT_TURN_LIMIT
+            else pace * _approach(turn, limits.turn_speed, limits.turn_acceleration)
+        )
         share = speed / distance if distance > 0.0 else 0.0
         self._change((share * (goal.x - x), share * (goal.y - y)), math.copysign(rate, turn), period)
         return True
@@ -161,8 +165,8 @@ class WaypointFollower:
         if self.index == len(self.waypoints) - 1:
             return _approach(distance, limits.speed, limits.acceleration)
         left = max(0.0, distance - PASSED)
-        braking = math.sqrt(through**2 + 2.0 * SHARE * limits.acceleration * left)
-        return min(limits.speed, max(braking, GAIN * PASSED))
+        braking = math.sqrt(through**2 + 2.0 * DECELERATION_SHARE * limits.acceleration * left)
+        return min(limits.speed, max(braking, WAYPOINT_GAIN * PASSED))
 
     def _turn(self, heading: float) -> float:
         """Return what is left to the heading of the present way-point, or of the next one that has one [rad]."""
@@ -171,7 +175,11 @@ class WaypointFollower:
 
     def _has_arrived(self, x: float, y: float, heading: float) -> bool:
         last = self.index == len(self.waypoints) - 1
-        return last and self._distance(x, y) <= ARRIVED and abs(self._turn(heading)) <= TURNED
+        return (
+            last
+            and self._distance(x, y) <= WAYPOINT_ARRIVAL_DISTANCE
+            and abs(self._turn(heading)) <= WAYPOINT_TURN_LIMIT
+        )
 
     def _change(self, desired: tuple[float, float], rate: float, period: float) -> None:
         """Let the velocity go to the desired one within the acceleration."""
@@ -190,7 +198,7 @@ class WaypointFollower:
 def _approach(left: float, speed: float, acceleration: float) -> float:
     """Return the speed with which the end of a way can still be met."""
     left = abs(left)
-    return min(speed, math.sqrt(2.0 * SHARE * acceleration * left), GAIN * left)
+    return min(speed, math.sqrt(2.0 * DECELERATION_SHARE * acceleration * left), WAYPOINT_GAIN * left)
 
 
 def _duration(way: float, speed: float, acceleration: float) -> float:

@@ -151,10 +151,10 @@ def _shorten(displacements, turns):
 shorten = cached("void(float64[:, ::1], float64[::1])", _shorten)
 
 
-LEAP, FASTER = 0.1, 5.0
+LEAP, JOINT_SPEED_MARGIN = 0.1, 5.0
 """Margins of the place and the speed of a joint [rad, m], [rad/s, m/s]."""
 
-LATEST = 1.0
+LONGEST_INTERVAL = 1.0
 """Longest time between two stamps that counts [s]: another clock may be anywhere."""
 
 SUMMED, GAP = 1.0, 0.1
@@ -167,7 +167,7 @@ STRAY, STRAY_SHARE = 0.08, 0.2
 """Way of a joint that contradicts its velocities [rad, m], and as a share of its way by them: they may be filtered."""
 
 
-STEP, LATE, HIDDEN = 0.02, 0.005, 400.0
+CHECK_STEP, CHECK_LATENESS, HIDDEN_ACCELERATION = 0.02, 0.005, 400.0
 """Way of a joint between two messages that contradicts its velocities [rad, m]: encoders have steps of a few mrad, and
 velocities that are filtered for 20 ms lag behind accelerations of 100 rad/s2. Time by which stamps may be wrong [s].
 Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a link which swings at 30 Hz and 8 rad/s.
@@ -220,19 +220,19 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
             before[10, k] = stamp + SHAKEN
     for k in part:
         away = _wrapped(position[k] - before[0, k], turns[k])
-        elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
+        elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LONGEST_INTERVAL))
         if wrong < 0 and abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
             wrong = k
         if len(velocity) and fastest[k] < math.inf:
             fast = velocity[k]
             slow = before[3, k]
             passed = stamp - before[4, k]
-            if wrong < 0 and abs(fast) > FASTER + 3.0 * fastest[k]:
+            if wrong < 0 and abs(fast) > JOINT_SPEED_MARGIN + 3.0 * fastest[k]:
                 wrong = k + len(position)
             is_frozen = fast == slow and fast != 0.0 and position[k] == before[5, k]
             step = _wrapped(position[k] - before[5, k], turns[k]) - 0.5 * passed * (fast + slow)
             is_shaken = before[10, k] - SHAKEN <= stamp < before[10, k]
-            if is_shaken or passed >= GAP or passed < -LATEST or (before[8, k] > GAP and not is_frozen):
+            if is_shaken or passed >= GAP or passed < -LONGEST_INTERVAL or (before[8, k] > GAP and not is_frozen):
                 before[6, k] = before[7, k] = before[9, k] = 0.0
             elif passed > 0.0 and before[9, k] > 0.0:  # all counts until they agree, and no doubt excuses it meanwhile
                 before[6, k] += step
@@ -245,13 +245,13 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                 before[6, k], before[7, k] = keep * before[6, k] + step, keep * before[7, k] + doubt
                 if abs(before[6, k]) > STRAY + before[7, k]:
                     before[9, k] = STRAY + before[7, k]
-                doubt += STEP + LATE * speed + HIDDEN * passed * passed
+                doubt += CHECK_STEP + CHECK_LATENESS * speed + HIDDEN_ACCELERATION * passed * passed
                 if abs(step) > doubt:
                     before[6, k] = step
                     before[9, k] = doubt
             if wrong < 0 and before[9, k] > 0.0:
                 wrong = k + 2 * len(position)
-            if passed > 0.0 or passed < -LATEST:
+            if passed > 0.0 or passed < -LONGEST_INTERVAL:
                 before[3, k], before[4, k], before[5, k] = fast, stamp, position[k]
                 before[8, k] = before[8, k] + passed if is_frozen else 0.0
     if wrong < 0:
@@ -268,20 +268,20 @@ find_leap = cached(
 )
 
 
-TILTED, TILTING, TILT_TIME = 0.1, 6.0, 0.1
+TILTED, TILTING, TILT_WINDOW = 0.1, 6.0, 0.1
 """Margin of a link's tilt [rad], how fast it can tilt [rad/s], and longest time for which that counts [s]."""
 
-JUMPED, TURNING, FOLLOWED = 0.05, 10.0, 0.5
+JUMPED, CHECK_TURN_SHARE, FOLLOWED = 0.05, 10.0, 0.5
 """Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]; share of a turn by such rates by
 which the orientation turns otherwise: they are spikes."""
 
 APART, APART_SHARE = 0.08, 0.3
 """Difference of two turns that contradict each other [rad], and as a share of both."""
 
-ASKEW = 0.4
+CHECK_SKEW = 0.4
 """Angle between the vertical and a mean specific force that contradict each other [rad]."""
 
-GRAVITY, UNEVEN, TURNED = 9.81, 1.0, 0.5
+GRAVITY, CHECK_UNEVENNESS, CHECK_TURN_LIMIT = 9.81, 1.0, 0.5
 """Specific force at rest, how far it may be from that [m/s^2], and how fast its sensor may turn [rad/s]: beyond that
 it is not gravity that is measured, as in a fall."""
 
@@ -311,7 +311,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     v = before[1]
     s = before[2]
     c = before[3]
-    elapsed = max(arrival - before[4], min(stamp - before[5], LATEST))
+    elapsed = max(arrival - before[4], min(stamp - before[5], LONGEST_INTERVAL))
     known = before[4] > -math.inf
     passed = stamp - before[5]
     if known:
@@ -321,7 +321,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
             + (1.0 - 2.0 * (x * x + y * y)) * (1.0 - 2.0 * (u * u + v * v))
         )
         tilt = math.acos(min(1.0, max(-1.0, upright)))
-        if tilt > TILTED + TILTING * min(elapsed, TILT_TIME):
+        if tilt > TILTED + TILTING * min(elapsed, TILT_WINDOW):
             return 1, tilt
     before[0] = x
     before[1] = y
@@ -332,7 +332,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     if not known:
         before[14] = SUMMED * GRAVITY  # a robot that starts by accelerating is not askew
     is_frozen = x == u and y == v and z == s and w == c
-    if passed >= GAP or passed < -LATEST or (before[16] > GAP and not is_frozen):
+    if passed >= GAP or passed < -LONGEST_INTERVAL or (before[16] > GAP and not is_frozen):
         before[6:12] = 0.0
         before[15] = 0.0
     before[16] = before[16] + passed if is_frozen else 0.0
@@ -343,7 +343,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     fy = force[1]
     fz = force[2]
     rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
-    if rate < TURNED and abs(math.sqrt(fx * fx + fy * fy + fz * fz) - GRAVITY) < UNEVEN:
+    if rate < CHECK_TURN_LIMIT and abs(math.sqrt(fx * fx + fy * fy + fz * fz) - GRAVITY) < CHECK_UNEVENNESS:
         # R f = f + 2 w (a x f) + 2 a x (a x f), where a is the axis of the quaternion
         px = y * fz - z * fy
         py = z * fx - x * fz
@@ -352,7 +352,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
         before[13] = keep * before[13] + passed * (fy + 2.0 * (w * py + z * px - x * pz))
         before[14] = keep * before[14] + passed * (fz + 2.0 * (w * pz + x * py - y * px))
         askew = math.atan2(math.sqrt(before[12] ** 2 + before[13] ** 2), before[14])
-        if askew > ASKEW:
+        if askew > CHECK_SKEW:
             return 3, askew
     if rate == 0.0:  # many senders leave them zero
         return 0, 0.0
@@ -365,9 +365,9 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     dx = tx - passed * values[10]
     dy = ty - passed * values[11]
     dz = tz - passed * values[12]
-    if rate > TURNING and math.sqrt(dx * dx + dy * dy + dz * dz) > FOLLOWED * passed * rate:
+    if rate > CHECK_TURN_SHARE and math.sqrt(dx * dx + dy * dy + dz * dz) > FOLLOWED * passed * rate:
         return 4, rate
-    if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + TURNING * passed:
+    if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + CHECK_TURN_SHARE * passed:
         return 0, 0.0
     if before[15]:  # what contradicted stays in the sums until it agrees again
         keep = 1.0
@@ -389,11 +389,11 @@ check_turn = cached(
 )
 
 
-AWAY, LONG = 1.0, 0.5
+CHECK_DISTANCE, LONG = 1.0, 0.5
 """Distance from its command at which a joint does not follow it [rad, m], and for how long [s]: wheels that steer on
 the ground were half a radian behind where a busy loop left cycles out."""
 
-LAG, SHARE = 0.5, 0.2
+FOLLOWING_LAG, LAG_SHARE = 0.5, 0.2
 """How far a joint may lag behind before it does not follow [rad, m], and the share of its command at which it does not
 lag."""
 
@@ -411,7 +411,7 @@ def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
         passed: Time since the cycle before [s].
     """
     for k in places:
-        is_away = abs(desired[k] - measured[dofs[k]]) > AWAY and stiffness[k] > 0.0
+        is_away = abs(desired[k] - measured[dofs[k]]) > CHECK_DISTANCE and stiffness[k] > 0.0
         record[0, k] = record[0, k] + passed if is_away else 0.0
         if record[0, k] > LONG:
             return k
@@ -421,7 +421,7 @@ def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
 def _find_stuck(desired, measured, dofs, places, record, passed):
     """Return the first joint that does not turn as it is commanded; -1: there is none.
 
-    A joint lags by all of its command where it turns at less than `SHARE` of it, and catches up where it turns faster:
+    A joint lags by all of its command where it turns below `LAG_SHARE` of it, and catches up where it turns faster:
     a cumulative sum, so that nothing counts that a joint did before it was jammed.
 
     Args:
@@ -435,11 +435,11 @@ def _find_stuck(desired, measured, dofs, places, record, passed):
     for k in places:
         speed = abs(desired[k])
         velocity = measured[dofs[k]] if desired[k] >= 0.0 else -measured[dofs[k]]
-        is_slow = velocity < SHARE * speed
-        lag = record[0, k] + passed * (speed if is_slow else -velocity / SHARE)
+        is_slow = velocity < LAG_SHARE * speed
+        lag = record[0, k] + passed * (speed if is_slow else -velocity / LAG_SHARE)
         record[0, k] = max(lag, 0.0)
         record[1, k] = record[1, k] + passed * velocity if lag > 0.0 else 0.0
-        if lag > LAG:
+        if lag > FOLLOWING_LAG:
             return k
     return -1
 

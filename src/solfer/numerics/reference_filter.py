@@ -7,19 +7,19 @@ import numpy as np
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.planar_move import PlanarMove
 
-SPEED, ACCELERATION = 0, 1
+SPEED_LIMIT, ACCELERATION_LIMIT = 0, 1
 """Columns of the limits, of positions; those of orientations are behind them."""
 
 STREAM = 0.1
 """Longest time between two targets of a stream [s]; slower ones are targets on their own."""
 
-PATIENCE = 2.0
+FILTER_PATIENCE = 2.0
 """A stream goes on until no target has come for so many of its periods."""
 
-UNIT = 1e-3
+UNIT_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's length from one."""
 
-REST = 1e-9
+REST_SUM = 1e-9
 """Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
 
 TAKEN, NOT_FINITE, NOT_A_TURN = range(3)
@@ -229,7 +229,7 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
     length = 1.0
     if last == 7:
         length = math.sqrt(numbers[-4] ** 2 + numbers[-3] ** 2 + numbers[-2] ** 2 + numbers[-1] ** 2)
-        if abs(length - 1.0) > UNIT:
+        if abs(length - 1.0) > UNIT_TOLERANCE:
             return NOT_A_TURN
     new = work[0]
     turn = work[1]
@@ -259,7 +259,7 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
     aim = work[2]
     all_still = True
     for i in range(len(target)):
-        if age[i] > PATIENCE * gap[i]:
+        if age[i] > FILTER_PATIENCE * gap[i]:
             stream[i] = 0.0
         aim[:] = target[i]
         if stream[i].any():
@@ -276,7 +276,7 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
             value[i, k] += period * rate[i, k]
         _turn_by(value[i], rate[i], period)
         age[i] += period
-        still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < REST and distance + _norm(error) < REST
+        still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < REST_SUM and distance + _norm(error) < REST_SUM
         all_still = all_still and still[i]
     return all_still
 

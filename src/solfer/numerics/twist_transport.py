@@ -16,7 +16,7 @@ from solfer.numerics import base_chart as chart
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.compilation import cached, digest, part
 
-POSE, TWIST, OWN_AXES, ORIENTED, GO_ON = 1, 2, 4, 8, 16
+FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, GO_ON = 1, 2, 4, 8, 16
 """Options, as a sum. POSE: the base from a pose; TWIST: its rates from a twist; OWN_AXES: the twist is in the axes of
 the sensor, not of the world; ORIENTED: an orientation is given, by which such a twist is turned; GO_ON: angles continue
 without jumps by 2 pi."""
@@ -128,9 +128,9 @@ def _compile(sources: str):
         sources  # noqa: B018 it has to be used to be in the closure
         to_chart = _transposed(origin)
         sensor = world
-        if options & ORIENTED:
+        if options & WITH_ORIENTATION:
             sensor = _times(world, _matrix(values))
-        if options & POSE:
+        if options & FROM_POSE:
             rotation = _times(sensor, _transposed(mount))
             arm = _turned(rotation, mount[9:12])
             base[:3] = _turned(to_chart, _turned(world, values[4:7]) + world[9:12] - arm - origin[9:12])
@@ -141,10 +141,10 @@ def _compile(sources: str):
         else:
             rotation = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
             arm = _turned(rotation, mount[9:12])
-        if options & TWIST:
+        if options & FROM_TWIST:
             axes = world
             if options & OWN_AXES:
-                axes = sensor if options & ORIENTED else _times(rotation, mount)
+                axes = sensor if options & WITH_ORIENTATION else _times(rotation, mount)
             angular = _turned(axes, values[10:13]) - _turned(rotation, mount[15:18])
             linear = _turned(axes, values[7:10]) - _turned(rotation, mount[12:15])
             linear[0] -= angular[1] * arm[2] - angular[2] * arm[1]

@@ -5,7 +5,7 @@ from solfer.errors import PipeError
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.context import PipeContext
 from solfer.pipes.feedback_pipe import FeedbackPipe
-from solfer.pipes.kinds import KINDS
+from solfer.pipes.kinds import PIPE_KINDS
 
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
@@ -16,7 +16,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
     """
     if record.source is None:
         raise PipeError(f"feedback '{record.name}' has no source", where=record.where(), expected="source: a topic")
-    return KINDS[record.space].feedback(record, context)
+    return PIPE_KINDS[record.space].feedback(record, context)
 
 
 def controller(record: ControllerRecord, context: PipeContext) -> CommandPipe:
@@ -27,4 +27,4 @@ def controller(record: ControllerRecord, context: PipeContext) -> CommandPipe:
     """
     if record.sink is None and not record.lower_level:
         raise PipeError(f"controller '{record.name}' has no sink", where=record.where(), expected="sink: a topic")
-    return KINDS[record.space].controller(record, context)
+    return PIPE_KINDS[record.space].controller(record, context)

@@ -36,5 +36,5 @@ class PipeKind:
         return cls(space, RECORDS[space], factory.feedback, controller=factory.controller)
 
 
-KINDS = {space: PipeKind.of(space, home) for space, home in HOMES.items()}
+PIPE_KINDS = {space: PipeKind.of(space, home) for space, home in HOMES.items()}
 """Each kind, by its `space`."""

@@ -10,13 +10,13 @@ from solfer.errors import PipeError, UnknownName, nearest
 
 logger = logging.getLogger(__name__)
 
-REMEMBERED = 8
+ORDER_MEMORY = 8
 """Most orders that are cached; senders that change their names in every message do not fill the memory."""
 
-ALIKE = 0.75
+ORDER_SIMILARITY = 0.75
 """Likeness of two names from which on one of them is taken for the other one, misspelt."""
 
-LONGEST = 100
+WARNED_NAMES = 100
 """Most names that are warned of."""
 
 
@@ -81,7 +81,7 @@ class NameOrder:
         order = self._remembered.get(names)
         if order is None:
             order = self._find(names)
-            if len(self._remembered) == REMEMBERED:
+            if len(self._remembered) == ORDER_MEMORY:
                 self._remembered.clear()
             self._remembered[names] = order
         self._names = names
@@ -120,7 +120,7 @@ class NameOrder:
     def _warn(self, unknown: Sequence[str]) -> None:
         """Name those that are ignored for the first time."""
         new = [name for name in unknown if name not in self._ignored]
-        if new and len(self._ignored) < LONGEST:
+        if new and len(self._ignored) < WARNED_NAMES:
             self._ignored.update(new)
             logger.warning("the robot has no %s %s: ignored in messages", self._what, ", ".join(map(repr, new)))
 
@@ -131,7 +131,7 @@ class NameOrder:
         unknown = [] if self._known is None else [name for name in names if name not in self._known]
         missing = [name for name in self._pipe_names if name not in names]
         for name in unknown:
-            if not self._ignores or nearest(name, missing, likeness=ALIKE):
+            if not self._ignores or nearest(name, missing, likeness=ORDER_SIMILARITY):
                 raise UnknownName(self._what, name, self._known)
         self._warn(unknown)
         place = {name: index for index, name in enumerate(names)}

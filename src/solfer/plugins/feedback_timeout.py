@@ -12,23 +12,23 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-TIMEOUT = 0.2
+DEFAULT_TIMEOUT = 0.2
 """Default of the age of the newest message above which a cycle is a strike [s]. A simulator on a shared machine stalls
 for 20 ms now and then."""
 
-PERIODS = 5
+TIMEOUT_PERIODS = 5
 """The same in periods of the plugin; the longer one counts."""
 
-FROZEN = 0.15
+FEEDBACK_FREEZE_TIME = 0.15
 """Time by the stamps without a change of any number after which a feedback is frozen, if joints are to move [s]."""
 
-STEPS = 5e-3
+ENCODER_STEPS = 5e-3
 """Way that a joint has to be commanded to move meanwhile: several steps of its encoder [rad, m]."""
 
 RECENT = 0.5
 """Time for which a refused message is a warning of the plugin's health [s]."""
 
-ACTIONS = {
+TIMEOUT_ACTIONS = {
     "keep": "the last message stays valid",
     "hold": "the plugin holds until it is back",
     "damp": "the springs of the robot fade out",
@@ -36,7 +36,7 @@ ACTIONS = {
 }
 """Actions of a plugin when a feedback times out, the gravest last, with their text for the log."""
 
-GRAVITY = tuple(ACTIONS)
+SEVERITY = tuple(TIMEOUT_ACTIONS)
 
 
 class FeedbackTimeout:
@@ -84,7 +84,7 @@ class FeedbackTimeout:
         """Make the timeout that a record configures, in a plugin of a `rate` [Hz]."""
         return cls(
             feedback,
-            record.timeout or max(TIMEOUT, PERIODS / rate),
+            record.timeout or max(DEFAULT_TIMEOUT, TIMEOUT_PERIODS / rate),
             record.strikes,
             action=record.timeout_action,
             where=record.where("source"),
@@ -107,8 +107,8 @@ class FeedbackTimeout:
             self._stamp = feedback.stamp
             self._moved = distance
         # in a simulation that pauses the stamps stay, too
-        stays = self._changed < math.inf and feedback.stamp - self._stamp > FROZEN
-        frozen = stays and distance - self._moved > STEPS and feedback.measures
+        stays = self._changed < math.inf and feedback.stamp - self._stamp > FEEDBACK_FREEZE_TIME
+        frozen = stays and distance - self._moved > ENCODER_STEPS and feedback.measures
         late = late or frozen
         self._handed_over = handed_over = feedback.handovers != self._handovers
         if handed_over:  # another publisher measures another start
@@ -178,7 +178,7 @@ class FeedbackTimeout:
         complaint = self.refusal(now) or self.doubt
         if self.timed_out:
             level = Health.WARNING if self.action == "keep" else Health.ERROR
-            summary = f"nothing new on {feedback.reader.topic}: {ACTIONS[self.action]}"
+            summary = f"nothing new on {feedback.reader.topic}: {TIMEOUT_ACTIONS[self.action]}"
         elif feedback.required and not feedback.received:
             level = Health.WARNING
             summary = complaint or f"nothing received on {feedback.reader.topic} yet"
@@ -197,7 +197,7 @@ class FeedbackTimeout:
             feedback.reader.topic,
             "no number has changed, though joints were commanded to move," if frozen else "nothing new",
             now - (feedback.changed if frozen else feedback.arrival),
-            ACTIONS[self.action],
+            TIMEOUT_ACTIONS[self.action],
         )
 
     def _recover(self) -> None:
@@ -269,7 +269,7 @@ class FeedbackTimeouts:
     def action(self) -> str:
         """Return the gravest action of the feedbacks that have timed out; `keep` if there is none."""
         return max(
-            (watch.action for watch in self._feedback_timeouts if watch.timed_out), key=GRAVITY.index, default="keep"
+            (watch.action for watch in self._feedback_timeouts if watch.timed_out), key=SEVERITY.index, default="keep"
         )
 
     def rivalries(self, now: float) -> str:

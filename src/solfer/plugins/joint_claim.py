@@ -11,14 +11,14 @@ import numpy as np
 
 from solfer.errors import ClaimRefused, MiddlewareError, ServiceUnavailable
 from solfer.pipes import JointCommandPipe
-from solfer.recording.model import CLAIMED, LOST, RELEASED
+from solfer.recording.model import CLAIMED, LOST_EVENT, RELEASED_EVENT
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
 from solfer.transport.lower_level import (
     ALL_OWNERS,
-    CLAIM,
+    CLAIM_INTERFACE,
     LOWER_LEVEL,
-    REFUSED,
+    REFUSALS_TOPIC,
     RELEASE,
     TOPIC,
     Answer,
@@ -32,16 +32,16 @@ from solfer.transport.middleware import TRIGGER, NoFields
 
 logger = logging.getLogger(__name__)
 
-PATIENCE = 2.0
+CLAIM_PATIENCE = 2.0
 """Longest wait for an answer of the lower level [s]."""
 
-AGAIN = 0.25
+CLAIM_REPEAT_PERIOD = 0.25
 """Time between two requests for a claim that is temporarily refused [s]."""
 
-IGNORED = 0.1
+REFUSAL_GRACE = 0.1
 """Time after a claim in which refusals are ignored: they concern earlier commands; later ones are repeated [s]."""
 
-SETTLE = 0.15
+CLAIM_SETTLING_TIME = 0.15
 """Time for publishers to begin again, before the plugin that follows them does [s]; shorter than a lease."""
 
 
@@ -98,7 +98,7 @@ class JointClaim:
         self._since = -math.inf
         self._next = -math.inf
         self._settled = -math.inf
-        self._refusals = middleware.queue(REFUSED, REFUSALS)
+        self._refusals = middleware.queue(REFUSALS_TOPIC, REFUSALS)
         self.restarted = False
         self.is_taken = False
         self.refused = 0
@@ -125,7 +125,7 @@ class JointClaim:
         if not answer.success:
             if not answer.later:
                 raise ClaimRefused(f"plugin '{self._plugin}' does not get its joints: {answer.message}")
-            self.reason, self._next = answer.message, self._middleware.now() + AGAIN
+            self.reason, self._next = answer.message, self._middleware.now() + CLAIM_REPEAT_PERIOD
             self.is_taken = True
             return False
         now = self._middleware.now()
@@ -134,7 +134,7 @@ class JointClaim:
         self.reason = ""
         self.is_taken = False
         self.note(CLAIMED, self._description)
-        self._settled = now + SETTLE if answer.again and self._claim.follows else now
+        self._settled = now + CLAIM_SETTLING_TIME if answer.again and self._claim.follows else now
         return now >= self._settled
 
     def lost(self) -> bool:
@@ -147,7 +147,7 @@ class JointClaim:
             for message in self._refusals.drain():
                 self._receive(message)
             if self.reason != before:
-                self.note(LOST, self.reason)
+                self.note(LOST_EVENT, self.reason)
         return bool(self.reason)
 
     def restarts(self) -> bool:
@@ -180,14 +180,14 @@ class JointClaim:
     def damp(self) -> None:
         """Trip the robot's emergency stop, which fades out its springs. No effect if the plugin commands no joint."""
         if self._commands:
-            self._middleware.request(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer, PATIENCE)
+            self._middleware.request(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer, CLAIM_PATIENCE)
 
     def release(self) -> None:
         """Release the joints; does not wait for the answer."""
         if self._commands and (self._granted or self._answer is not None):
-            self.note(RELEASED, self._description)
+            self.note(RELEASED_EVENT, self._description)
             self._release = self._middleware.request(
-                f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._claim.owner), Answer, PATIENCE
+                f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._claim.owner), Answer, CLAIM_PATIENCE
             )
         self.lapse()
 
@@ -196,7 +196,9 @@ class JointClaim:
         if self._middleware.now() < self._next or not self.released:
             return
         claim = dataclasses.replace(self._claim, positions=self._measured())
-        self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, claim, ClaimAnswer, PATIENCE)
+        self._answer = self._middleware.request(
+            f"{LOWER_LEVEL}/claim", CLAIM_INTERFACE, claim, ClaimAnswer, CLAIM_PATIENCE
+        )
 
     def _measured(self) -> tuple[float, ...]:
         """Return where the joints are measured, in the names and numbers of the lower level."""
@@ -218,7 +220,7 @@ class JointClaim:
             return ClaimAnswer(False, error.line, later=True)
 
     def _receive(self, message: RefusalMessage) -> None:
-        if self._middleware.now() < self._since + IGNORED:
+        if self._middleware.now() < self._since + REFUSAL_GRACE:
             return
         for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
             if owner == ALL_OWNERS:

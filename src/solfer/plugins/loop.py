@@ -21,7 +21,7 @@ from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
-from solfer.transport.plugin_state import FAILED, PluginState
+from solfer.transport.plugin_state import FAILED_STATES, PluginState
 
 logger = logging.getLogger(__name__)
 
@@ -235,7 +235,7 @@ class PluginLoop:
         """Log a plugin that fails while others go on, or that stops since it requires one of these."""
         if self._recorder is not None:
             self._recorder.note(index, managed, round(1e9 * self._middleware.now()))
-        if managed.state in FAILED and self.plugins.failure is None:
+        if managed.state in FAILED_STATES and self.plugins.failure is None:
             logger.error("%s is aborted: %s", managed.name, managed.reason)
         elif managed.state is STOPPING and managed.reason:
             logger.error("%s stops: %s", managed.name, managed.reason)

@@ -10,22 +10,22 @@ from solfer.pipes import FeedbackPipe
 
 logger = logging.getLogger(__name__)
 
-WINDOW = 1.0
+OVERLOAD_WINDOW = 1.0
 """Time constant with which cycles, and the time that they had, are forgotten [s]."""
 
-CALM = 1.0
+OVERLOAD_END_TIME = 1.0
 """Time for which both figures have to be below half of their limits before the overload ends [s]."""
 
-SLOWED, RESTS = 0.5, 0.6
+SLOWED, REST_SHARE = 0.5, 0.6
 """Shares of periods left out beyond which motions slow down, and rest; up to the first components bridge the gaps."""
 
-OLDEST = 4.0
+OVERLOAD_OLDEST_AGE = 4.0
 """Age of the measurement at which they rest, in ages at which the overload begins."""
 
-SLOWER, FASTER = 4.0, 1.0
+OVERLOAD_DECAY_RATE, OVERLOAD_RECOVERY_RATE = 4.0, 1.0
 """How fast the pace falls and rises [1/s]."""
 
-STEP = 0.02
+OVERLOAD_STEP = 0.02
 """Longest time for which it does so in one cycle [s]: others have followed the pace before through all of a gap."""
 
 
@@ -33,7 +33,7 @@ class Overload:
     """Judges once a cycle, in the robot's own time, whether a loop is overloaded.
 
     A loop is overloaded when it has left out more than a share of the periods of a second, or works on a measurement
-    that is too old. The pace falls from 1 to 0 between `SLOWED` and `RESTS`, and with the age from its limit on. From 0
+    that is too old. The pace falls from 1 to 0 between `SLOWED` and `REST_SHARE`, with the age as well. From 0
     it rises when neither slows motions down any more.
 
     Args:
@@ -64,14 +64,14 @@ class Overload:
         self.pace = 1.0
         self.figures[:] = 0.0, 0.0, 1.0
         self._left_out = self._age = self._calm = 0.0
-        self._passed = WINDOW
-        self._cycles = WINDOW / self._period
+        self._passed = OVERLOAD_WINDOW
+        self._cycles = OVERLOAD_WINDOW / self._period
         self._accepted = -1
 
     def advance(self, passed: float) -> float:
         """Return the pace, in a cycle that begins `passed` [s] after the one before, in the robot's time."""
         # over time, not in each cycle: measurements that come in bunches let the robot's time pass in bunches
-        kept = 1.0 / (1.0 + passed / WINDOW)
+        kept = 1.0 / (1.0 + passed / OVERLOAD_WINDOW)
         self._passed = kept * self._passed + passed
         self._cycles = kept * self._cycles + 1.0
         self._left_out = max(1.0 - self._cycles * self._period / self._passed, 0.0)
@@ -99,12 +99,14 @@ class Overload:
             )
             logger.warning("%s is %s; motions slow down", self._plugin, self.reason)
         self._calm = self._calm + passed if worst < 0.5 else 0.0
-        if self.reason and self._calm > CALM:
+        if self.reason and self._calm > OVERLOAD_END_TIME:
             self.reason = ""
             logger.info("%s is no longer overloaded", self._plugin)
-        slowed = max((self._left_out - self._slowed) / (RESTS - SLOWED), (age - 1.0) / (OLDEST - 1.0), 0.0)
+        slowed = max(
+            (self._left_out - self._slowed) / (REST_SHARE - SLOWED), (age - 1.0) / (OVERLOAD_OLDEST_AGE - 1.0), 0.0
+        )
         if slowed and not self.pace:  # what rests goes on when nothing slows it down any more, and does not creep
             slowed = 1.0
         change = max(1.0 - slowed, 0.0) - self.pace
-        step = min(passed, STEP)
-        self.pace += min(max(change, -SLOWER * step), FASTER * step)
+        step = min(passed, OVERLOAD_STEP)
+        self.pace += min(max(change, -OVERLOAD_DECAY_RATE * step), OVERLOAD_RECOVERY_RATE * step)

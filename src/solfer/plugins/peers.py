@@ -16,10 +16,10 @@ NEEDED, OPTIONAL = 1.0, 5.0
 """Time after which a peer should be there [s]: at the ends that the plugin cannot work without, and at others, which
 may start together with it."""
 
-LOOK = 1.0
+PEER_POLL_PERIOD = 1.0
 """Time between two looks [s]."""
 
-AGAIN = 10.0
+PEER_REPEAT_PERIOD = 10.0
 """Time between two warnings about the same end, while nothing changes [s]."""
 
 
@@ -92,7 +92,7 @@ class Peers:
         now = self._middleware.now()
         if self._has_called or now < self._next:
             return
-        self._next = now + LOOK
+        self._next = now + PEER_POLL_PERIOD
         missing = [peer for peer in self._peers if peer.open]
         if not missing:
             self._next = math.inf
@@ -127,7 +127,7 @@ class Peers:
     def _judge(self, peer: Peer, topics: Topics, now: float) -> None:
         before = peer.fault
         peer.judge(topics)
-        if peer.fault and (peer.fault != before or now >= peer.warned + AGAIN):
+        if peer.fault and (peer.fault != before or now >= peer.warned + PEER_REPEAT_PERIOD):
             peer.warned = now
             logger.warning("%s: %s", self._plugin, peer.fault)
         elif before and not peer.fault:

@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from solfer.components.port import Port
-from solfer.config.kinds.point import MESSAGES
+from solfer.config.kinds.point import POINT_MESSAGES
 from solfer.errors import ComponentError, SolferError, located
 from solfer.model import State
 from solfer.model.urdf.scalar_joints import BASE_DOFS
@@ -16,9 +16,9 @@ from solfer.pipes.shared_feedback import SharedFeedbackPipe
 from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.plugin import Plugin
-from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
+from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
 from solfer.recording.log import Logger, LogSource, with_units
-from solfer.recording.model import COLUMNS, JOINTS
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND
 from solfer.robot import Robot
 from solfer.transport.messages import BodyMessage, JointMessage, PointsMessage, VectorMessage, WrenchMessage
 
@@ -112,7 +112,7 @@ class PluginLog:
         if isinstance(pipe, StateFeedbackPipe):
             for each in pipe.state_fields:
                 names = [robot.dofs[dof] for dof in each.dofs]
-                kind = JOINTS if each.field in JOINT_PARTS else COLUMNS
+                kind = JOINTS_KIND if each.field in JOINT_PARTS else COLUMNS_KIND
                 log.add(each.field, each.values, names, _units(robot, names, each.field), kind=kind)
         elif isinstance(pipe, ContactFeedbackPipe):
             for name, wrench in pipe.wrenches.items():
@@ -129,7 +129,7 @@ class PluginLog:
         port = self._plugin.component.outputs.get(pipe.name)
         if isinstance(sent, JointMessage):
             for field, values in _joint_fields(sent):
-                kind = JOINTS if field in JOINT_PARTS else COLUMNS
+                kind = JOINTS_KIND if field in JOINT_PARTS else COLUMNS_KIND
                 log.add(f"{name}/{field}", values, sent.names, _units(robot, sent.names, field), kind=kind)
         elif isinstance(sent, BodyMessage):
             parts = (sent.position, sent.orientation, sent.linear, sent.angular)
@@ -155,7 +155,9 @@ class PluginLog:
         for part in parts:
             self._copies.append((memoryview(whole[start : start + part.size]), memoryview(part)))
             start += part.size
-        log.add(name, whole, NAMED[kind], unit=with_units(NAMED[kind], UNITS), frame=frame, kind=kind, child=child)
+        log.add(
+            name, whole, NAMED[kind], unit=with_units(NAMED[kind], CHANNEL_UNITS), frame=frame, kind=kind, child=child
+        )
 
 
 def _count_in(gates: Iterable[CommandGate], counts: np.ndarray) -> None:
@@ -186,7 +188,7 @@ def _declared(plugin: Plugin, log: Logger) -> None:
 
 def _add_state(log: Logger, robot: Robot, state: State) -> None:
     for field, interface in _STATES.items():
-        log.add(field, state[interface], robot.dofs, _units(robot, robot.dofs, field), kind=JOINTS)
+        log.add(field, state[interface], robot.dofs, _units(robot, robot.dofs, field), kind=JOINTS_KIND)
 
 
 def _joint_fields(sent: JointMessage) -> Iterator[tuple[str, np.ndarray]]:
@@ -198,10 +200,10 @@ def _joint_fields(sent: JointMessage) -> Iterator[tuple[str, np.ndarray]]:
 
 def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     """Declare the numbers of a port."""
-    kind = MESSAGES[port.quantity]
+    kind = POINT_MESSAGES[port.quantity]
     columns = NAMED[kind]
     unit = _UNITS.get(port.quantity, "")
-    units = (unit,) * len(columns) if unit else with_units(columns, UNITS)
+    units = (unit,) * len(columns) if unit else with_units(columns, CHANNEL_UNITS)
     if port.count is None:
         log.add(name, port.value, columns, unit=units, frame=frame, kind=kind)
     else:
@@ -211,7 +213,7 @@ def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
 
 def _add_wrench(log: Logger, name: str, wrench: np.ndarray, frame: str) -> None:
     kind = "geometry_msgs/WrenchStamped"
-    log.add(name, wrench, NAMED[kind], unit=with_units(NAMED[kind], UNITS), frame=frame, kind=kind)
+    log.add(name, wrench, NAMED[kind], unit=with_units(NAMED[kind], CHANNEL_UNITS), frame=frame, kind=kind)
 
 
 def _of_each(names: tuple[str, ...], values: np.ndarray) -> list[str]:

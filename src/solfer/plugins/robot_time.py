@@ -5,16 +5,16 @@ from collections.abc import Sequence
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.cycle_timing import PassedPeriods
 
-EARLY, LATE = 0.03, 0.06
+EARLY, LATENESS = 0.03, 0.06
 """Times by which the newest stamp may be before the robot's time, or behind it: messages come early or late [s]."""
 
-SLOWEST = 0.01
+ROBOT_TIME_LOWEST_SPEED = 0.01
 """How fast the robot's time goes at least, by the clock: never not at all, for many divide by what has passed."""
 
-LOOK, KEPT = 1.0, 0.02
+DRIFT_WINDOW, CLOCK_TOLERANCE = 1.0, 0.02
 """The clock counts again where the robot was no more than so much slower or faster within such a time [s]."""
 
-SET, FROZEN = 1.0, 0.5
+SET, CLOCK_JUMP = 1.0, 0.5
 """A stamp that jumps by this is of a clock that was set, and one that stays for so long is of none [s]."""
 
 
@@ -23,7 +23,7 @@ class RobotTime:
 
     A simulation that cannot hold real time falls behind the clock of those who command it: references that follow the
     clock would run away from the robot. The stamps of the first feedback that measures it show how far it has come.
-    Messages that are merely late or lost change nothing: within `EARLY` and `LATE` the clock counts. Beyond that the
+    Messages that are only late or lost change nothing: within `EARLY` and `LATENESS` the clock counts. Beyond that the
     stamps do, until the robot keeps up with the clock again.
 
     Args:
@@ -51,16 +51,16 @@ class RobotTime:
         progress = self._progress(by_clock)
         self._ahead += by_clock - progress
         self.lost = 0.0
-        if self._stamp == 0.0 or self._still > FROZEN:
+        if self._stamp == 0.0 or self._still > CLOCK_JUMP:
             self._ahead = 0.0
             self._follows = False
         if not self._follows:
-            self._follow(not -EARLY <= self._ahead <= LATE)
+            self._follow(not -EARLY <= self._ahead <= LATENESS)
             return by_clock
         self._looked += by_clock
-        if self._looked > LOOK:
-            self._follow(abs(self._ahead) > KEPT)
-        passed = max(progress, SLOWEST * by_clock)
+        if self._looked > DRIFT_WINDOW:
+            self._follow(abs(self._ahead) > CLOCK_TOLERANCE)
+        passed = max(progress, ROBOT_TIME_LOWEST_SPEED * by_clock)
         self.lost = by_clock - passed
         return passed
 

@@ -15,17 +15,17 @@ from solfer.transport import Middleware
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
-FIRST = 60.0
+FIRST_MESSAGES_PATIENCE = 60.0
 """Longest wait for the first messages of all required feedbacks [s]."""
 
-SETTLE = 0.1
+RESTART_SETTLING_TIME = 0.1
 """Time after a simulation began again until received messages are certain to be new [s]."""
 
 STALL = 0.2
 """Default of the lateness of a plugin's own loop at which it starts again [s]. After less a component goes on, by the
 time that has passed; meanwhile the lower level carries out its last commands, for its lease on the joints is longer."""
 
-PERIODS = 5
+SETTLING_PERIODS = 5
 """The same in periods of the plugin; the longer one counts."""
 
 
@@ -76,7 +76,7 @@ class StartConditions:
         self._plugin = plugin
         self._feedback_timeouts = watches
         self._claim = claim
-        self._longest = period + min(stall or max(STALL, PERIODS * period), watches.patience)
+        self._longest = period + min(stall or max(STALL, SETTLING_PERIODS * period), watches.patience)
         self._newest = math.inf
         self._middleware = middleware
         self._now = middleware.now
@@ -127,7 +127,7 @@ class StartConditions:
 
     def forgotten(self, now: float) -> None:
         """Note that all was discarded that was received before `now` [s]: what comes soon may be old, too."""
-        self._earliest = now + SETTLE
+        self._earliest = now + RESTART_SETTLING_TIME
         self.lacks = f"{self._missing()}, {self._past}"
         self.level = logging.WARNING
 
@@ -180,10 +180,10 @@ class StartConditions:
                 )
             return HOLD
         if self._latest is None:
-            self._latest = now + FIRST
+            self._latest = now + FIRST_MESSAGES_PATIENCE
         elif now > self._latest and not rivalries:
             raise ReceiveTimeout(
-                f"plugin '{self._plugin}' has waited {FIRST:g} s {self.lacks}",
+                f"plugin '{self._plugin}' has waited {FIRST_MESSAGES_PATIENCE:g} s {self.lacks}",
                 expected="a publisher, or `initialize: false`",
             )
         return WAIT

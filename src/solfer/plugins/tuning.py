@@ -32,13 +32,13 @@ logger = logging.getLogger(__name__)
 RAMP = 0.5
 """Time in which numbers move to new ones [s]."""
 
-MOST = 16
+REQUEST_PARAMETERS = 16
 """Most parameters that one request changes."""
 
-AT_ONCE = 2
+MOVING_PARAMETERS = 2
 """Most parameters that move in one cycle; more of them take turns."""
 
-KEPT = 1000
+WAITING_CHANGES = 1000
 """Most changes that wait to be logged."""
 
 
@@ -143,7 +143,7 @@ class Tuning:
         self._time = 0.0
         self._configured = self._newest = tags
         self._lock = threading.Lock()
-        self._unsaid: deque[tuple[tuple[str, Any, Any], ...]] = deque(maxlen=KEPT)
+        self._unsaid: deque[tuple[tuple[str, Any, Any], ...]] = deque(maxlen=WAITING_CHANGES)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -178,7 +178,7 @@ class Tuning:
         """Move numbers on by `step` [s]; where `moves` is False there is nothing to do."""
         self._time += step
         moving = self._moving
-        for _ in range(min(len(moving), AT_ONCE)):
+        for _ in range(min(len(moving), MOVING_PARAMETERS)):
             motion = next(iter(moving))
             del moving[motion]
             if motion.go_on(self._time):
@@ -257,8 +257,10 @@ class Tuning:
             except SolferError as error:
                 raise error.at(name) from None
             goals[knob.motion] = numbers, bool(np.isfinite(numbers).all())
-        if len(lines) > MOST:
-            raise ComponentError(f"{len(lines)} parameters change at once", expected=f"at most {MOST} in a request")
+        if len(lines) > REQUEST_PARAMETERS:
+            raise ComponentError(
+                f"{len(lines)} parameters change at once", expected=f"at most {REQUEST_PARAMETERS} in a request"
+            )
         return _Change(before, after, tuple(goals.items()), writes=tuple(writes), lines=tuple(lines))
 
     def _explained(self, error: SolferError) -> SolferError:

@@ -17,7 +17,7 @@ from solfer.points.compiled.kernel import Operation, run
 from solfer.points.compiled.registry import Kernel
 from solfer.points.point import Point
 
-NOTHING = np.zeros(0)
+NO_NUMBERS = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class LinkMotion:
 
     joint: int = 0
     parts: int = 0
-    offset: np.ndarray = field(default_factory=lambda: NOTHING)
+    offset: np.ndarray = field(default_factory=lambda: NO_NUMBERS)
 
 
-STILL = LinkMotion()
+PROGRAM_STILLNESS = LinkMotion()
 """For operations that compute no motion of a link."""
 
 
@@ -65,9 +65,9 @@ class Instruction:
         point: Point,
         operands: tuple[Point, ...] = (),
         *,
-        numbers: np.ndarray = NOTHING,
-        table: np.ndarray = NOTHING,
-        motion: LinkMotion = STILL,
+        numbers: np.ndarray = NO_NUMBERS,
+        table: np.ndarray = NO_NUMBERS,
+        motion: LinkMotion = PROGRAM_STILLNESS,
         columns: np.ndarray | None = None,
     ):
         columns = point.written_columns() if columns is None else columns
@@ -244,7 +244,7 @@ class CompiledPoint(Point, abc.ABC):
     @property
     def written_offset(self) -> np.ndarray:
         """The offset that its instructions write, where it is a dynamic point."""
-        return NOTHING
+        return NO_NUMBERS
 
     def compute(self) -> None:
         """Write the value."""

@@ -7,13 +7,13 @@ from pathlib import Path
 from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.latched import latched
 
-FILE = "estop"
-KIND = "estop"
-LAYOUT = b"""{"words": ["tripped", "time [ns]", "pid", "answer [ns]", "answering pid", "holds"],
+ESTOP_FILE = "estop"
+ESTOP_KIND = "estop"
+ESTOP_LAYOUT = b"""{"words": ["tripped", "time [ns]", "pid", "answer [ns]", "answering pid", "holds"],
 "texts": ["reason", "answer"]}"""
 TRIPPED, TIME, PID, ANSWER, ANSWERING, HOLDS = range(6)
-WORDS = 6
-TEXT = 160  # [words], [B]
+ESTOP_WORDS = 6
+ESTOP_TEXT_BYTES = 160  # [words], [B]
 
 
 class EmergencyStopLatch:
@@ -32,10 +32,12 @@ class EmergencyStopLatch:
     """
 
     def __init__(self, folder: Path):
-        self.segment = latched(folder / FILE, KIND, LAYOUT, size=8 * WORDS + 2 * TEXT)
-        self._words = self.segment.data[: 8 * WORDS].cast("q")
-        self._text = self.segment.data[8 * WORDS : 8 * WORDS + TEXT]
-        self._answer = self.segment.data[8 * WORDS + TEXT : 8 * WORDS + 2 * TEXT]
+        self.segment = latched(
+            folder / ESTOP_FILE, ESTOP_KIND, ESTOP_LAYOUT, size=8 * ESTOP_WORDS + 2 * ESTOP_TEXT_BYTES
+        )
+        self._words = self.segment.data[: 8 * ESTOP_WORDS].cast("q")
+        self._text = self.segment.data[8 * ESTOP_WORDS : 8 * ESTOP_WORDS + ESTOP_TEXT_BYTES]
+        self._answer = self.segment.data[8 * ESTOP_WORDS + ESTOP_TEXT_BYTES : 8 * ESTOP_WORDS + 2 * ESTOP_TEXT_BYTES]
 
     def __bool__(self) -> bool:
         return bool(self._words[TRIPPED])
@@ -106,4 +108,4 @@ def _read(text: memoryview) -> str:
 
 
 def _write(text: memoryview, content: str) -> None:
-    text[:] = content.encode(errors="replace")[:TEXT].ljust(TEXT, b"\0")
+    text[:] = content.encode(errors="replace")[:ESTOP_TEXT_BYTES].ljust(ESTOP_TEXT_BYTES, b"\0")

@@ -24,11 +24,11 @@ from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import TRIGGER, NoFields
-from solfer.transport.plugin_state import FAILED, SAFE_STOP, PluginState
+from solfer.transport.plugin_state import FAILED_STATES, SAFE_STOP, PluginState
 
 logger = logging.getLogger(__name__)
 
-SELDOM = 0.1
+BESIDE_CALL_PERIOD = 0.1
 """Time between two calls of `beside` [s]."""
 
 CYCLE, OVERHEAD, LATENESS = LoopTime
@@ -123,7 +123,7 @@ class Executor:
         )
         self._set.measure(telemetry.nanoseconds, self._durations[len(LoopTime) :])
         self._set.interrupted = self._interrupted
-        self._seldom = max(1, round(SELDOM * self.rate))
+        self._seldom = max(1, round(BESIDE_CALL_PERIOD * self.rate))
         self._period = round(1e9 / self.rate)
         self._late = LeakyCounter(rules.overruns)
         self._black_box = telemetry.black_box
@@ -293,7 +293,7 @@ class Executor:
         """Publish a plugin's new state, and log why it is aborted."""
         state = managed.state
         budget = self._set.budgets[index]
-        if state in FAILED:
+        if state in FAILED_STATES:
             logger.error(
                 "%s is aborted: %s",
                 managed.name,

@@ -8,7 +8,7 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.namespaces import STATISTICS
 
-LOOK = 0.05
+HEARTBEAT_POLL_PERIOD = 0.05
 """Time between two looks for a process that is missing, or has begun again [s]."""
 
 
@@ -41,7 +41,7 @@ class Heartbeat:
             now = time.monotonic()
             if now < self._next_look:
                 return None
-            self._next_look = now + LOOK
+            self._next_look = now + HEARTBEAT_POLL_PERIOD
             segment = self._attach()
             if segment is None:
                 return None

@@ -8,10 +8,10 @@ from typing import Protocol
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware
 
-PERIOD = 1.0
+LOOKOUT_PERIOD = 1.0
 """Time between two looks [s]."""
 
-PAUSE = 0.002
+LOOKOUT_PAUSE = 0.002
 """Time between the reports of two pipes [s]: the loop needs the interpreter meanwhile."""
 
 Reports = Iterable[tuple[str, HealthReport]]
@@ -59,14 +59,14 @@ class Lookout:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._end.wait(PERIOD):
+        while not self._end.wait(LOOKOUT_PERIOD):
             for name, peers in self._peers.items():
                 if not peers.done:
                     peers.look()
                     self._report(name, peers.complaint())
             for part, report in chain.from_iterable(pipes() for pipes in self._pipes):
                 self._middleware.report(part, report.level, report.summary, report.values)
-                if self._end.wait(PAUSE):
+                if self._end.wait(LOOKOUT_PAUSE):
                     return
 
     def _report(self, name: str, complaint: str) -> None:

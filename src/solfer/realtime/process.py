@@ -16,7 +16,7 @@ logger = logging.getLogger(__name__)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-LOOK = 0.1
+SIGNAL_POLL_PERIOD = 0.1
 """Time between two looks at the handlers, which take 10 us [s]."""
 
 
@@ -48,7 +48,7 @@ class ProcessEnd:
             os._exit(1)
         now = time.monotonic()
         if now > self._next_look:
-            self._next_look = now + LOOK
+            self._next_look = now + SIGNAL_POLL_PERIOD
             self._take_back()
         return True
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-STOPPED = frozenset("Tt")
+STOPPED_CODES = frozenset("Tt")
 """States of a process that a signal or a debugger has stopped."""
 
 
@@ -31,7 +31,7 @@ class ProcessorShare:
         state, ran = self._read()
         before = self._ran
         self._ran = ran
-        if state in STOPPED:
+        if state in STOPPED_CODES:
             return 0.0
         return 1e-9 * (ran - before) if state == "R" else elapsed
 

@@ -14,13 +14,13 @@ logger = logging.getLogger(__name__)
 LIMIT = 0.1
 """Time in which a process could have cycled and did not, above which it hangs [s]."""
 
-PATIENCE = 10.0
+WATCHDOG_PATIENCE = 10.0
 """Multiple of the limit: age of the newest beat above which a process hangs even where the machine did not run it."""
 
-LOOKS = 3
+WATCHDOG_POLLS = 3
 """Looks that it takes at least to find a hang, so that a stall of the whole machine, with the watchdog, is none."""
 
-PERIOD = 0.01
+WATCHDOG_PERIOD = 0.01
 """Time between two looks [s]."""
 
 
@@ -79,7 +79,7 @@ class Watchdog:
             if presence is not None and presence.lost():
                 self._stop.trip(presence.loss)
                 presence.require()
-            due = max(due + PERIOD, time.monotonic())
+            due = max(due + WATCHDOG_PERIOD, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
 
     def _measure(self, age: float) -> None:
@@ -90,8 +90,8 @@ class Watchdog:
         else:
             able = self._share.since(age - self._age)
         self._age = age
-        self._idle += min(able, self._limit / LOOKS)
-        if self._idle > self._limit or age > PATIENCE * self._limit:
+        self._idle += min(able, self._limit / WATCHDOG_POLLS)
+        if self._idle > self._limit or age > WATCHDOG_PATIENCE * self._limit:
             self._over = True
             self._judge()
 

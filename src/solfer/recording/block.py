@@ -8,7 +8,7 @@ import numpy as np
 from mcap.opcode import Opcode
 
 from solfer.errors import RecordingError
-from solfer.recording.kinds import JOINT_PARTS, JOINTS, STAMP, Template, check, part_of, template, topic_of
+from solfer.recording.kinds import JOINT_PARTS, JOINTS_KIND, STAMP_PLACE, Template, check, part_of, template, topic_of
 from solfer.recording.model import Channel
 
 _RECORD = "<BQHIQQ"  # of a message: opcode, length, channel, sequence, time of the log, time of publication
@@ -16,7 +16,7 @@ _HEADER = struct.calcsize(_RECORD)
 _SEQUENCE = 11
 _LOGGED = 15
 _PUBLISHED = 23
-_SECOND = 1_000_000_000
+_BLOCK_SECOND = 1_000_000_000
 
 
 class RecordedTopic:
@@ -63,7 +63,7 @@ def topics_of(channels: Sequence[Channel]) -> list[RecordedTopic]:
     """Group channels: those of joints that differ by the field alone share a topic, any other has its own."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for index, channel in enumerate(channels):
-        same = (topic_of(channel), channel.columns, channel.frame) if channel.kind == JOINTS else (channel.name,)
+        same = (topic_of(channel), channel.columns, channel.frame) if channel.kind == JOINTS_KIND else (channel.name,)
         groups.setdefault(same, []).append(index)
     topics = []
     used = set()
@@ -78,7 +78,7 @@ def topics_of(channels: Sequence[Channel]) -> list[RecordedTopic]:
 
 
 def _rank(channel: Channel) -> int:
-    return JOINT_PARTS.index(part_of(channel.name)) if channel.kind == JOINTS else 0
+    return JOINT_PARTS.index(part_of(channel.name)) if channel.kind == JOINTS_KIND else 0
 
 
 class Block:
@@ -113,7 +113,7 @@ class Block:
         self._row = np.frombuffer(bytes(data), dtype=np.uint8)
         self.size = len(data)
         self._times = self._bytes(8, _LOGGED, _PUBLISHED)
-        self._numbers, self._stamps = self._bytes(4, _SEQUENCE), self._bytes(8, _HEADER + STAMP)
+        self._numbers, self._stamps = self._bytes(4, _SEQUENCE), self._bytes(8, _HEADER + STAMP_PLACE)
 
     def _bytes(self, size: int, *places: int) -> np.ndarray:
         """Return the indices of numbers of so many bytes that are at these places of all messages."""
@@ -133,7 +133,7 @@ class Block:
         """
         rows = np.empty((len(times), self.size), dtype=np.uint8)
         rows[:] = self._row
-        stamps = np.stack((times // _SECOND, times % _SECOND), axis=1)
+        stamps = np.stack((times // _BLOCK_SECOND, times % _BLOCK_SECOND), axis=1)
         rows[:, self._times] = _repeated(times.astype("<u8"), len(self._times))
         rows[:, self._numbers] = _repeated(numbers.astype("<u4"), len(self._numbers))
         rows[:, self._stamps] = _repeated(stamps.astype("<u4"), len(self._stamps))

@@ -2,7 +2,7 @@
 
 import struct
 
-from solfer.recording.kinds import STAMP, Cdr
+from solfer.recording.kinds import STAMP_PLACE, Cdr
 from solfer.recording.model import Event
 
 _ERRORS = frozenset({"abort", "aborted", "fault", "lost"})
@@ -20,13 +20,13 @@ def event_message(event: Event, time: int) -> bytes:
     cdr.number("I", 1)
     cdr.string(_KEY)
     cdr.string(event.kind)
-    struct.pack_into("<iI", cdr.data, STAMP, *divmod(time, 1_000_000_000))
+    struct.pack_into("<iI", cdr.data, STAMP_PLACE, *divmod(time, 1_000_000_000))
     return bytes(cdr.data)
 
 
 def event_of(message: bytes, time: int) -> Event:
     """Read an event of a time [ns] from its message; the inverse of `event_message`."""
-    place = STAMP + 8
+    place = STAMP_PLACE + 8
     _, place = _string(message, place)
     place = _aligned(place) + 4 + 1  # one status, its level
     plugin, place = _string(message, place)
@@ -38,7 +38,7 @@ def event_of(message: bytes, time: int) -> Event:
 
 
 def _aligned(place: int) -> int:
-    return place + -(place - STAMP) % 4
+    return place + -(place - STAMP_PLACE) % 4
 
 
 def _string(message: bytes, place: int) -> tuple[str, int]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from solfer.errors import RecordingError, UnknownName
-from solfer.recording.model import COLUMNS, JOINTS, Channel
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel
 
 JOINT_PARTS = ("position", "velocity", "effort")
 """Fields of a message of joints, each a channel of its own."""
@@ -28,7 +28,7 @@ NAMED = {
 }
 """Columns of the kinds that say themselves what each of their numbers is."""
 
-UNITS = {
+CHANNEL_UNITS = {
     **dict.fromkeys(_XYZ, "m"),
     **dict.fromkeys(_TWIST[:3], "m/s"),
     **dict.fromkeys(_TWIST[3:], "rad/s"),
@@ -37,10 +37,10 @@ UNITS = {
 }
 """Units of these columns; a quaternion has none."""
 
-KINDS = (COLUMNS, JOINTS, *NAMED)
+CHANNEL_KINDS = (COLUMNS_KIND, JOINTS_KIND, *NAMED)
 """All kinds of channels."""
 
-EVENTS = "diagnostic_msgs/DiagnosticArray"
+EVENT_MESSAGE = "diagnostic_msgs/DiagnosticArray"
 """Message of an event."""
 
 _DEFINITIONS = {
@@ -62,12 +62,12 @@ _DEFINITIONS = {
     "geometry_msgs/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench",
     "nav_msgs/Odometry": "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
     "geometry_msgs/TwistWithCovariance twist",
-    JOINTS: "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
-    COLUMNS: "std_msgs/Header header\nfloat64[] values",
+    JOINTS_KIND: "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
+    COLUMNS_KIND: "std_msgs/Header header\nfloat64[] values",
     "diagnostic_msgs/KeyValue": "string key\nstring value",
     "diagnostic_msgs/DiagnosticStatus": "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\nstring name\n"
     "string message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values",
-    EVENTS: "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status",
+    EVENT_MESSAGE: "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status",
 }
 
 
@@ -111,13 +111,13 @@ class Cdr:
         return places[0] if places else len(self.data)
 
     def header(self, frame: str) -> None:
-        """Append a header; its stamp is at `STAMP`."""
+        """Append a header; its stamp is at `STAMP_PLACE`."""
         self.number("i", 0)
         self.number("I", 0)
         self.string(frame)
 
 
-STAMP = 4
+STAMP_PLACE = 4
 """Where the stamp of a message is: seconds and nanoseconds, four bytes each."""
 
 
@@ -140,9 +140,9 @@ def template(channels: Sequence[Channel]) -> Template:
     first = channels[0]
     cdr = Cdr()
     cdr.header(first.frame)
-    if first.kind == JOINTS:
+    if first.kind == JOINTS_KIND:
         runs = _joints(cdr, channels)
-    elif first.kind == COLUMNS:
+    elif first.kind == COLUMNS_KIND:
         runs = [_sequence(cdr, len(first.columns))]
     elif first.kind == "nav_msgs/Odometry":
         runs = _odometry(cdr, first.child)
@@ -182,7 +182,7 @@ def part_of(name: str) -> str:
 
 def topic_of(channel: Channel) -> str:
     """Return the topic of a channel: its name, without the field if it is one of a message of joints."""
-    return channel.name.rpartition("/")[0] if channel.kind == JOINTS else channel.name
+    return channel.name.rpartition("/")[0] if channel.kind == JOINTS_KIND else channel.name
 
 
 def check(channel: Channel) -> None:
@@ -193,9 +193,9 @@ def check(channel: Channel) -> None:
         RecordingError: Its name or its columns are not those of its kind.
     """
     where = f"channel '{channel.name}'"
-    if channel.kind not in KINDS:
-        raise UnknownName("kind of channel", channel.kind, KINDS, where=where)
-    if channel.kind == JOINTS and (part_of(channel.name) not in JOINT_PARTS or not topic_of(channel)):
+    if channel.kind not in CHANNEL_KINDS:
+        raise UnknownName("kind of channel", channel.kind, CHANNEL_KINDS, where=where)
+    if channel.kind == JOINTS_KIND and (part_of(channel.name) not in JOINT_PARTS or not topic_of(channel)):
         raise RecordingError(
             "a channel of joints without its field", where=where, expected=f"<name>/{{{','.join(JOINT_PARTS)}}}"
         )

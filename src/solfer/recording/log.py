@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.errors import RecordingError, SizeMismatch
 from solfer.recording.kinds import check
-from solfer.recording.model import COLUMNS, Channel
+from solfer.recording.model import COLUMNS_KIND, Channel
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Logger:
         columns: Sequence[str] = (),
         unit: str | Sequence[str] = "",
         frame: str = "",
-        kind: str = COLUMNS,
+        kind: str = COLUMNS_KIND,
         child: str = "",
         factor: float = 1.0,
     ) -> None:

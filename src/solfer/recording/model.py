@@ -7,16 +7,16 @@ import numpy as np
 
 from solfer.errors import SizeMismatch, UnknownName
 
-COLUMNS = "solfer_msgs/Columns"
+COLUMNS_KIND = "solfer_msgs/Columns"
 """Kind of a channel that is nothing but named columns."""
 
-JOINTS = "sensor_msgs/JointState"
+JOINTS_KIND = "sensor_msgs/JointState"
 """Kind of a channel with one number for each joint; its name ends with the field of the message."""
 
 REQUEST = "request"
 """Kind of the event that something was asked of a component: its name and fields, as JSON."""
 
-CLAIMED, RELEASED, LOST, RESET = "claim", "release", "lost", "reset"
+CLAIMED, RELEASED_EVENT, LOST_EVENT, RESET = "claim", "release", "lost", "reset"
 """Kinds of the events that a plugin got its joints, gave them back or lost them, or reset its component."""
 
 

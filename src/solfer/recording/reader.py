@@ -21,16 +21,16 @@ from solfer.errors import RecordingError, SolferError, described
 from solfer.files import open_regular
 from solfer.recording.block import RecordedTopic
 from solfer.recording.events import event_of
-from solfer.recording.kinds import EVENTS
+from solfer.recording.kinds import EVENT_MESSAGE
 from solfer.recording.model import Channel, Event, Recording
 from solfer.recording.writer import END, METADATA
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-_CHUNK = struct.Struct("<QQQI")
+_MCAP_CHUNK = struct.Struct("<QQQI")
 _CONTENT = _HEAD.size + _MESSAGE.size
-_LARGEST = 1 << 28  # [B], of a record and of the messages in a chunk: solfer's own have some hundred kB
-_EXPECTED = "a file that `solfer record` made"
+_MCAP_LARGEST = 1 << 28  # [B], of a record and of the messages in a chunk: solfer's own have some hundred kB
+_MCAP_EXPECTED = "a file that `solfer record` made"
 _DAMAGES = (
     ValueError,
     TypeError,
@@ -41,7 +41,7 @@ _DAMAGES = (
     struct.error,
     McapError,
 )
-_ROW = np.dtype([("sequence", "<u4"), ("time", "<u8")])
+_MCAP_ROW = np.dtype([("sequence", "<u4"), ("time", "<u8")])
 
 
 def read(path: Path) -> Recording:
@@ -66,10 +66,10 @@ def read(path: Path) -> Recording:
                 raise RecordingError(error.what, where=where, expected=error.expected) from error
             except _DAMAGES as error:
                 what = f"the recording is damaged: {described(error)}"
-                raise RecordingError(what, where=f"{path}: {reader.place}", expected=_EXPECTED) from error
+                raise RecordingError(what, where=f"{path}: {reader.place}", expected=_MCAP_EXPECTED) from error
     except OSError as error:
         raise RecordingError(
-            f"the recording cannot be read: {error.strerror}", where=str(path), expected=_EXPECTED
+            f"the recording cannot be read: {error.strerror}", where=str(path), expected=_MCAP_EXPECTED
         ) from error
 
 
@@ -95,7 +95,7 @@ class _Reader:
     def recording(self) -> Recording:
         """Read all records, then put the numbers of each channel together."""
         if self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise RecordingError("this is no MCAP file", expected=_EXPECTED)
+            raise RecordingError("this is no MCAP file", expected=_MCAP_EXPECTED)
         for opcode, content in self._records():
             self._take(opcode, content)
             if opcode == Opcode.DATA_END:
@@ -124,7 +124,7 @@ class _Reader:
             if len(head) < _HEAD.size or length > rest - _HEAD.size:
                 self._missing.append(f"an unfinished record of {rest} bytes at the end")
                 return
-            if not opcode or length > _LARGEST:
+            if not opcode or length > _MCAP_LARGEST:
                 raise ValueError(f"a record of the kind {opcode} with {length} bytes")
             yield opcode, self._file.read(length)
             rest -= _HEAD.size + length
@@ -149,13 +149,13 @@ class _Reader:
 
     def _chunk(self, content: bytes) -> None:
         """Take the messages of a chunk; one that is damaged is left out."""
-        first, last, size, checksum = _CHUNK.unpack_from(content)
-        stream = ReadDataStream(io.BytesIO(content[_CHUNK.size :]))
+        first, last, size, checksum = _MCAP_CHUNK.unpack_from(content)
+        stream = ReadDataStream(io.BytesIO(content[_MCAP_CHUNK.size :]))
         packing = stream.read_prefixed_string()
         length = stream.read8()
         packed = stream.read(length)
         try:
-            if size > _LARGEST or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
+            if size > _MCAP_LARGEST or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
                 raise zstandard.ZstdError("as much memory would be taken as a damaged number says")
             messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
         except zstandard.ZstdError:
@@ -172,7 +172,7 @@ class _Reader:
         topic = self._topics.get(number)
         if topic is None:
             return
-        if self._schemas[topic.schema_id] == EVENTS:
+        if self._schemas[topic.schema_id] == EVENT_MESSAGE:
             for place, length in zip(places, lengths, strict=True):
                 content = data[place : place + length].tobytes()
                 time = _MESSAGE.unpack_from(content, _HEAD.size)[2]
@@ -188,10 +188,10 @@ class _Reader:
         for number, topic in self._topics.items():
             self.place = f"topic {topic.topic}"
             kind = self._schemas[topic.schema_id]
-            if kind == EVENTS:
+            if kind == EVENT_MESSAGE:
                 continue
             if "channels" not in topic.metadata:
-                raise RecordingError("the topic does not say what its columns are", expected=_EXPECTED)
+                raise RecordingError("the topic does not say what its columns are", expected=_MCAP_EXPECTED)
             layout = RecordedTopic(topic.topic[1:], (), RecordedTopic.channels_of(kind, topic.metadata))
             stamps, contents = self._stacked(number, layout)
             gaps = max(gaps, _gaps(stamps["sequence"]))
@@ -205,7 +205,7 @@ class _Reader:
         whole = [(stamps, contents) for stamps, contents in parts if contents.shape[1:] == (size,)]
         if len(whole) < len(parts):
             self._missing.append(f"messages of {layout.name} that do not have the layout of their topic")
-        stamps = np.concatenate([np.zeros(0, _ROW), *(stamps for stamps, _ in whole)])
+        stamps = np.concatenate([np.zeros(0, _MCAP_ROW), *(stamps for stamps, _ in whole)])
         contents = np.concatenate([np.zeros((0, size), np.uint8), *(contents for _, contents in whole)])
         order = np.argsort(stamps["time"], kind="stable")
         return (stamps, contents) if np.all(np.diff(order) == 1) else (stamps[order], contents[order])
@@ -229,7 +229,7 @@ def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
 
 def _stamps(rows: np.ndarray) -> np.ndarray:
     """Return the numbers and times of messages, shape (T,)."""
-    stamps = np.zeros(len(rows), _ROW)
+    stamps = np.zeros(len(rows), _MCAP_ROW)
     stamps["sequence"] = np.ascontiguousarray(rows[:, 11:15]).view("<u4")[:, 0]
     stamps["time"] = np.ascontiguousarray(rows[:, 15:23]).view("<u8")[:, 0]
     return stamps

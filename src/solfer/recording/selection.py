@@ -10,7 +10,7 @@ import numpy as np
 from solfer.errors import UnknownName
 from solfer.recording.model import Channel, Recording
 
-HALF = 5e-10
+HALF_OF_RESOLUTION = 5e-10
 """Half of the resolution of times in a file [s]."""
 
 
@@ -85,5 +85,5 @@ def between(recording: Recording, begin: float | None, end: float | None, start:
 
 
 def _within(channel: Channel, low: float, high: float) -> Channel:
-    rows = slice(*np.searchsorted(channel.times, (low - HALF, high + HALF)))
+    rows = slice(*np.searchsorted(channel.times, (low - HALF_OF_RESOLUTION, high + HALF_OF_RESOLUTION)))
     return dataclasses.replace(channel, times=channel.times[rows], values=channel.values[rows])

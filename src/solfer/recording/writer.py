@@ -31,14 +31,14 @@ from mcap.writer import MCAP0_MAGIC
 from solfer.errors import RecordingError
 from solfer.recording.block import Block
 from solfer.recording.events import event_message
-from solfer.recording.kinds import EVENTS, check, definition, ros_name
+from solfer.recording.kinds import EVENT_MESSAGE, check, definition, ros_name
 from solfer.recording.model import Channel, Event, Recording
 
 EVENT_TOPIC = "/events"
 METADATA, END = "solfer", "solfer_end"
 """Names of the texts at the beginning, and of those that only a file has whose writer came to its end."""
 
-_LONGEST = {"sec": 9223372036, "nsec": 854775807}
+_WRITTEN_LONGEST = {"sec": 9223372036, "nsec": 854775807}
 QOS = json.dumps(
     [
         {
@@ -46,10 +46,10 @@ QOS = json.dumps(
             "depth": 10,
             "reliability": 1,  # reliable
             "durability": 2,  # volatile
-            "deadline": _LONGEST,
-            "lifespan": _LONGEST,
+            "deadline": _WRITTEN_LONGEST,
+            "lifespan": _WRITTEN_LONGEST,
             "liveliness": 1,  # automatic
-            "liveliness_lease_duration": _LONGEST,
+            "liveliness_lease_duration": _WRITTEN_LONGEST,
             "avoid_ros_namespace_conventions": False,
         }
     ]
@@ -58,7 +58,7 @@ QOS = json.dumps(
 
 _LEVEL = 1  # of the compression: the fastest that is worth it
 _MEDIA = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
-_CHUNK = (
+_WRITTEN_CHUNK = (
     "<QQQIi4sQ"  # first and last time, size, checksum, name of the compression with its length, size of the records
 )
 
@@ -105,7 +105,7 @@ class RecordingWriter:
         self._text(METADATA, dict(metadata or {}))
         for name, data in (attachments or {}).items():
             self._attach(name, data)
-        self._events = self._channel(EVENTS, EVENT_TOPIC, {})
+        self._events = self._channel(EVENT_MESSAGE, EVENT_TOPIC, {})
 
     def block(self, channels: Sequence[Channel]) -> Block:
         """Announce channels that are recorded together; their own times and values do not count.
@@ -210,7 +210,7 @@ class RecordingWriter:
         packed = self._compress(messages)
         begin = int(index[..., 0].min())
         end = int(index[..., 0].max())
-        head = struct.pack(_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
+        head = struct.pack(_WRITTEN_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
         chunk = struct.pack("<BQ", Opcode.CHUNK, len(head) + len(packed)) + head + packed
         tail = bytearray()
         places = {}

@@ -14,7 +14,7 @@ from solfer.config.tasks.references import (
 )
 from solfer.config.yaml.files import located
 from solfer.errors import ConfigError, SizeMismatch, UnknownName
-from solfer.references.generator import SIZES, LineReference, ReferenceGenerator, Swing
+from solfer.references.generator import QUANTITY_SIZES, LineReference, ReferenceGenerator, Swing
 from solfer.references.table import header_of, read_table, require_length
 from solfer.references.timed import TimedReference
 
@@ -26,7 +26,7 @@ _COLUMNS = {
     "orientation": ("qx", "qy", "qz", "qw"),
     "pose": ("x", "y", "z", "qx", "qy", "qz", "qw"),
 }
-_KINDS = {
+_REFERENCE_KINDS = {
     "position": ("circle", "line", "sine", "waypoints", "file"),
     "orientation": ("waypoints", "file"),
     "pose": ("circle", "line", "sine", "waypoints", "file"),
@@ -47,13 +47,13 @@ def build_reference(record: ReferenceRecord, quantity: str, joints: Sequence[str
         SizeMismatch: There are too few or too many numbers.
         UnknownName: There is no such joint.
     """
-    if record.kind not in _KINDS[quantity]:
+    if record.kind not in _REFERENCE_KINDS[quantity]:
         raise ConfigError(
             f"there is no {record.kind} of this: it has {'joints' if quantity == POSTURE else 'no position'}",
             where=record.where(record.kind),
-            expected=", ".join(_KINDS[quantity]),
+            expected=", ".join(_REFERENCE_KINDS[quantity]),
         )
-    size, rates = SIZES.get(quantity, (len(joints), len(joints)))
+    size, rates = QUANTITY_SIZES.get(quantity, (len(joints), len(joints)))
     if record.circle is not None:
         return _circle(record.circle, size, rates)
     if record.line is not None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.numerics.rotations import quaternion_product
 
-SIZES = {"position": (3, 3), "orientation": (4, 3), "pose": (7, 6)}
+QUANTITY_SIZES = {"position": (3, 3), "orientation": (4, 3), "pose": (7, 6)}
 """How many numbers a quantity has, and how many its velocity; a posture has one of both for each joint."""
 
 EACH = 64

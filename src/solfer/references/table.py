@@ -10,10 +10,10 @@ from solfer.config.records.bounds import COORDINATE
 from solfer.config.yaml.files import read_text
 from solfer.errors import ConfigError, SizeMismatch, UnknownName
 
-LONGEST = 20_000
+TABLE_ROWS = 20_000
 """Rows of a table."""
 
-UNIT = 1e-3
+UNIT_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's length from one."""
 
 
@@ -64,8 +64,8 @@ def read_table(path: Path, columns: Sequence[str], where: str, named: bool) -> t
         if "qw" in found:
             require_length(row[-4:], f"{path}:{line}:{_column(fields, len(fields) - 4)}")
         rows.append(row)
-        if len(rows) > LONGEST:
-            raise ConfigError("too many lines", where=f"{path}:{line}:1", expected=f"{LONGEST} at most")
+        if len(rows) > TABLE_ROWS:
+            raise ConfigError("too many lines", where=f"{path}:{line}:1", expected=f"{TABLE_ROWS} at most")
     if not rows or (len(rows) == 1 and rows[0][0] == 0.0):
         raise ConfigError(
             f"'{path}' has no motion", where=f"{path}:1:1", expected="a line of numbers after 0 s, or several"
@@ -89,7 +89,7 @@ def header_of(path: Path, where: str) -> list[str]:
 
 def require_length(quaternion: Sequence[float], where: str) -> None:
     """Check that a quaternion has the length 1; a ConfigError at `where` if not."""
-    if abs(math.hypot(*quaternion) - 1.0) > UNIT:
+    if abs(math.hypot(*quaternion) - 1.0) > UNIT_TOLERANCE:
         raise ConfigError(f"the quaternion {list(quaternion)}", where=where, expected="a quaternion of length 1")
 
 

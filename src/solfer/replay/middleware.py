@@ -5,7 +5,7 @@ from typing import Any
 
 from solfer.config import Configuration
 from solfer.plugins.generation.dry_run import DryMiddleware
-from solfer.recording.model import JOINTS
+from solfer.recording.model import JOINTS_KIND
 from solfer.replay.rows import RecordedRows
 from solfer.robot.shipped import RobotFiles
 from solfer.transport.messages import GAINS
@@ -52,7 +52,7 @@ class ReplayMiddleware(DryMiddleware):
         for pipe in self._pipes(controller):
             begin = f"{self._rows.plugin}/command/{pipe}/"
             for name, channel in self._rows.recording.channels.items():
-                if name.startswith(begin) and (channel.kind == JOINTS or name.removeprefix(begin) in GAINS):
+                if name.startswith(begin) and (channel.kind == JOINTS_KIND or name.removeprefix(begin) in GAINS):
                     found |= dict.fromkeys(channel.columns)
         return tuple(found) or super().controller_joints(controller, timeout, where)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import RecordingError, UnknownName
 from solfer.recording.model import REQUEST, Channel, Recording
-from solfer.recording.selection import HALF
+from solfer.recording.selection import HALF_OF_RESOLUTION
 from solfer.transport.plugin_state import PluginState
 
 LIFE = "life"
@@ -59,7 +59,7 @@ class RecordedRows:
         found: dict[int, list[str]] = {}
         for event in self.recording.events:
             if event.plugin == self.plugin and event.kind == REQUEST:
-                row = int(np.searchsorted(self.times, event.time - HALF))
+                row = int(np.searchsorted(self.times, event.time - HALF_OF_RESOLUTION))
                 found.setdefault(row, []).append(event.text)
         return found
 
@@ -70,7 +70,7 @@ class RecordedRows:
 
     def places(self, channel: Channel) -> np.ndarray:
         """Return the newest row of a channel at each cycle, shape (T,); -1 before its first one."""
-        return np.searchsorted(channel.times, self.times + HALF, side="right") - 1
+        return np.searchsorted(channel.times, self.times + HALF_OF_RESOLUTION, side="right") - 1
 
     def values(self, channel: Channel, columns: Sequence[str]) -> np.ndarray:
         """Return columns at each cycle, shape (T, columns); NaN before the first row, later the newest one.

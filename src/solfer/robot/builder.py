@@ -14,7 +14,7 @@ from solfer.config import (
     PipeRecord,
     Problems,
 )
-from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
+from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
@@ -22,8 +22,8 @@ from solfer.model.contacts import ContactRecord
 from solfer.robot.files import own_contacts
 from solfer.robot.hardware_names import commanded_joints, received_joints
 from solfer.robot.names import (
-    FEEDBACK,
-    LOWER_LEVEL,
+    FEEDBACK_MAP,
+    LOWER_LEVEL_MAP,
     LOWER_LEVEL_MAPS,
     UNACTUATED,
     RobotNames,
@@ -34,7 +34,7 @@ from solfer.robot.robot import Robot
 from solfer.robot.shipped import with_bundled_base
 from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
-TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
+BUILDER_TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
 """How long the builder waits for a first message or a controller; after one did not answer, for each other [s]."""
 
 _LOG = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ class _Builder:
         self._outside = outside
         self._goes_on = goes_on
         self.faults: list[SolferError] = []
-        self._patience = TIMEOUT
+        self._patience = BUILDER_TIMEOUT
         self._waits = True
 
     def robot(self, beside: Robot | None) -> Robot:
@@ -152,14 +152,14 @@ class _Builder:
             if record.loading == "topic" and self._used(name):
                 self._add_topic(robot, name, record, where=record.where("source"))
         default = self._default_feedback()
-        if default is not None and FEEDBACK not in self._configuration.mappings:
-            self._add_topic(robot, FEEDBACK, default, where=default.where("source"))
+        if default is not None and FEEDBACK_MAP not in self._configuration.mappings:
+            self._add_topic(robot, FEEDBACK_MAP, default, where=default.where("source"))
 
     def _default_feedback(self) -> FeedbackRecord | None:
         """Return the first feedback of measured joints, if it is required at the start or a pipe uses its order."""
         for record in self._configuration.feedbacks:
             if record.measures_joints and record.source is not None:
-                return record if record.initialize or any(map(self._used, (FEEDBACK, *MIDDLEWARE_MAPS))) else None
+                return record if record.initialize or any(map(self._used, (FEEDBACK_MAP, *MIDDLEWARE_MAPS))) else None
         return None
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
@@ -216,13 +216,15 @@ class _Builder:
                 if own not in robot.maps:
                     self._add(robot, own, self._with_base(robot, named, order), where=record.where())
                 joints |= dict.fromkeys(order)
-        if joints and LOWER_LEVEL not in self._configuration.mappings:
-            self._add(robot, LOWER_LEVEL, self._with_base(robot, LOWER_LEVEL, tuple(joints)), where="")
+        if joints and LOWER_LEVEL_MAP not in self._configuration.mappings:
+            self._add(robot, LOWER_LEVEL_MAP, self._with_base(robot, LOWER_LEVEL_MAP, tuple(joints)), where="")
 
     def _add_middleware_map(self, robot: Robot) -> None:
         """Add the map of the middleware's order, if it has one, which is that of the lower level."""
         name = MIDDLEWARES[self._configuration.middleware].map
-        order = next((robot.maps[each].external for each in (FEEDBACK, LOWER_LEVEL) if each in robot.maps), None)
+        order = next(
+            (robot.maps[each].external for each in (FEEDBACK_MAP, LOWER_LEVEL_MAP) if each in robot.maps), None
+        )
         if name is not None and name not in self._configuration.mappings and order is not None:
             self._add(robot, name, self._with_base(robot, name, order), where="")
 

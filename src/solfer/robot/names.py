@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from solfer.config import CalibrationRecord, Configuration, DofsRecord, FeedbackRecord, Problems, Record
-from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
+from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.robot_names import names_in
 from solfer.config.yaml.nodes import Key
@@ -14,10 +14,10 @@ from solfer.model import Description, Semantics
 from solfer.robot.defaults import ACTUATED, ALL, MODEL_MAPS
 from solfer.robot.robot import Robot
 
-FEEDBACK, LOWER_LEVEL = "FEEDBACK", "LOWER_LEVEL"
+FEEDBACK_MAP, LOWER_LEVEL_MAP = "FEEDBACK", "LOWER_LEVEL"
 """Names of the maps of the default state feedback, and of all lower-level controllers."""
 
-LOWER_LEVEL_MAPS = (LOWER_LEVEL, *MIDDLEWARE_MAPS)
+LOWER_LEVEL_MAPS = (LOWER_LEVEL_MAP, *MIDDLEWARE_MAPS)
 """Maps that stand for the one of a controller in a pipe to it."""
 
 UNACTUATED = "unactuated"
@@ -169,7 +169,7 @@ def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> No
 
 def _maps(configuration: Configuration) -> Iterator[str]:
     """Yield the names of the maps that a Robot gets from its configuration."""
-    yield from (*MODEL_MAPS, ACTUATED, FEEDBACK, LOWER_LEVEL)
+    yield from (*MODEL_MAPS, ACTUATED, FEEDBACK_MAP, LOWER_LEVEL_MAP)
     predefined = configuration.tree.get(configuration.section, "mapping")
     yield from (name for name, _ in predefined.items()) if predefined else ()
     order = MIDDLEWARES[configuration.middleware].map

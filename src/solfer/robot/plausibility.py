@@ -12,7 +12,7 @@ from solfer.model.urdf.description import Description
 from solfer.model.urdf.unfit import unfit_parts
 from solfer.robot.shipped import RobotFiles
 
-TURN = 2.0 * math.pi + 1e-3
+WHOLE_TURN = 2.0 * math.pi + 1e-3
 """Angle beyond which a value looks like degrees [rad]; URDFs round a whole turn."""
 
 
@@ -53,8 +53,8 @@ def _of_limits(description: Description) -> Iterator[tuple[Mark, str]]:
         mark = Mark.read(joint.where)
         if mark is None or joint.lower is None or joint.upper is None or joint.type == "continuous":
             continue
-        if joint.type == "revolute" and max(-joint.lower, joint.upper) > TURN:
-            limit = joint.upper if joint.upper > TURN else joint.lower
+        if joint.type == "revolute" and max(-joint.lower, joint.upper) > WHOLE_TURN:
+            limit = joint.upper if joint.upper > WHOLE_TURN else joint.lower
             yield mark, f"joint '{joint.name}' has a limit that {_degrees(limit)}"
 
 
@@ -65,7 +65,12 @@ def _of_states(files: RobotFiles, description: Description) -> Iterator[tuple[Ma
     for element in robot.iterfind("group_state/joint"):
         joint = description.joints.get(element.get("name", ""))
         value = element.get("value", "").split()
-        if joint is not None and joint.type in ("revolute", "continuous") and value and abs(float(value[0])) > TURN:
+        if (
+            joint is not None
+            and joint.type in ("revolute", "continuous")
+            and value
+            and abs(float(value[0])) > WHOLE_TURN
+        ):
             assert isinstance(element, PlacedElement)
             mark = Mark(str(files.srdf), element.line, element.column)
             yield mark, f"joint '{joint.name}' has a value in a state that {_degrees(float(value[0]))}"
@@ -85,7 +90,7 @@ def _inside(record: Record, path: tuple[Key, ...], value: Any, is_angle: bool) -
     elif isinstance(value, dict | tuple):
         for key, item in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _inside(record, (*path, key), item, is_angle=is_angle)
-    elif is_angle and isinstance(value, float) and abs(value) > TURN:
+    elif is_angle and isinstance(value, float) and abs(value) > WHOLE_TURN:
         mark = record.place(*path)
         if mark is not None:
             yield mark, value

@@ -7,7 +7,7 @@ from solfer.scenarios.scenario import Scenario
 from solfer.scenarios.script import Script
 from solfer.scenarios.steps import played
 
-LONGEST = 1_000_000
+STEP_PERIODS = 1_000_000
 """Periods that a step may take."""
 
 _ROUNDING = 1e-9  # of a period
@@ -150,10 +150,10 @@ def count_periods(scenario: Scenario) -> tuple[int, ...]:
         most = step.longest(script)
         count = 0
         while not step.done(script):
-            if count > most or most > LONGEST:
+            if count > most or most > STEP_PERIODS:
                 raise ConfigError(
                     f"step {number} of the pattern, '{record.type}', "
-                    + ("never ends" if count > most or most == np.inf else f"takes more than {LONGEST} periods"),
+                    + ("never ends" if count > most or most == np.inf else f"takes more than {STEP_PERIODS} periods"),
                     where=record.where(),
                     expected="speeds with which its goals can be reached, and met to 5 mm and 5 mrad",
                 )

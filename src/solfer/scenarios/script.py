@@ -6,19 +6,19 @@ import numpy as np
 
 from solfer.scenarios.scenario import Scenario
 
-SLOWEST = 1e-3
+SCRIPT_LOWEST_SPEED = 1e-3
 """Speed of a vertex below which it goes what is left in one period [m/s]."""
 
 NEAREST = 1e-3
 """What is left of the base's way below which it goes there in one period [m, rad]."""
 
-REACHED = 5e-3
+SCRIPT_REACH_TOLERANCE = 5e-3
 """Distance from the goal of a move that is near enough, absolute [m, rad] or as a share of the goal."""
 
-TURNED = 1e-2
+SCRIPT_TURN_LIMIT = 1e-2
 """Distance from the heading of a turn or a circle that is near enough [rad]."""
 
-HEADING = 3
+HEADING_INDEX = 3
 """Index of the heading among the numbers of the base."""
 
 
@@ -69,7 +69,7 @@ class Script:
         np.divide(self._left, self.period, out=self._left)
         np.multiply(self._left, self.vertex_speed, out=self.vertex_velocity)
         np.abs(self.vertex_velocity, out=self._bare)
-        np.less(self._bare, SLOWEST, out=self._slow)
+        np.less(self._bare, SCRIPT_LOWEST_SPEED, out=self._slow)
         np.copyto(self.vertex_velocity, self._left, where=self._slow)
 
     def go(self, goal: np.ndarray) -> None:
@@ -85,10 +85,10 @@ class Script:
 
     def turn(self, heading: float) -> float:
         """Let the heading go to `heading` [rad] at its speed, x, y and z not at all; return its rate [rad/s]."""
-        left = heading - self.base[HEADING]
+        left = heading - self.base[HEADING_INDEX]
         self.base_velocity[:] = 0.0
-        rate = left / self.period if abs(left) < NEAREST else math.copysign(self.base_speed[HEADING], left)
-        self.base_velocity[HEADING] = rate
+        rate = left / self.period if abs(left) < NEAREST else math.copysign(self.base_speed[HEADING_INDEX], left)
+        self.base_velocity[HEADING_INDEX] = rate
         return rate
 
     def move(self) -> None:

@@ -17,7 +17,14 @@ from solfer.scenarios.records import (
     WaitRecord,
 )
 from solfer.scenarios.scenario import Scenario
-from solfer.scenarios.script import HEADING, NEAREST, REACHED, SLOWEST, TURNED, Script
+from solfer.scenarios.script import (
+    HEADING_INDEX,
+    NEAREST,
+    SCRIPT_LOWEST_SPEED,
+    SCRIPT_REACH_TOLERANCE,
+    SCRIPT_TURN_LIMIT,
+    Script,
+)
 
 
 class PlayedStep(abc.ABC):
@@ -58,7 +65,7 @@ class _Speed(_Instant):
 
     def start(self, script: Script) -> None:
         for row, column, value in self._motions:
-            if row == HEADING:
+            if row == HEADING_INDEX:
                 script.base_speed[column] = value
             else:
                 script.vertex_speed[column, row] = value
@@ -97,7 +104,9 @@ class _Move(PlayedStep):
         self._vertices = vertices
         self._base = base
         self._camber = camber
-        self._near, self._base_near = (REACHED * np.maximum(1.0, np.abs(each)) for each in (vertices, base))
+        self._near, self._base_near = (
+            SCRIPT_REACH_TOLERANCE * np.maximum(1.0, np.abs(each)) for each in (vertices, base)
+        )
         self._left = np.zeros_like(vertices)
         self._base_left = np.zeros_like(base)
         self._fits = np.zeros(vertices.shape, dtype=bool)
@@ -142,11 +151,11 @@ class _Heading(PlayedStep):
         self._heading = heading
 
     def done(self, script: Script) -> bool:
-        return abs(self._heading - float(script.base[HEADING])) <= TURNED
+        return abs(self._heading - float(script.base[HEADING_INDEX])) <= SCRIPT_TURN_LIMIT
 
     def longest(self, script: Script) -> float:
-        left = abs(self._heading - float(script.base[HEADING]))
-        return _straight(left, float(script.base_speed[HEADING]) * script.period)
+        left = abs(self._heading - float(script.base[HEADING_INDEX]))
+        return _straight(left, float(script.base_speed[HEADING_INDEX]) * script.period)
 
 
 class _Turn(_Heading):
@@ -157,7 +166,7 @@ class _Turn(_Heading):
     def step(self, script: Script) -> None:
         script.approach(self._vertices)
         script.turn(self._heading)
-        heading = float(script.base[HEADING])
+        heading = float(script.base[HEADING_INDEX])
         script.base_velocity[0] = self._speed * math.cos(heading)
         script.base_velocity[1] = self._speed * math.sin(heading)
 
@@ -170,7 +179,7 @@ class _Circle(_Heading):
     def step(self, script: Script) -> None:
         script.approach(self._vertices)
         rate = script.turn(self._heading)
-        heading = float(script.base[HEADING])
+        heading = float(script.base[HEADING_INDEX])
         script.base_velocity[0] = self._along[0] * rate * math.cos(heading)
         script.base_velocity[1] = self._along[1] * rate * math.sin(heading)
 
@@ -184,9 +193,9 @@ def _straight(left: float, step: float) -> float:
 
 def _exponential(left: float, share: float, period: float) -> float:
     """Return after how many periods a vertex that goes a share of what is left in each has arrived."""
-    if share * left < SLOWEST * period or share >= 1.0:
+    if share * left < SCRIPT_LOWEST_SPEED * period or share >= 1.0:
         return 2.0
-    return math.log(SLOWEST * period / (share * left)) / math.log1p(-share) + 3.0
+    return math.log(SCRIPT_LOWEST_SPEED * period / (share * left)) / math.log1p(-share) + 3.0
 
 
 def played(scenario: Scenario) -> tuple[PlayedStep, ...]:

@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solfer.components.following.requests import MESSAGES
+from solfer.components.following.requests import REFERENCE_MESSAGES
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene.state import ScenePose, ShownReference
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import VectorMessage
 
-SILENCE = 1.0
+OPERATOR_SILENCE = 1.0
 """Time without a movement or a sign of life of its operator after which a reference is released [s]."""
 
 
@@ -49,7 +49,7 @@ class DraggedReferences:
         key = (shown.module, shown.task)
         now = self._middleware.now()
         present = self._drags.get(key)
-        if present is not None and present.client != client and now - present.since <= SILENCE:
+        if present is not None and present.client != client and now - present.since <= OPERATOR_SILENCE:
             return False
         if pose is not None:
             numbers = {
@@ -59,7 +59,7 @@ class DraggedReferences:
             }[shown.quantity]
             if key not in self._writers:
                 topic = self._middleware.resolve(f"{shown.module}/{shown.task}/reference")
-                self._writers[key] = self._middleware.declared_writer(topic, MESSAGES[shown.quantity][0])
+                self._writers[key] = self._middleware.declared_writer(topic, REFERENCE_MESSAGES[shown.quantity][0])
             self._drags[key] = _Drag(client, numbers, now)
             return True
         if present is None or present.client != client:
@@ -80,6 +80,6 @@ class DraggedReferences:
     def publish(self) -> None:
         """Publish what is dragged at present."""
         now = self._middleware.now()
-        self._drags = {key: drag for key, drag in self._drags.items() if now - drag.since <= SILENCE}
+        self._drags = {key: drag for key, drag in self._drags.items() if now - drag.since <= OPERATOR_SILENCE}
         for key, drag in self._drags.items():
             self._writers[key].write(VectorMessage("", drag.numbers.copy()))

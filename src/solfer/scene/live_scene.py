@@ -9,7 +9,7 @@ from solfer.components.geometry import Pose
 from solfer.components.support_shaping.messages import SupportMargins
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.robot import Robot
-from solfer.scene.discovery import STALE, DiscoveredTopics
+from solfer.scene.discovery import DISCOVERY_STALE_AGE, DiscoveredTopics
 from solfer.scene.polygon import hull, shrunk
 from solfer.scene.state import ContactForce, ScenePose, SceneState, ShownReference
 from solfer.transport import JointMessage, Middleware, Reader
@@ -17,7 +17,7 @@ from solfer.transport.declared.fields import value_of
 
 WORLD = "world"
 
-TOPICS = {
+SCENE_TOPICS = {
     "command": "solfer/JointCommand",
     "references": "solfer/TaskReferences",
     "support_margins": "solfer/SupportMargins",
@@ -27,13 +27,13 @@ TOPICS = {
 BASES = ("floating_base", "odometry/odom")
 """Topics with the pose of the base; the first with a message counts."""
 
-TOUCH = 5.0
+CARRYING_FORCE = 5.0
 """Vertical force from which on a contact carries a part of the robot [N]."""
 
-LEVEL = 0.05
+CONTACT_HEIGHT = 0.05
 """Height above the lowest contact up to which one without a known force is on the ground [m]."""
 
-STEP, LONGEST = 0.02, 2000
+PATH_STEP, PATH_POINTS = 0.02, 2000
 """Distance of two points of the path of the base [m], and their largest number."""
 
 FRICTION = 0.8
@@ -51,7 +51,7 @@ class LiveScene:
     def __init__(self, robot: Robot, middleware: Middleware, friction: float = FRICTION):
         self._robot, self._desired, self._friction = robot, robot.twin(), friction
         self._places = {name: index for index, name in enumerate(robot.dofs)}
-        self._discovered = DiscoveredTopics(middleware, TOPICS)
+        self._discovered = DiscoveredTopics(middleware, SCENE_TOPICS)
         self._joints = middleware.reader("joint_states", "sensor_msgs/JointState")
         floats = robot.kinematics.base is not None
         self._bases = [middleware.reader(topic, "nav_msgs/Odometry") for topic in BASES if floats]
@@ -139,7 +139,7 @@ class LiveScene:
                 force = estimates.values[estimates.names.index(name), :3].copy()
             else:
                 continue
-            yield ContactForce(name, contact.value.copy(), force, touches=bool(force[2] >= TOUCH))
+            yield ContactForce(name, contact.value.copy(), force, touches=bool(force[2] >= CARRYING_FORCE))
 
     def _polygon(self, forces: tuple[ContactForce, ...]) -> tuple[np.ndarray, np.ndarray]:
         nothing = np.zeros((0, 3))
@@ -148,7 +148,7 @@ class LiveScene:
         if not records:
             return nothing, nothing
         known = {force.contact: force.touches for force in forces}
-        ground = contacts.positions[:, 2].min() + LEVEL
+        ground = contacts.positions[:, 2].min() + CONTACT_HEIGHT
         touching = [each for each in records if known.get(each.name, contacts[each.name].value[2] <= ground)]
         points = np.array([contacts[record.name].value for record in touching]).reshape(-1, 3)
         corners = hull(points)
@@ -217,14 +217,14 @@ class _Path:
 
     def add(self, position: np.ndarray) -> None:
         """Add a position, if it is not near the last one."""
-        if not len(self.points) or np.linalg.norm(position - self.points[-1]) >= STEP:
-            self.points = np.concatenate((self.points[1 - LONGEST :], position[None]))
+        if not len(self.points) or np.linalg.norm(position - self.points[-1]) >= PATH_STEP:
+            self.points = np.concatenate((self.points[1 - PATH_POINTS :], position[None]))
 
 
 def _is_fresh(reader: Reader) -> bool:
     """Read the newest message, and return whether it counts."""
     reader.read()
-    return reader.age() <= STALE
+    return reader.age() <= DISCOVERY_STALE_AGE
 
 
 def _poses(robot: Robot) -> dict[str, ScenePose]:

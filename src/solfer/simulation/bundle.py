@@ -22,10 +22,10 @@ from solfer.simulation.sensors import Equipment, load_equipment
 from solfer.simulation.world.records import Friction
 
 ROBOTS = "package://solfer/config/robots"
-DESCRIPTIONS = (".urdf", ".xacro")
+URDF_SUFFIXES = (".urdf", ".xacro")
 """Ends of names of bare URDFs, in letters of any case."""
 
-STANDING = "standing"
+STANDING_STATE = "standing"
 """Name that collections of robots have given to the state in which a robot stands."""
 
 
@@ -63,7 +63,7 @@ def find_robot(name: str) -> Path:
     Raises:
         UnknownName: There is no robot of that name.
     """
-    if "/" in name or name.lower().endswith((".yaml", *DESCRIPTIONS)):
+    if "/" in name or name.lower().endswith((".yaml", *URDF_SUFFIXES)):
         return Path(name)
     folder = located(ROBOTS, ".")
     known = sorted(path.parent.name for path in folder.glob("*/robot.yaml"))
@@ -84,7 +84,7 @@ def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base:
         ConfigError: The bundle's file is wrong.
     """
     path = Path(path)
-    if path.suffix.lower() in DESCRIPTIONS:
+    if path.suffix.lower() in URDF_SUFFIXES:
         record = BundleRecord(
             name=path.stem,
             urdf=_file(path),
@@ -175,7 +175,7 @@ def _file(path: str | Path) -> FileRecord:
 def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> str | None:
     """Choose the state in which a simulation begins; None: in the neutral posture."""
     if record.start is None:
-        return STANDING if STANDING in states else next(iter(states), None)
+        return STANDING_STATE if STANDING_STATE in states else next(iter(states), None)
     if record.start.state not in states:
         raise UnknownName("state", record.start.state, states, where=record.start.where("state"))
     return record.start.state

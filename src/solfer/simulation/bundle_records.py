@@ -7,7 +7,7 @@ from pydantic import Field
 from solfer.config import FileRecord, Record
 from solfer.lower_level.records import JointControllerRecord, LowerLevelRecord
 from solfer.simulation.sensors.records import SensorsRecord
-from solfer.simulation.world.records import DEFAULT, FRICTION, GROUND
+from solfer.simulation.world.records import DEFAULT_FRICTION, FRICTION, GROUND_FRICTION
 
 
 class PartRecord(Record):
@@ -26,11 +26,11 @@ class StartRecord(Record):
 class FrictionRecord(Record):
     """Friction coefficients; Bullet multiplies those of the two bodies that touch."""
 
-    default: float = Field(default=DEFAULT, **FRICTION, description="of a link of the robot")
+    default: float = Field(default=DEFAULT_FRICTION, **FRICTION, description="of a link of the robot")
     groups: dict[str, Annotated[float, Field(**FRICTION)]] = Field(
         default_factory=dict, description="of the links of a group of the SRDF"
     )
-    ground: float = Field(default=GROUND, **FRICTION, description="of the ground")
+    ground: float = Field(default=GROUND_FRICTION, **FRICTION, description="of the ground")
 
 
 class BundleRecord(Record):

@@ -9,16 +9,16 @@ from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
-from solfer.simulation.robot_body.placement import ORIGIN, StartPlacement, fix, put
+from solfer.simulation.robot_body.placement import START_ORIGIN, StartPlacement, fix, put
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
 from solfer.simulation.sensors import Sensors
 from solfer.simulation.state import BaseMotion, Moment, MotorSide, SimulationState, read_only
 from solfer.simulation.world.engine import STEP, Engine
 from solfer.simulation.world.records import WorldRecord
-from solfer.simulation.world.world import FLAT, World, read_world
+from solfer.simulation.world.world import FLAT_WORLD, World, read_world
 
-AWAY = (0.0, 0.0, 500.0)  # [m], where nothing is
+NOWHERE = (0.0, 0.0, 500.0)  # [m], where nothing is
 LARGEST_FRICTION = 10.0
 LARGEST_SEED = 2**63 - 1
 DIVERGED = 1e6  # [rad/s, m/s]; the norm of all speeds stays far below in a world that makes sense
@@ -51,7 +51,7 @@ class Simulation:
         ModelError: The state has a joint beyond its limits.
     """
 
-    def __init__(self, bundle: Bundle, gui: bool = False, world: WorldRecord = FLAT):
+    def __init__(self, bundle: Bundle, gui: bool = False, world: WorldRecord = FLAT_WORLD):
         kinematics = self.kinematics = bundle.kinematics
         drives = bundle.lower_level.drives
         self.lower_level = bundle.lower_level
@@ -124,7 +124,7 @@ class Simulation:
             ConfigError, ModelError, UnknownName: A file of the bundle or of the world is wrong.
             SimulationError: The world or the robot in it cannot be made.
         """
-        around = FLAT if world is None else read_world(world)
+        around = FLAT_WORLD if world is None else read_world(world)
         simulation = cls(load_bundle(path, description_text), gui, around)
         if state is not None:
             try:
@@ -156,7 +156,9 @@ class Simulation:
         """Whether the robot's base moves."""
         return self.body.floating
 
-    def reset(self, state: str | None = None, placement: StartPlacement = ORIGIN, seed: int | None = None) -> None:
+    def reset(
+        self, state: str | None = None, placement: StartPlacement = START_ORIGIN, seed: int | None = None
+    ) -> None:
         """Begin again at rest in a named state (default: the start), upright on the ground below the robot.
 
         Commands and pushes are forgotten, movable parts of the world are where they were, noise begins again. Time goes
@@ -174,7 +176,7 @@ class Simulation:
         """
         posture = self._postures.positions_of(state)
         placement.check()
-        if not self.floating and placement != ORIGIN:
+        if not self.floating and placement != START_ORIGIN:
             raise SimulationError("the robot's base is fixed", expected="no x, y, yaw and height")
         if seed is not None and not 0 <= seed <= LARGEST_SEED:
             raise SimulationError(f"the seed is {seed}", expected=f"from 0 to {LARGEST_SEED}")
@@ -250,7 +252,7 @@ class Simulation:
         """Put robot and world where they begin; if that is impossible they stay where they are."""
         before = self._engine.keep()
         try:
-            self.body.place(posture, AWAY)
+            self.body.place(posture, NOWHERE)
             self.world.scatter()
             self._engine.forget_contacts()
             self.world.reset()

@@ -12,7 +12,7 @@ from solfer.study.folder import StudyFolder
 from solfer.study.plan import PlannedRun
 from solfer.study.result import Result
 
-LOOK = 0.25
+DRIVE_POLL_PERIOD = 0.25
 """Period in which the folder is read [s]."""
 
 TABLE = 30.0
@@ -103,7 +103,7 @@ def _wait(folder: StudyFolder, engine: WorkerEngine, progress: StudyProgress) ->
         if time.monotonic() - written > TABLE:
             folder.write_table()
             written = time.monotonic()
-        time.sleep(LOOK)
+        time.sleep(DRIVE_POLL_PERIOD)
 
 
 def find_run(folder: StudyFolder, name: str) -> PlannedRun:

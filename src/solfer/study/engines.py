@@ -15,11 +15,11 @@ from solfer.errors import StudyError
 ENGINES = ("local", "dask", "slurm")
 
 SHORT = 5.0
-"""Time within which a worker that ends has not worked [s]; as many of them in a row as `TRIES` end the study."""
+"""Time within which a worker that ends has not worked [s]; as many of them in a row as `ENGINE_TRIES` end the study."""
 
-TRIES = 3
+ENGINE_TRIES = 3
 
-SELDOM = 5.0
+ENGINE_CALL_PERIOD = 5.0
 """Period in which Slurm is asked for its jobs [s]."""
 
 
@@ -60,7 +60,7 @@ class LocalEngine(WorkerEngine):
             if code is None or code == 0:
                 continue
             self._short = self._short + 1 if time.monotonic() - begin < SHORT else 0
-            if code == 2 or self._short >= TRIES:
+            if code == 2 or self._short >= ENGINE_TRIES:
                 _, text = process.communicate()
                 raise _failed(f"a worker ended with exit code {code}: {text.strip().removeprefix('error: ')[-2000:]}")
             self._processes[place] = self._start()
@@ -155,7 +155,7 @@ class SlurmEngine(WorkerEngine):
         """See `WorkerEngine.check`."""
         if time.monotonic() < self._next:
             return
-        self._next = time.monotonic() + SELDOM
+        self._next = time.monotonic() + ENGINE_CALL_PERIOD
         for job in self._jobs:
             if job.done() and (error := job.exception()) is not None:
                 raise _failed(f"a job failed: {error}")

@@ -33,11 +33,11 @@ from solfer.study.result import Result
 STUDY = "study.json"
 RUNS = "runs"
 RESULT = "result.json"
-CONFIGURATION = "config.yaml"
-STDERR = "stderr"
+CONFIGURATION_FILE = "config.yaml"
+STDERR_FILE = "stderr"
 RECORDING = "recording.mcap"
-COLUMNS = "columns.npz"
-CLAIM = "claim."
+COLUMNS_FILE = "columns.npz"
+CLAIM_PREFIX = "claim."
 
 HEARTBEAT, DEAD = 2.0, 30.0
 """Period in which a worker renews its claim, and the age at which another one takes it over [s]."""
@@ -56,7 +56,7 @@ class Claim:
     @property
     def attempt(self) -> int:
         """Number of the attempt, from 1 on."""
-        return int(self._file.name.removeprefix(CLAIM))
+        return int(self._file.name.removeprefix(CLAIM_PREFIX))
 
     @property
     def folder(self) -> Path:
@@ -179,10 +179,10 @@ class StudyFolder:
         folder = self.of(run)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            attempts = sorted(int(file.name.removeprefix(CLAIM)) for file in folder.glob(f"{CLAIM}*"))
-            if self.is_done(run) or (attempts and not self._is_dead(folder / f"{CLAIM}{attempts[-1]}")):
+            attempts = sorted(int(file.name.removeprefix(CLAIM_PREFIX)) for file in folder.glob(f"{CLAIM_PREFIX}*"))
+            if self.is_done(run) or (attempts and not self._is_dead(folder / f"{CLAIM_PREFIX}{attempts[-1]}")):
                 return None
-            file = folder / f"{CLAIM}{attempts[-1] + 1 if attempts else 1}"
+            file = folder / f"{CLAIM_PREFIX}{attempts[-1] + 1 if attempts else 1}"
             place = os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o644)
         except FileExistsError:
             return None  # another worker was faster
@@ -212,7 +212,7 @@ class StudyFolder:
 
     def attempts(self, run: PlannedRun) -> int:
         """Return how often a run was taken up."""
-        return sum(1 for _ in self.of(run).glob(f"{CLAIM}*"))
+        return sum(1 for _ in self.of(run).glob(f"{CLAIM_PREFIX}*"))
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of the table, in the order of the plan."""

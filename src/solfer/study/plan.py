@@ -20,20 +20,20 @@ from solfer.config.yaml.search import anchored
 from solfer.errors import ConfigError, SolferError, SolferErrors, UnknownName, raise_all, singles
 from solfer.recording.versions import versions
 from solfer.study.measures import check_expressions
-from solfer.study.records import DRAWN, StudyRecord, VariationRecord
+from solfer.study.records import DRAWN_KEYS, StudyRecord, VariationRecord
 from solfer.study.robot import files_of
 from solfer.study.simulated_run import check_tags, configurations_of, listed, rehearse
 
-PACKAGE = Path(__file__).resolve().parents[1]
+CODE_FOLDER = Path(__file__).resolve().parents[1]
 """Folder of the code; that of `solfer.__init__` may be one of catkin's."""
 
-CONFIGURATION = "configuration"
+CONFIGURATION_KEY = "configuration"
 """First key of a path into the configuration of the plugins; others lead into the study itself."""
 
 DECIDING = {"plugins", "simulation", "motion", "settle", "duration", "measure", "fails"}
 """Keys of a study that decide what a run is."""
 
-VARYING = ("simulation", "motion", "duration", "settle", CONFIGURATION)
+VARYING = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
 """First keys of paths of what may vary."""
 
 
@@ -120,7 +120,7 @@ class Study:
         for name, value in variations.items():
             path = self._path(name)
             written = self._value(name, value)
-            if path[0] == CONFIGURATION:
+            if path[0] == CONFIGURATION_KEY:
                 over = _with(over or YamlNode({}, written.mark), path[1:], written)
             else:
                 node = _with(node, path, written)
@@ -139,7 +139,7 @@ class Study:
                 for count in range(runs or self.record.runs):
                     chosen = dict(zip(grids, point, strict=True)) | dict(zip(lists, row, strict=True))
                     draw = np.random.default_rng((seed, place))
-                    drawn = {name: _drawn(each, draw) for name, each in vary.items() if each.kind in DRAWN}
+                    drawn = {name: _drawn(each, draw) for name, each in vary.items() if each.kind in DRAWN_KEYS}
                     yield seed + count, {name: (chosen | drawn)[name] for name in vary}
                     place += 1
 
@@ -175,7 +175,7 @@ class Study:
         used = [configuration.name for _, configuration in listed(configurations_of(self.record, None))]
         for name, each in self._variations.items():
             path = self._path(name)
-            if path[:2] == (CONFIGURATION, "modules") and path[2] not in used:
+            if path[:2] == (CONFIGURATION_KEY, "modules") and path[2] not in used:
                 errors.append(UnknownName("configuration of a plugin of the study", path[2], used, where=each.where()))
         raise_all(errors)
         _files(self.record)
@@ -225,7 +225,7 @@ class Study:
             mark = each.place() or self._node.mark
             if path[0] not in VARYING:
                 problems.unknown(mark, "begin of a path", path[0], VARYING)
-            elif path[0] == CONFIGURATION and len(path) < 3:
+            elif path[0] == CONFIGURATION_KEY and len(path) < 3:
                 problems.add(mark, f"'{'/'.join(path)}' leads to no tag", "configuration/modules/NAME/TAG")
         search = record.search
         if search is not None and (goal := search.minimize or search.maximize) not in record.measure:
@@ -274,7 +274,9 @@ def record_of(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> tuple[Stud
 @cache
 def code_hash() -> str:
     """Return a hash of the package's Python files, and of the versions of what it works with."""
-    contents = [f"{path.relative_to(PACKAGE)} {_file_hash(str(path))}" for path in sorted(PACKAGE.rglob("*.py"))]
+    contents = [
+        f"{path.relative_to(CODE_FOLDER)} {_file_hash(str(path))}" for path in sorted(CODE_FOLDER.rglob("*.py"))
+    ]
     return _hash(*contents, json.dumps(versions(), sort_keys=True))[:16]
 
 

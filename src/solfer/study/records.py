@@ -20,7 +20,7 @@ Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_leng
 Force = Annotated[tuple[Annotated[float, Field(**FORCE)], ...], Field(min_length=3, max_length=3)]
 Pair = Annotated[tuple[Annotated[float, Field(**VALUE)], ...], Field(min_length=2, max_length=2)]
 
-DRAWN = ("uniform", "log_uniform", "normal", "choice")
+DRAWN_KEYS = ("uniform", "log_uniform", "normal", "choice")
 """Keys of a variation that is drawn for each run."""
 
 
@@ -104,11 +104,11 @@ class VariationRecord(Record):
     @property
     def kind(self) -> str:
         """Which of its keys is given."""
-        return next(key for key in ("grid", "list", *DRAWN) if getattr(self, key) is not None)
+        return next(key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None)
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "VariationRecord":
-        given = [key for key in ("grid", "list", *DRAWN) if getattr(self, key) is not None]
+        given = [key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None]
         if len(given) != 1:
             raise ValueError("one of `grid`, `list`, `choice`, `uniform`, `log_uniform` and `normal`")
         if given[0] in ("uniform", "log_uniform"):

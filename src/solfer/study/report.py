@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.errors import StudyError, UnknownName
-from solfer.recording.pictures.canvas import FIRST, FONT, WRONG, check_suffix, new_figure, save
-from solfer.study.folder import COLUMNS, RECORDING, RUNS, StudyFolder, write_whole
+from solfer.recording.pictures.canvas import CANVAS_FONT, FIRST_COLOR, WRONG, check_suffix, new_figure, save
+from solfer.study.folder import COLUMNS_FILE, RECORDING, RUNS, StudyFolder, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 WORST = 5
 """How many runs are shown by themselves."""
 
-MAPS = 6
+REPORT_MAPS = 6
 """Most maps of a measure."""
 
-LEVELS = 12
+MAP_VALUES = 12
 """Most values of a variable for a map of all its values; of more the range is cut into as many pieces."""
 
-SHOWN = 2000
+REPORT_SHOWN_COUNT = 2000
 """Most rows of the table on the page; all of them are in `table.csv`."""
 
 STYLE = """
@@ -126,7 +126,7 @@ def _histogram(rows: Sequence[Row], name: str) -> str:
     figure = new_figure(3.4, 2.2)
     axes = figure.add_subplot()
     parts = [values[counts & ~failed], values[counts & failed]]
-    axes.hist(parts, bins=30, stacked=True, color=[FIRST, WRONG])
+    axes.hist(parts, bins=30, stacked=True, color=[FIRST_COLOR, WRONG])
     axes.set_xlabel(name)
     axes.set_ylabel("runs")
     return _picture(figure)
@@ -139,7 +139,9 @@ def _maps(rows: Sequence[Row], names: Sequence[str], measures: Sequence[str]) ->
     found = []
     for measure in ("failed", *measures):
         values = _of_good(rows, measure)
-        found += [_picture(_map(rows, first, second, measure=measure, values=values)) for first, second in pairs[:MAPS]]
+        found += [
+            _picture(_map(rows, first, second, measure=measure, values=values)) for first, second in pairs[:REPORT_MAPS]
+        ]
     return found
 
 
@@ -194,11 +196,11 @@ def _levels(rows: Sequence[Row], name: str) -> tuple[np.ndarray, list[str]]:
     """Return the level of a variable in each row, shape (n,), and the names of the levels."""
     values = numbers(rows, name)
     distinct = sorted({str(row.get(name)) for row in rows}, key=lambda text: (_number(text), text))
-    if len(distinct) <= LEVELS or not np.isfinite(values).all():
+    if len(distinct) <= MAP_VALUES or not np.isfinite(values).all():
         place = {text: index for index, text in enumerate(distinct)}
         return np.array([place[str(row.get(name))] for row in rows]), distinct
-    edges = np.linspace(values.min(), values.max(), LEVELS + 1)
-    level = np.clip(np.digitize(values, edges) - 1, 0, LEVELS - 1)
+    edges = np.linspace(values.min(), values.max(), MAP_VALUES + 1)
+    level = np.clip(np.digitize(values, edges) - 1, 0, MAP_VALUES - 1)
     return level, [f"{(low + high) / 2:.3g}" for low, high in itertools.pairwise(edges)]
 
 
@@ -228,7 +230,7 @@ def _worst(folder: StudyFolder, rows: Sequence[Row]) -> str:
 def _plot(run: Path) -> str:
     """Draw the columns of a run over time; empty where it has none."""
     try:
-        with np.load(run / COLUMNS) as kept:
+        with np.load(run / COLUMNS_FILE) as kept:
             times = kept["times"]
             names = kept["names"].tolist()
             values = kept["values"]
@@ -241,10 +243,10 @@ def _plot(run: Path) -> str:
     figure = new_figure(3.6 * across, 1.6 * down)
     for place, (name, column) in enumerate(zip(names, values, strict=True)):
         axes = figure.add_subplot(down, across, place + 1)
-        axes.plot(times, column, color=FIRST, linewidth=1.0)
-        axes.set_title(name, fontsize=FONT)
-        axes.tick_params(labelsize=FONT)
-    axes.set_xlabel("time [s]", fontsize=FONT)
+        axes.plot(times, column, color=FIRST_COLOR, linewidth=1.0)
+        axes.set_title(name, fontsize=CANVAS_FONT)
+        axes.tick_params(labelsize=CANVAS_FONT)
+    axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
     recorded = (
         f"<p>recording: <code>{html.escape(str(run / RECORDING))}</code></p>" if (run / RECORDING).exists() else ""
     )
@@ -253,9 +255,13 @@ def _plot(run: Path) -> str:
 
 def _table(rows: Sequence[Row]) -> str:
     heads = list(rows[0])
-    lines = [[_shown(row.get(name)) for name in heads] for row in rows[:SHOWN]]
-    marks = ["failed" if row["failed"] else "" for row in rows[:SHOWN]]
-    more = f"<p>{len(rows) - SHOWN} more are in <code>table.csv</code>.</p>" if len(rows) > SHOWN else ""
+    lines = [[_shown(row.get(name)) for name in heads] for row in rows[:REPORT_SHOWN_COUNT]]
+    marks = ["failed" if row["failed"] else "" for row in rows[:REPORT_SHOWN_COUNT]]
+    more = (
+        f"<p>{len(rows) - REPORT_SHOWN_COUNT} more are in <code>table.csv</code>.</p>"
+        if len(rows) > REPORT_SHOWN_COUNT
+        else ""
+    )
     return f"<h2>Runs</h2><div class=rows>{_html_table(heads, lines, marks)}</div>{more}"
 
 

@@ -13,10 +13,10 @@ from solfer.simulation import BundleRecord, Simulation, find_robot, read_bundle
 from solfer.simulation.world.world import find_world
 from solfer.study.records import PayloadRecord, SimulationRecord
 
-NAME = "study_payload"
+PAYLOAD_NAME = "study_payload"
 """Name of the link and of the joint of a payload."""
 
-RADIUS = 0.05
+PAYLOAD_RADIUS = 0.05
 """Radius of the ball that a payload is [m]."""
 
 SPHERE = 0.4
@@ -136,14 +136,14 @@ def _add_payload(root: ElementTree.Element, payload: PayloadRecord) -> None:
         raise UnknownName("link", payload.link, links, where=payload.where("link"))
     if not payload.mass:
         return
-    link = ElementTree.SubElement(root, "link", name=NAME)
+    link = ElementTree.SubElement(root, "link", name=PAYLOAD_NAME)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "mass", value=repr(payload.mass))
-    moment = repr(SPHERE * payload.mass * RADIUS**2)
+    moment = repr(SPHERE * payload.mass * PAYLOAD_RADIUS**2)
     ElementTree.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
-    joint = ElementTree.SubElement(root, "joint", name=NAME, type="fixed")
+    joint = ElementTree.SubElement(root, "joint", name=PAYLOAD_NAME, type="fixed")
     ElementTree.SubElement(joint, "parent", link=payload.link)
-    ElementTree.SubElement(joint, "child", link=NAME)
+    ElementTree.SubElement(joint, "child", link=PAYLOAD_NAME)
     ElementTree.SubElement(joint, "origin", xyz=_text(np.array(payload.center)), rpy="0 0 0")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from solfer.config.yaml.nodes import YamlNode
-from solfer.realtime.telemetry.black_box import TRUTH, BlackBox
+from solfer.realtime.telemetry.black_box import TRUTH_MESSAGE, BlackBox
 from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.writer import RecordingWriter
 from solfer.study.measures import Columns, evaluated, measured
@@ -23,7 +23,7 @@ DRAIN = 1.0
 """Period in which a recording is written [s]."""
 
 
-KEPT = 400
+KEPT_ROWS = 400
 """Most rows of the columns that are kept for pictures."""
 
 
@@ -73,7 +73,7 @@ def carry_out(
         changes: What is laid over the configuration; None: nothing.
         variations: What varies, by name, for expressions.
         recording: File of a recording, MCAP; None: none.
-        columns: File for the columns that are measured, NPZ, `KEPT` rows at most; None: none.
+        columns: File for the columns that are measured, NPZ, `KEPT_ROWS` rows at most; None: none.
         gui: Open PyBullet's window.
 
     Raises:
@@ -95,7 +95,7 @@ def carry_out(
 
 def _keep_columns(columns: Columns, file: Path) -> None:
     """Write every n-th row of the columns."""
-    step = max(1, -(-columns.count // KEPT))
+    step = max(1, -(-columns.count // KEPT_ROWS))
     values = np.array([columns[name][::step] for name in columns.names], dtype=np.float32)
     np.savez_compressed(file, names=np.array(columns.names), times=columns.times[::step], values=values)
 
@@ -108,7 +108,7 @@ def recorded(simulated: SimulatedRun, file: Path) -> Iterator[None]:
         RecordingError: The file cannot be written.
     """
     plugins = list(simulated.plugins.values())
-    truth = simulated.node("recorder").reader("floating_base", TRUTH) if simulated.simulation.floating else None
+    truth = simulated.node("recorder").reader("floating_base", TRUTH_MESSAGE) if simulated.simulation.floating else None
     with TemporaryDirectory() as folder, closing(BlackBox(Path(folder), plugins, 2.0 * DRAIN, truth=truth)) as box:
         drain = RecordDrain(Path(folder))
         attached = {name: text.encode() for name, text in drain.layout.attachments.items()}

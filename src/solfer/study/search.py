@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from solfer.study.drive import LOOK, StudyProgress
+from solfer.study.drive import DRIVE_POLL_PERIOD, StudyProgress
 from solfer.study.engines import engine_of, needs
 from solfer.study.folder import StudyFolder
 from solfer.study.plan import PlannedRun
@@ -61,7 +61,7 @@ def search(
             if not waiting:
                 break
             started.check()
-            time.sleep(LOOK)
+            time.sleep(DRIVE_POLL_PERIOD)
     finally:
         started.close()
     progress.show(is_last=True)

@@ -31,7 +31,7 @@ from solfer.study.measures import Columns
 from solfer.study.records import StudyRecord
 from solfer.study.robot import bundle_of, faults_of, simulation_of
 
-PERIOD = 0.02
+RUN_PERIOD = 0.02
 """Period of what moves the robot [s]."""
 
 SAMPLE = 0.005
@@ -40,7 +40,7 @@ SAMPLE = 0.005
 START = 10.0
 """Longest time in which all plugins have to run [s]."""
 
-TRUTH = "simulation"
+TRUTH_PREFIX = "simulation"
 """Begin of the channels of the true robot."""
 
 Configuration = tuple[str, config.Configuration] | SharedConfiguration
@@ -150,7 +150,7 @@ class SimulatedRun:
         """Do some work once each `period` [s] from now on, after the plugins."""
         self.bus.every(period, work)
 
-    def step(self, duration: float = PERIOD) -> None:
+    def step(self, duration: float = RUN_PERIOD) -> None:
         """Let a time pass [s]; a run that has failed stays as it is."""
         end = self.bus.time + duration
         while not self.failure and self.bus.time < end - 1e-12:
@@ -177,7 +177,7 @@ class SimulatedRun:
             self.done = not self.failure
             return
         while not self.is_over:
-            self.step(min(PERIOD * 5, max(self.record.duration - self.time, STEP)))
+            self.step(min(RUN_PERIOD * 5, max(self.record.duration - self.time, STEP)))
         if not self.done and not self.failure and self._navigation is not None:
             waits = f": it waits for {self._navigation.waits}" if self._navigation.waits else ""
             self.failure = f"the motion is not over after {self.record.duration:g} s{waits}"
@@ -246,14 +246,14 @@ class SimulatedRun:
         while not self.failure and (waiting := self._waiting()):
             if self.bus.time - begin > START + self.record.settle:
                 self.failure = f"{waiting.name} {waiting.health()[1]}"
-            self._run_until(self.bus.time + PERIOD)
+            self._run_until(self.bus.time + RUN_PERIOD)
         self.bus.check_faults()
         self._begin = self.bus.time
         self._sample()
         course = self._course()
         if course is not None:
-            self._navigation = Navigation(self._mover, course, self._mover.name, rate=1.0 / PERIOD)
-            self.bus.every(PERIOD, self._navigate)
+            self._navigation = Navigation(self._mover, course, self._mover.name, rate=1.0 / RUN_PERIOD)
+            self.bus.every(RUN_PERIOD, self._navigate)
 
     def _waiting(self) -> Plugin | None:
         return next((plugin for plugin in self.plugins.values() if not plugin.running), None)
@@ -263,7 +263,7 @@ class SimulatedRun:
         motion = self.record.motion
         self._mover = MemoryMiddleware(self.bus, "navigation")
         if motion.scenario is not None:
-            player = Player(read_scenario(str(motion.scenario.location)), PERIOD)
+            player = Player(read_scenario(str(motion.scenario.location)), RUN_PERIOD)
             return ScenarioCourse(
                 self._mover, player, motion.target, odometry=motion.odometry, positions=motion.positions
             )
@@ -317,7 +317,7 @@ class _Truth:
     def __init__(self, run: SimulatedRun):
         self._simulation = simulation = run.simulation
         self._model = simulation.kinematics.twin()
-        log = Logger(TRUTH)
+        log = Logger(TRUTH_PREFIX)
         names = simulation.kinematics.dofs
         for title, array, unit in (
             ("position", simulation.q, "rad"),

@@ -17,11 +17,11 @@ from typing import NoReturn
 from solfer.config.yaml.nodes import YamlNode
 from solfer.errors import MissingDependency, SolferError, SolferErrors, StudyError, located
 from solfer.study.folder import (
-    COLUMNS,
-    CONFIGURATION,
+    COLUMNS_FILE,
+    CONFIGURATION_FILE,
     HEARTBEAT,
     RECORDING,
-    STDERR,
+    STDERR_FILE,
     Claim,
     StudyFolder,
     write_whole,
@@ -31,10 +31,10 @@ from solfer.study.records import RunLimitsRecord, StudyRecord
 from solfer.study.result import Result
 from solfer.supervision import end_with_parent
 
-LOOK = 0.02
+WORKER_POLL_PERIOD = 0.02
 """Period in which a run is watched [s]."""
 
-AGAIN = 0.5
+WORKER_REPEAT_PERIOD = 0.5
 """Time between two looks for runs where others work on all that are left [s]."""
 
 KILLED = 3
@@ -66,7 +66,7 @@ def work(folder: Path, follow: bool = False) -> int:
         done = sum(_take_up(study, run) for run in left)
         count += done
         if not done:
-            time.sleep(AGAIN)
+            time.sleep(WORKER_REPEAT_PERIOD)
         if follow:
             study.load()
 
@@ -90,7 +90,7 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
             return True
         if failure:
             break
-    study.finish(run, Result(failure or f"its process was killed {KILLED} times; see {STDERR}"))
+    study.finish(run, Result(failure or f"its process was killed {KILLED} times; see {STDERR_FILE}"))
     return True
 
 
@@ -114,18 +114,18 @@ def _watch(limits: RunLimitsRecord, claim: Claim, child: int) -> str:
         if excess and not failure:
             failure = excess
             os.kill(child, signal.SIGKILL)
-        time.sleep(LOOK)
+        time.sleep(WORKER_POLL_PERIOD)
     code = os.waitstatus_to_exitcode(status)
     if code == UNFINISHED:
         raise StudyError(
-            f"a run cannot be carried out; see {STDERR}",
+            f"a run cannot be carried out; see {STDERR_FILE}",
             where=str(claim.folder),
             expected="a folder with room, and PyBullet",
         )
     if failure or code in FROM_OUTSIDE:
         return failure
     ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    return f"its process ended by {ending}; see {STDERR}"
+    return f"its process ended by {ending}; see {STDERR_FILE}"
 
 
 def _excess(limits: RunLimitsRecord, process: int, took: float) -> str:
@@ -145,12 +145,12 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
     try:
         end_with_parent()
         folder = study.of(run)
-        stderr = os.open(folder / STDERR, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o644)
+        stderr = os.open(folder / STDERR_FILE, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o644)
         for stream in (1, 2):
             os.dup2(stderr, stream)
         gc.freeze()
         record, changes = study.study.settings(run.variations)
-        write_whole(folder / CONFIGURATION, _texts(run, record, changes))
+        write_whole(folder / CONFIGURATION_FILE, _texts(run, record, changes))
         study.finish(run, _result(study, run, record, changes=changes))
         code = 0
     except (SolferError, SolferErrors) as error:
@@ -174,7 +174,7 @@ def _result(study: StudyFolder, run: PlannedRun, record: StudyRecord, changes: Y
     recording = folder / RECORDING if study.is_recorded else None
     try:
         return carry_out(
-            record, run.seed, changes, variations=run.variations, recording=recording, columns=folder / COLUMNS
+            record, run.seed, changes, variations=run.variations, recording=recording, columns=folder / COLUMNS_FILE
         )
     except (MissingDependency, StudyError):
         raise  # the machine's, and not the run's

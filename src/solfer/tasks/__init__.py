@@ -6,7 +6,7 @@ Names are imported when they are first used: the compiled kernels behind them ta
 from importlib import import_module
 from typing import Any
 
-_HOME = {
+_TASKS_HOME = {
     "CollisionLimit": "collisions",
     "ConfiguredStack": "building.build",
     "Constraint": "constraints",
@@ -25,10 +25,10 @@ _HOME = {
     "joint_bounds": "constraints",
 }
 
-__all__ = sorted(_HOME)
+__all__ = sorted(_TASKS_HOME)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    if name not in _TASKS_HOME:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_TASKS_HOME[name]}"), name)

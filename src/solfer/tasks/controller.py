@@ -14,7 +14,7 @@ from solfer.tasks.task import Task
 DURATION = 0.5
 """Default duration of a change [s]."""
 
-MOST = 4
+MAX_STACKS = 4
 """Largest number of stacks at one time."""
 
 
@@ -82,8 +82,8 @@ class TaskController:
         if not 0.0 < duration < np.inf:
             raise TaskError(f"a change within {duration:g} s", expected="a positive number")
         earlier = self._stages[:-1] if self.is_changing and self._stages[-1].is_new else self._stages
-        if len(earlier) >= MOST:
-            raise TaskError(f"{MOST - 1} changes are under way", expected="another one when the first has ended")
+        if len(earlier) >= MAX_STACKS:
+            raise TaskError(f"{MAX_STACKS - 1} changes are under way", expected="another one when the first has ended")
         for task in (task for level in levels for task in level):
             if task.point.robot.kinematics is not self._robot.kinematics:
                 raise TaskError(

@@ -9,7 +9,7 @@ import numpy as np
 
 from solfer.numerics.compilation import REORDERED, cached, part
 
-TOLERANCE = 1e-12
+ROW_TOLERANCE = 1e-12
 """Share of a row's length below which its remainder beside other rows counts as zero: rounding errors and no more."""
 
 CANCELLED = 0.5
@@ -95,7 +95,7 @@ def _project(jacobian, velocity, start, end, projected, basis, residual, out):
             projected[i, k] = jacobian[i, k]
         residual[i - start] = entry
         _clear(projected[i], basis, 0, start)
-        projected[i] *= _share(projected[i], jacobian[i]) > TOLERANCE
+        projected[i] *= _share(projected[i], jacobian[i]) > ROW_TOLERANCE
 
 
 @part
@@ -148,7 +148,7 @@ def _extend(jacobian, start, end, projected, basis, first):
         basis[i] = projected[i]
         _clear(basis[i], basis, first, i)
         share = _share(basis[i], jacobian[i])
-        basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > TOLERANCE else 0.0
+        basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > ROW_TOLERANCE else 0.0
 
 
 @part

@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.errors import TaskError
 from solfer.points import Handler
-from solfer.tasks.kernel import TOLERANCE, gather, gather_jacobian
+from solfer.tasks.kernel import ROW_TOLERANCE, gather, gather_jacobian
 from solfer.tasks.task import COLUMNS, Task, updated_in_order
 
 Levels = Sequence[Task | Sequence[Task]]
@@ -98,7 +98,7 @@ class Stack:
             singular = np.linalg.svd(self.jacobian[start:end] @ free.T, compute_uv=False)
             values.append(singular[-1] if len(singular) == end - start else 0.0)
             _, singular, rows = np.linalg.svd(self.jacobian[:end])
-            free = rows[np.count_nonzero(singular > TOLERANCE * singular[0]) :]
+            free = rows[np.count_nonzero(singular > ROW_TOLERANCE * singular[0]) :]
         return np.array(values)
 
     def __repr__(self) -> str:

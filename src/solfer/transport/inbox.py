@@ -7,7 +7,7 @@ from typing import Any
 
 from solfer.errors import MiddlewareError
 
-RATION, WAITING = 16, 64
+RATION, WAITING_CALLS = 16, 64
 """Default of an `Inbox`: calls in one cycle, and calls that may wait."""
 
 _Call = tuple[Callable[[], Any], "Future[Any]"]
@@ -29,7 +29,7 @@ class Inbox:
             where there is a `refusal`.
     """
 
-    def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING) -> None:
+    def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING_CALLS) -> None:
         self.refusal = refusal
         self.refused = 0
         self.most = 0

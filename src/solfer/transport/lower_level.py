@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-CLAIM = "solfer/ClaimJoints"
+CLAIM_INTERFACE = "solfer/ClaimJoints"
 """Interface of `lower_level/claim`."""
 
 RELEASE = "solfer/ReleaseJoints"
@@ -20,7 +20,7 @@ SWITCH_FEED_FORWARD = "std_srvs/SetBool"
 LOWER_LEVEL = "lower_level"
 """Owner of these services."""
 
-REFUSED = f"{LOWER_LEVEL}/refusals"
+REFUSALS_TOPIC = f"{LOWER_LEVEL}/refusals"
 """Topic on which the lower level publishes the senders of refused commands."""
 
 ALL_OWNERS = "*"

@@ -17,7 +17,7 @@ JOINT_FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 """Fields of a JointMessage: [rad, m], [rad/s, m/s], [Nm, N], [Nm/rad], [Nms/rad]."""
 
 
-_ROWS = frozenset((*JOINT_FIELDS, "values"))
+_MESSAGE_ROWS = frozenset((*JOINT_FIELDS, "values"))
 
 GAINS = ("stiffness", "damping")
 """Those of them that are gains: they have no direction, and a lower level has values of its own for them."""
@@ -73,7 +73,7 @@ class JointMessage:
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute; an array that takes the place of a row ends the block, which would be sent instead."""
         numbers = self.__dict__
-        if "block" in numbers and name in _ROWS and value is not numbers.get(name):
+        if "block" in numbers and name in _MESSAGE_ROWS and value is not numbers.get(name):
             numbers["block"] = None
         numbers[name] = value
 
@@ -261,7 +261,7 @@ VECTOR_MESSAGES = {
 }
 """Messages of geometry by their canonical name, with the length of their `values`."""
 
-POINTS = "solfer/RobotPoints"
+ROBOT_POINTS = "solfer/RobotPoints"
 """Message of several Robot Points."""
 
 IMU_MESSAGES = ("sensor_msgs/Imu",)
@@ -277,14 +277,14 @@ TYPES: dict[str, type[Message]] = {
     **dict.fromkeys(JOINT_MESSAGES, JointMessage),
     **dict.fromkeys(BODY_MESSAGES, BodyMessage),
     **dict.fromkeys(VECTOR_MESSAGES, VectorMessage),
-    POINTS: PointsMessage,
+    ROBOT_POINTS: PointsMessage,
     **dict.fromkeys(IMU_MESSAGES, ImuMessage),
     **dict.fromkeys(WRENCH_MESSAGES, WrenchMessage),
     REFUSALS: RefusalMessage,
 }
 """Class of the messages by their canonical name."""
 
-INTERFACE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
+INTERFACE_NAME = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 """Name of an interface: what is none of TYPES travels as a FieldsMessage."""
 
 
@@ -317,7 +317,7 @@ def type_of(message: str) -> type[Message]:
     Raises:
         MiddlewareError: It is no name of a message.
     """
-    if message not in TYPES and not INTERFACE.fullmatch(message):
+    if message not in TYPES and not INTERFACE_NAME.fullmatch(message):
         raise MiddlewareError(f"no message: {message}", expected=f"package/Type, such as {', '.join(TYPES)}")
     return TYPES.get(message, FieldsMessage)
 

@@ -20,7 +20,7 @@ from solfer.transport.topics import Missing, Topics
 
 logger = logging.getLogger(__name__)
 
-SOON = 1.0
+FIRST_MESSAGE_QUIET_TIME = 1.0
 """Time without a first message after which `joint_order` warns about a missing publisher [s]."""
 
 Submit = Callable[[Callable[[], Any]], "Future[Any]"]
@@ -202,12 +202,12 @@ class Middleware(abc.ABC):
             MiddlewareError: Nothing arrived within `timeout` [s]; names what is wrong with the topic.
         """
         message = canonical(message, where)
-        topic, order = self._first_order(topic, message, min(SOON, timeout))
-        if order is None and timeout > SOON:
+        topic, order = self._first_order(topic, message, min(FIRST_MESSAGE_QUIET_TIME, timeout))
+        if order is None and timeout > FIRST_MESSAGE_QUIET_TIME:
             missing = self._missing_publisher(topic, message)
             if missing is not None:
                 logger.warning("%s%s%s", f"{where}: " if where else "", missing.what, missing.hint)
-            topic, order = self._first_order(topic, message, timeout - SOON)
+            topic, order = self._first_order(topic, message, timeout - FIRST_MESSAGE_QUIET_TIME)
         if order is not None:
             return order
         missing = self._missing_publisher(topic, message)

@@ -31,6 +31,6 @@ class PluginState(enum.IntEnum):
 
 
 ACTIVE = frozenset({PluginState.STARTING, PluginState.RUNNING})
-FAILED = frozenset({PluginState.ABORTED, PluginState.FAULT})
+FAILED_STATES = frozenset({PluginState.ABORTED, PluginState.FAULT})
 STARTABLE = frozenset({PluginState.CONFIGURED, PluginState.INITIALIZED, PluginState.STOPPED, PluginState.ABORTED})
-AT_REST = frozenset(PluginState) - ACTIVE - {PluginState.STOPPING}
+RESTING_STATES = frozenset(PluginState) - ACTIVE - {PluginState.STOPPING}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from solfer.errors import nearest
 
-SHOWN = 3
+HINT_SHOWN_COUNT = 3
 """Most names that a hint suggests."""
 
 
@@ -67,4 +67,6 @@ def _alike(topic: str, message: str, topics: Mapping[str, str]) -> tuple[str, ..
     """List topics with similar names, those of the same message first; else any of the same message."""
     fitting = [name for name, present in topics.items() if present == message and name != topic]
     foreign = [name for name, present in topics.items() if present != message and name != topic]
-    return tuple((nearest(topic, fitting) + nearest(topic, foreign))[:SHOWN] or sorted(fitting)[:SHOWN])
+    return tuple(
+        (nearest(topic, fitting) + nearest(topic, foreign))[:HINT_SHOWN_COUNT] or sorted(fitting)[:HINT_SHOWN_COUNT]
+    )

@@ -19,19 +19,19 @@ from solfer.view.life import PageLives
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 
-SILENCE = 0.5
+CONTROL_SILENCE = 0.5
 """Time without a sign of life of the page that commands after which everything comes to rest [s]."""
 
-RELEASED = 0.25
+RELEASE_TIME = 0.25
 """Time after which a button of the pad counts as released [s]; while it is pressed it says so ten times a second."""
 
-TURN = 2.0
+TURN_BY_SPEED = 2.0
 """Turn of the base for each metre of the pad's speed [rad/m]."""
 
 CMD_VEL = "cmd_vel"
 TWIST = "geometry_msgs/Twist"
 
-DIRECTIONS = {
+PAD_VELOCITIES = {
     "ahead": (1.0, 0.0, 0.0),
     "back": (-1.0, 0.0, 0.0),
     "left": (0.0, 1.0, 0.0),
@@ -41,15 +41,15 @@ DIRECTIONS = {
 }
 """Velocity of each button of the pad, as a share: x, y, heading."""
 
-FREE = "no page commands"
+NO_PAGE_COMMANDS = "no page commands"
 
-WORLD = ScenePose(np.zeros(3), np.eye(3))
+WORLD_POSE = ScenePose(np.zeros(3), np.eye(3))
 
 
 class PageControl:
     """Lets one page command, as long as it shows life.
 
-    Without a sign of it for `SILENCE`, or when it closes, the velocity is zero, references stay where they are, and
+    Without a sign of it for `CONTROL_SILENCE`, or closed, the velocity is zero, references stay where they are, and
     others may command.
 
     Args:
@@ -78,12 +78,12 @@ class PageControl:
         self._next = -math.inf
         gui = viser.gui
         with gui.add_folder("control"):
-            self._state = gui.add_markdown(FREE)
+            self._state = gui.add_markdown(NO_PAGE_COMMANDS)
             take = gui.add_button("take control")
             give = gui.add_button("give it back")
             self._module = gui.add_dropdown("base", ("",))
             self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
-            pads = {name: gui.add_button(name) for name in DIRECTIONS}
+            pads = {name: gui.add_button(name) for name in PAD_VELOCITIES}
 
         @take.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
@@ -94,7 +94,7 @@ class PageControl:
             requests.submit(partial(self._give, event.client_id))
 
         for name, button in pads.items():
-            self._connect(button, DIRECTIONS[name])
+            self._connect(button, PAD_VELOCITIES[name])
 
         @viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:
@@ -104,7 +104,7 @@ class PageControl:
         """Publish what is commanded; without a scene, None, nothing is."""
         now = self._middleware.now()
         self._find_modules(now)
-        if self._holder is not None and (state is None or self._lives.age(self._holder) > SILENCE):
+        if self._holder is not None and (state is None or self._lives.age(self._holder) > CONTROL_SILENCE):
             self._rest()
         if state is not None:
             self._show(state)
@@ -155,7 +155,7 @@ class PageControl:
             return
         if self._holder is not None:
             self._refuse(client, "another page commands")
-        elif self._lives.age(client) > SILENCE:
+        elif self._lives.age(client) > CONTROL_SILENCE:
             self._refuse(client, "this page does not answer in time to command")
         else:
             self._holder = client
@@ -181,7 +181,7 @@ class PageControl:
         self._moved.clear()
         self._pressed = -math.inf
         self._holder = None
-        self._state.content = FREE
+        self._state.content = NO_PAGE_COMMANDS
 
     def _connect(self, button: GuiButtonHandle, direction: tuple[float, float, float]) -> None:
         @button.on_hold(callback_hz=10.0)
@@ -194,7 +194,7 @@ class PageControl:
 
     def _drive(self, now: float) -> None:
         """Publish the velocity while a button is pressed, then zero once."""
-        pressed = now - self._pressed <= RELEASED
+        pressed = now - self._pressed <= RELEASE_TIME
         module = str(self._module.value)
         if not module or not (pressed or self._drives):
             return
@@ -204,7 +204,7 @@ class PageControl:
             topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
             self._writers[module] = self._middleware.declared_writer(topic, TWIST)
         linear = {"x": x, "y": y, "z": 0.0}
-        angular = {"x": 0.0, "y": 0.0, "z": TURN * turn}
+        angular = {"x": 0.0, "y": 0.0, "z": TURN_BY_SPEED * turn}
         self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
         self._drives = pressed
 
@@ -253,7 +253,7 @@ class PageControl:
         except NotFinite:
             return
         if phase == "update" and np.isfinite(position).all():
-            frame = self._frames.get(shown.frame, WORLD)
+            frame = self._frames.get(shown.frame, WORLD_POSE)
             own = ScenePose(frame.seen(pose.position), frame.rotation.T @ pose.rotation)
             self._moved.add(name)
             self._dragged.drag(shown, self._name, own)

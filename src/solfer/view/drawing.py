@@ -11,13 +11,13 @@ from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene import ScenePose, SceneState, ShownReference
 from solfer.view.visuals import Visual, visuals_of
 
-LENGTH = 1e-3
+FORCE_SCALE = 1e-3
 """Length of the arrow of a force [m/N]."""
 
-MOVED = 1e-4
+DRAWN_STEP = 1e-4
 """How far a link moves until the page is informed [m], and an entry of its rotation."""
 
-AXES = 0.12
+REFERENCE_AXES_LENGTH = 0.12
 """Length of the axes of a reference [m]."""
 
 TRANSLUCENT = 0.3
@@ -25,15 +25,15 @@ TRANSLUCENT = 0.3
 
 Color = tuple[float, float, float]
 
-DESIRED = (0.3, 0.55, 1.0)
+DESIRED_COLOR = (0.3, 0.55, 1.0)
 CENTER = (0.1, 0.4, 0.9)
 PROJECTION = (0.9, 0.2, 0.2)
-EDGES = (0.1, 0.7, 0.2)
-INNER = (0.9, 0.7, 0.1)
+EDGES_COLOR = (0.1, 0.7, 0.2)
+INNER_COLOR = (0.9, 0.7, 0.1)
 FORCES = (0.9, 0.3, 0.1)
-PATH = (0.6, 0.2, 0.8)
+PATH_COLOR = (0.6, 0.2, 0.8)
 ESTIMATED = (0.95, 0.6, 0.2)
-GOES = (0.5, 0.5, 0.5)
+GOAL_COLOR = (0.5, 0.5, 0.5)
 
 
 class SceneDrawing:
@@ -49,12 +49,12 @@ class SceneDrawing:
         visuals = visuals_of(description)
         api.add_grid("/ground", width=20.0, height=20.0, cell_size=0.5, section_size=1.0)
         self._measured = _Links(api, "/measured", visuals)
-        self._desired = _Links(api, "/desired", visuals, color=DESIRED, opacity=TRANSLUCENT)
+        self._desired = _Links(api, "/desired", visuals, color=DESIRED_COLOR, opacity=TRANSLUCENT)
         self._center = api.add_icosphere("/center/mass", 0.04, CENTER)
         self._projection = api.add_icosphere("/center/projection", 0.025, PROJECTION)
-        self._polygon = _Line(api, "/support/polygon", EDGES)
-        self._inner = _Line(api, "/support/margins", INNER)
-        self._path = _Line(api, "/path/base", PATH)
+        self._polygon = _Line(api, "/support/polygon", EDGES_COLOR)
+        self._inner = _Line(api, "/support/margins", INNER_COLOR)
+        self._path = _Line(api, "/path/base", PATH_COLOR)
         self._estimated = _Line(api, "/path/estimated", ESTIMATED)
         self._forces: ArrowsHandle | None = None
         self._references: dict[str, _Reference] = {}
@@ -70,7 +70,7 @@ class SceneDrawing:
         ground = state.projection[2]
         for line, path in ((self._path, state.path), (self._estimated, state.estimated_path)):
             line.draw(np.column_stack((path[:, :2], np.full(len(path), ground))))
-        arrows = [(each.position, each.position + LENGTH * each.force) for each in state.forces if each.touches]
+        arrows = [(each.position, each.position + FORCE_SCALE * each.force) for each in state.forces if each.touches]
         self._draw_forces(np.array(arrows, dtype=np.float32).reshape(-1, 2, 3))
         self._draw_references(state.references)
 
@@ -134,10 +134,10 @@ class _Links:
         positions = np.array([poses[link].position for link in self._links])
         rotations = np.array([poses[link].rotation for link in self._links])
         # handles would compare each pose with the one before, which takes three times as long as to send it
-        for index in np.flatnonzero(~(np.abs(positions - self._positions) < MOVED).all(axis=1)):
+        for index in np.flatnonzero(~(np.abs(positions - self._positions) < DRAWN_STEP).all(axis=1)):
             self._positions[index] = positions[index]
             self._send(SetPositionMessage(self._names[index], tuple(positions[index].tolist())))
-        for index in np.flatnonzero(~(np.abs(rotations - self._rotations) < MOVED).all(axis=(1, 2))):
+        for index in np.flatnonzero(~(np.abs(rotations - self._rotations) < DRAWN_STEP).all(axis=(1, 2))):
             self._rotations[index] = rotations[index]
             x, y, z, w = quaternion_from_rotation(rotations[index]).tolist()
             self._send(SetOrientationMessage(self._names[index], (w, x, y, z)))
@@ -163,9 +163,9 @@ class _Reference:
     """Where a reference is, and where it goes."""
 
     def __init__(self, api: SceneApi, name: str):
-        self._frame = api.add_frame(f"/references{name}", axes_length=AXES, axes_radius=0.006)
+        self._frame = api.add_frame(f"/references{name}", axes_length=REFERENCE_AXES_LENGTH, axes_radius=0.006)
         self._label = api.add_label(f"/references{name}/name", name)
-        self._goal = api.add_icosphere(f"/goals{name}", 0.02, GOES)
+        self._goal = api.add_icosphere(f"/goals{name}", 0.02, GOAL_COLOR)
 
     def place(self, reference: ShownReference) -> None:
         """Move it."""

@@ -8,7 +8,7 @@ from solfer.transport.lower_level import LOWER_LEVEL, Answer
 from solfer.transport.middleware import TRIGGER, NoFields
 from solfer.view.requests import PageRequests
 
-TEXT = "EMERGENCY STOP"
+STOP_LABEL = "EMERGENCY STOP"
 CONFIRM = "stop the robot now"
 
 
@@ -24,7 +24,7 @@ class EmergencyStopButton:
     def __init__(self, viser: ViserServer, requests: PageRequests, stop: Callable[[], None] | None = None):
         self._requests = requests
         self._stop = stop or self._call
-        button = viser.gui.add_button(TEXT, color="red")
+        button = viser.gui.add_button(STOP_LABEL, color="red")
         button.on_click(self._confirm)
 
     def _confirm(self, event: GuiEvent[GuiButtonHandle]) -> None:

@@ -14,7 +14,7 @@ from solfer.scene import ContactForce, SceneState
 from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters
 from solfer.view.columns import PlottedColumns
 from solfer.view.control import PageControl
-from solfer.view.drawing import FORCES, LENGTH
+from solfer.view.drawing import FORCE_SCALE, FORCES
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
 from solfer.view.server import HOST
@@ -45,7 +45,7 @@ except ModuleNotFoundError as error:
         expected="pip install -r requirements-view.txt",
     ) from error
 
-PORT = 8765
+FOXGLOVE_PORT = 8765
 """Where Foxglove looks first."""
 
 
@@ -214,7 +214,7 @@ def _arrow(force: ContactForce) -> ArrowPrimitive:
     red, green, blue = FORCES
     return ArrowPrimitive(
         pose=Pose(position=_vector(force.position), orientation=_turn(turn)),
-        shaft_length=LENGTH * size,
+        shaft_length=FORCE_SCALE * size,
         shaft_diameter=0.024,
         head_length=0.06,
         head_diameter=0.06,

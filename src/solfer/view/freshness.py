@@ -5,10 +5,10 @@ from viser._messages import RunJavascriptMessage
 
 from solfer.view.server import PageServer
 
-OLDEST = 0.5
+PAGE_OLDEST_AGE = 0.5
 """Age from which on the page says that what it shows is old [s]."""
 
-BEAT = "solfer-beat"
+BEAT_ELEMENT = "solfer-beat"
 BANNER = "solfer-banner"
 
 WATCH = f"""
@@ -21,13 +21,13 @@ banner.style.cssText = "display:none;position:fixed;top:0;left:0;right:0;z-index
 document.body.appendChild(banner);
 let newest = null, since = performance.now();
 window.solferWatch = setInterval(() => {{
-  const beat = document.getElementById("{BEAT}")?.dataset.count ?? null;
+  const beat = document.getElementById("{BEAT_ELEMENT}")?.dataset.count ?? null;
   if (beat !== newest) {{
     if (beat !== null) since = performance.now();
     newest = beat;
   }}
   const age = (performance.now() - since) / 1000;
-  banner.style.display = age > {OLDEST} ? "block" : "none";
+  banner.style.display = age > {PAGE_OLDEST_AGE} ? "block" : "none";
   banner.textContent = `what you see is ${{age.toFixed(1)}} s old`;
 }}, 100);
 """
@@ -52,4 +52,4 @@ class Freshness:
 
 
 def _beat(count: int) -> str:
-    return f'<span id="{BEAT}" data-count="{count}"></span>'
+    return f'<span id="{BEAT_ELEMENT}" data-count="{count}"></span>'

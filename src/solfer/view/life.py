@@ -9,10 +9,10 @@ from viser._messages import RunJavascriptMessage
 
 from solfer.view.server import LIFE, PageServer
 
-EVERY = 100
+LIFE_PERIOD = 100
 """Time between two signs of a page [ms]; a browser lets a page that is not in view send one a second."""
 
-SCRIPT = """
+LIFE_SCRIPT = """
 const place = location.origin.replace(/^http/, "ws") + location.pathname;
 const socket = new WebSocket(`${place}%s/%s`);
 const timer = setInterval(() => socket.readyState === 1 && socket.send(""), %d);
@@ -39,7 +39,9 @@ class PageLives:
             number = client.client_id
             keys[number] = secrets.token_urlsafe()
             server.lives[keys[number]] = lambda: self._note(number)
-            client._websock_connection.queue_message(RunJavascriptMessage(SCRIPT % (LIFE, keys[number], EVERY)))
+            client._websock_connection.queue_message(
+                RunJavascriptMessage(LIFE_SCRIPT % (LIFE, keys[number], LIFE_PERIOD))
+            )
 
         @server.viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from solfer.view.foxglove_server import FoxgloveServer
 
 CAMERA = (2.1, -1.8, 1.4)
-LOOK = (0.0, 0.0, 0.6)
+CAMERA_TARGET = (0.0, 0.0, 0.6)
 """Where a page looks from at first, and where to [m]."""
 
-FIELD_OF_VIEW = math.radians(40.0)
+CAMERA_FIELD_OF_VIEW = math.radians(40.0)
 """Vertical field of view of a page [rad]."""
 
 
@@ -63,8 +63,8 @@ class Page:
         gui = self._viser.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.initial_camera.position = CAMERA
-        self._viser.initial_camera.look_at = LOOK
-        self._viser.initial_camera.fov = FIELD_OF_VIEW
+        self._viser.initial_camera.look_at = CAMERA_TARGET
+        self._viser.initial_camera.fov = CAMERA_FIELD_OF_VIEW
         self._freshness = Freshness(server)
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from solfer.transport import Middleware
 from solfer.transport.parameters import GET_PARAMETERS, GETTING, GetParameters, ParametersReply
 
-TRIALS, PAUSE = 10, 2.0
+TRIALS, PARAMETERS_PAUSE = 10, 2.0
 """How often, and after which time [s], a part is asked for its parameters: it may report before it offers them."""
 
 
@@ -36,9 +36,9 @@ class KnownParameters:
                 self._take(part)
             elif self._left.setdefault(part, TRIALS) and now >= self._next.get(part, -math.inf):
                 self._left[part] -= 1
-                self._next[part] = now + PAUSE
+                self._next[part] = now + PARAMETERS_PAUSE
                 service = self._middleware.resolve(f"{part}/{GET_PARAMETERS}")
-                answer = self._middleware.request(service, GETTING, GetParameters(), ParametersReply, PAUSE)
+                answer = self._middleware.request(service, GETTING, GetParameters(), ParametersReply, PARAMETERS_PAUSE)
                 self._pending[part] = answer
 
     def forget(self, part: str) -> None:

@@ -4,15 +4,15 @@ import numpy as np
 
 from solfer.errors import RecordingError, SolferError, UnknownName
 from solfer.recording.kinds import part_of, topic_of
-from solfer.recording.model import JOINTS, Channel, Recording
+from solfer.recording.model import JOINTS_KIND, Channel, Recording
 from solfer.robot import Robot
 from solfer.robot.shipped import robot_of
 from solfer.transport import BodyMessage, JointMessage, Middleware, Writer
 from solfer.transport.messages import PointsMessage
 
-MEASURED = "measured/position"
-COMMAND = "command"
-TRUTH = "truth"
+MEASURED_CHANNEL = "measured/position"
+COMMAND_CHANNEL = "command"
+TRUTH_CHANNEL = "truth"
 
 
 class PlayedTopics:
@@ -53,7 +53,7 @@ class Playback:
     def __init__(self, recording: Recording, middleware: Middleware, robot: Robot):
         self._recording = recording
         self._robot = robot
-        self._joints = [each for each in _widest_first(recording, MEASURED) if len(each.times)]
+        self._joints = [each for each in _widest_first(recording, MEASURED_CHANNEL) if len(each.times)]
         if not self._joints:
             raise RecordingError("no plugin measures joints", expected="a recording with <plugin>/measured/position")
         times = self._joints[0].times
@@ -67,12 +67,12 @@ class Playback:
         channels = [each for each in recording.channels.values() if len(each.times)]
         for channel in channels:
             plugin, _, rest = channel.name.partition("/")
-            if channel.kind == JOINTS and rest.startswith(f"{COMMAND}/") and part_of(rest) == "position":
+            if channel.kind == JOINTS_KIND and rest.startswith(f"{COMMAND_CHANNEL}/") and part_of(rest) == "position":
                 topic = f"{plugin}_{topic_of(channel).rpartition('/')[2]}/command"
                 self._commands.append((channel, middleware.writer(topic, "solfer/JointCommand")))
         poses = [each for each in channels if each.kind == "nav_msgs/Odometry"]
-        self._truths = [each for each in poses if part_of(each.name) == TRUTH]
-        self._estimates = [each for each in poses if part_of(each.name) != TRUTH]
+        self._truths = [each for each in poses if part_of(each.name) == TRUTH_CHANNEL]
+        self._estimates = [each for each in poses if part_of(each.name) != TRUTH_CHANNEL]
         names = robot.contacts.names
         self._forces = {part_of(each.name): each for each in channels if part_of(each.name) in names}
         base = robot.kinematics.base
@@ -146,7 +146,7 @@ def robot_of_recording(recording: Recording) -> Robot:
     Raises:
         RecordingError: It describes none.
     """
-    widest = next(iter(_widest_first(recording, MEASURED)), None)
+    widest = next(iter(_widest_first(recording, MEASURED_CHANNEL)), None)
     plugin = widest.name.partition("/")[0] if widest is not None else ""
     texts = [recording.attachments.get(f"{plugin}/robot.{kind}") for kind in ("urdf", "srdf")]
     if texts[0] is None:

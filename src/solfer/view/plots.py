@@ -11,13 +11,13 @@ from solfer.view.requests import PageRequests
 SPAN = 20.0
 """Time that a plot shows [s]."""
 
-RATE = 5.0
+PLOT_RATE = 5.0
 """Of what is drawn [Hz]."""
 
-COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf")
+PLOT_COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf")
 """Of the columns of a plot, which has as many at most."""
 
-NOTHING = "(none)"
+NO_COLUMN = "(none)"
 
 
 class Plots:
@@ -37,7 +37,7 @@ class Plots:
         self._plot: GuiUplotHandle | None = None
         self._drawn = -np.inf
         with gui.add_folder("plot", expand_by_default=False) as self._folder:
-            self._choice = gui.add_dropdown("column", (NOTHING,))
+            self._choice = gui.add_dropdown("column", (NO_COLUMN,))
             add = gui.add_button("add")
             clear = gui.add_button("clear")
         add.on_click(lambda _: requests.submit(self._add))
@@ -49,20 +49,20 @@ class Plots:
             self._empty()
         names = self._columns.names()
         if len(names) + 1 != len(self._choice.options):
-            self._choice.options = (NOTHING, *names)
+            self._choice.options = (NO_COLUMN, *names)
         self._times.append(now)
         for name, samples in self._samples.items():
             samples.append(self._columns.value(name))
         while self._times[0] < now - SPAN:
             for kept in (self._times, *self._samples.values()):
                 kept.popleft()
-        if self._plot is not None and abs(now - self._drawn) >= 1.0 / RATE:
+        if self._plot is not None and abs(now - self._drawn) >= 1.0 / PLOT_RATE:
             self._drawn = now
             self._plot.data = self._data()
 
     def _add(self) -> None:
         name = self._choice.value
-        if name != NOTHING and name not in self._samples and len(self._samples) < len(COLORS):
+        if name != NO_COLUMN and name not in self._samples and len(self._samples) < len(PLOT_COLORS):
             self._samples[name] = deque([np.nan] * len(self._times))
             self._draw()
 
@@ -80,7 +80,9 @@ class Plots:
             self._plot = None
         if not self._samples:
             return
-        lines = (uplot.Series(label=name, stroke=color) for name, color in zip(self._samples, COLORS, strict=False))
+        lines = (
+            uplot.Series(label=name, stroke=color) for name, color in zip(self._samples, PLOT_COLORS, strict=False)
+        )
         with self._folder:
             self._plot = self._gui.add_uplot(
                 self._data(),

@@ -18,12 +18,12 @@ from solfer.view.control import PageControl
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
 
-COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
+SLIDER_COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
 
-REACH = 4.0
+SLIDER_RANGE = 4.0
 """Largest value of a slider over the larger one of value and default, where the parameter may have it."""
 
-STEPS = 400
+SLIDER_STEPS = 400
 """Steps of a slider."""
 
 Control = GuiSliderHandle[float] | GuiCheckboxHandle | GuiTextHandle
@@ -133,9 +133,9 @@ class _PluginTab:
             control = self._gui.add_checkbox(label, value == "true", disabled=off, hint=description)
         elif not any(math.isnan(each) for each in (number, least, most)):
             largest = max((abs(each) for each in (number, usual) if not math.isnan(each)), default=0.0)
-            most = min(most, REACH * largest or most)
-            least = max(least, -REACH * largest if largest else least)
-            step = (most - least) / STEPS
+            most = min(most, SLIDER_RANGE * largest or most)
+            least = max(least, -SLIDER_RANGE * largest if largest else least)
+            step = (most - least) / SLIDER_STEPS
             control = self._gui.add_slider(label, least, most, step, number, disabled=off, hint=description)
         else:
             control = self._gui.add_text(label, value, disabled=off, hint=description)
@@ -167,7 +167,7 @@ def _table(report: HealthReport) -> str:
         f"<tr><td>{html.escape(name)}</td><td style='text-align:right;padding-left:1em'>{_text(value)}</td></tr>"
         for name, value in report.values.items()
     )
-    color = COLORS[report.level]
+    color = SLIDER_COLORS[report.level]
     head = f"<b style='color:{color}'>{report.level.name}</b> {html.escape(report.summary)}"
     return f"<div style='font-size:0.8em;padding:0.5em'>{head}<table>{rows}</table></div>"
 

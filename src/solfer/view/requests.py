@@ -11,7 +11,7 @@ from viser import ViserServer
 from solfer.errors import MiddlewareError, SolferError, described
 from solfer.transport import Middleware
 
-PATIENCE = 2.0
+SERVICE_PATIENCE = 2.0
 """Longest wait for an answer of a service [s]."""
 
 logger = logging.getLogger(__name__)
@@ -42,7 +42,7 @@ class PageRequests:
         self, service: str, interface: str, request: Any, reply: type, done: Callable[[Any], None] = lambda _: None
     ) -> None:
         """Call a service; what it refuses is shown. `done` gets the reply, in the loop; from the loop alone."""
-        answer = self.middleware.request(self.middleware.resolve(service), interface, request, reply, PATIENCE)
+        answer = self.middleware.request(self.middleware.resolve(service), interface, request, reply, SERVICE_PATIENCE)
         self._answers.append((answer, service, done))
 
     def update(self) -> None:

@@ -20,10 +20,10 @@ from solfer.errors import MiddlewareError
 
 HOST = "127.0.0.1"
 
-NAMES = ("localhost", HOST)
+HOST_NAMES = ("localhost", HOST)
 """Names of this machine in addresses of the page."""
 
-PORT = 8080
+FIRST_PORT = 8080
 
 LIFE = "life"
 """Path of the websockets by which pages show that they live."""
@@ -56,7 +56,7 @@ class PageServer:
         MiddlewareError: It cannot be served.
     """
 
-    def __init__(self, port: int = PORT):
+    def __init__(self, port: int = FIRST_PORT):
         rich.get_console().quiet = True  # viser prints addresses without the token
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
@@ -117,7 +117,7 @@ class PageServer:
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the answer to a request that is none of this page's; None: it is one."""
-        hosts = [f"{name}:{connection.local_address[1]}" for name in NAMES]
+        hosts = [f"{name}:{connection.local_address[1]}" for name in HOST_NAMES]
         origins = [f"http://{host}" for host in hosts]
         token = request.path.partition("?")[0].split("/")[1:2]
         headers = request.headers

@@ -7,10 +7,10 @@ from viser import GuiButtonHandle, GuiInputHandle, ViserServer
 from solfer.view.playback import Playback
 from solfer.view.requests import PageRequests
 
-STEP = 0.01
+TIME_LINE_STEP = 0.01
 """Of the time line [s]."""
 
-SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "10")
+PLAYBACK_SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "10")
 
 
 class TimeLine:
@@ -24,11 +24,11 @@ class TimeLine:
 
     def __init__(self, viser: ViserServer, requests: PageRequests, playback: Playback):
         self._playback = playback
-        length = max(math.floor(100.0 * (playback.end - playback.begin)) / 100.0, STEP)
+        length = max(math.floor(100.0 * (playback.end - playback.begin)) / 100.0, TIME_LINE_STEP)
         gui = viser.gui
-        self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, STEP, 0.0)
+        self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, TIME_LINE_STEP, 0.0)
         self._button: GuiButtonHandle = gui.add_button("pause")
-        speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+        speed = gui.add_dropdown("speed", PLAYBACK_SPEEDS, initial_value="1")
         self._button.on_click(lambda _: requests.submit(self._toggle))
 
         @self._slider.on_update

@@ -14,7 +14,7 @@ from solfer.model.urdf.description import Description
 from solfer.model.urdf.mesh_files import find_mesh
 from solfer.numerics.rotations import rotation_from_rpy
 
-GREY = (0.7, 0.7, 0.7, 1.0)
+DEFAULT_GREY = (0.7, 0.7, 0.7, 1.0)
 
 logger = logging.getLogger(__name__)
 
@@ -103,14 +103,14 @@ def _mesh(geometry: Element, where: str) -> trimesh.Trimesh | None:
 def _color(shape: Element, materials: dict[str, Element]) -> Color:
     own = shape.find("material")
     if own is None:
-        return GREY
+        return DEFAULT_GREY
     color = own.find("color")
     if color is None:
         named = materials.get(own.get("name", ""))
         color = None if named is None else named.find("color")
     if color is None:
-        return GREY
-    red, green, blue, opacity = _numbers(color, "rgba", GREY)
+        return DEFAULT_GREY
+    red, green, blue, opacity = _numbers(color, "rgba", DEFAULT_GREY)
     return red, green, blue, opacity
 
 

@@ -11,8 +11,8 @@ from solfer.errors import MiddlewareError
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.telemetry.statistics_memory import LOOP
-from solfer.transport.lower_level import REFUSED
+from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS
+from solfer.transport.lower_level import REFUSALS_TOPIC
 from solfer.transport.messages import REFUSALS, JointMessage
 
 LEASE = 0.3
@@ -111,7 +111,7 @@ def test_a_command_with_nan_aborts_its_plugin(layer, value):
 def test_a_command_of_a_stranger_is_refused(shared):
     position = shared.simulation.lower_level.controllers["position_controller"]
     stranger, before = shared.node("stranger"), position.position.copy()
-    refusals = stranger.queue(REFUSED, REFUSALS)
+    refusals = stranger.queue(REFUSALS_TOPIC, REFUSALS)
     command = JointMessage(position.joints, position=before + 0.1)
     command.position[7] = np.nan
     stranger.writer("position_controller/command", "solfer/JointCommand").write(command)
@@ -221,7 +221,7 @@ def test_a_loop_that_stood_still_begins_anew(timed):
     ((stage, cycles, skipped, overruns),) = seen
     assert (stage, overruns) == (PluginState.RUNNING, 1)
     assert skipped == pytest.approx(1.0 * RATE, abs=3) and cycles + skipped == pytest.approx(2.4 * RATE, abs=3)
-    assert statistics.skips[LOOP.index("lateness")] == skipped
+    assert statistics.skips[LOOP_HISTOGRAMS.index("lateness")] == skipped
     meanwhile = [speed for time, _, speed in timed.rows if 1.0 + LEASE + AT_ONCE / RATE <= time < 1.99]
     assert not np.any(meanwhile)  # the lower level ends claims without commands
     assert not any(np.any(speed) for time, _, speed in timed.rows if time >= 2.0)  # what was asked for is forgotten

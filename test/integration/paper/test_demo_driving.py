@@ -11,8 +11,8 @@ from solfer.demo import centauro, driving, driving_report
 from solfer.demo.driving_record import DrivingRecorder
 from solfer.demo.film import film
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.recording.model import COLUMNS, Channel, Recording
-from solfer.simulation.world.world import FLAT
+from solfer.recording.model import COLUMNS_KIND, Channel, Recording
+from solfer.simulation.world.world import FLAT_WORLD
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
@@ -48,7 +48,7 @@ class Log:
             {
                 name: Channel(
                     name,
-                    COLUMNS,
+                    COLUMNS_KIND,
                     columns,
                     ("",) * len(columns),
                     "",
@@ -85,7 +85,7 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     assert float(rows["slip, share of the way of wheels"]) < 0.02
     assert 95.0 < float(rows["forces of the ground"].split()[1]) < 105.0
     path = tmp_path / "film.gif"
-    film(shown.robot, seen.time[-30:], seen.position[-30:], FLAT, path)
+    film(shown.robot, seen.time[-30:], seen.position[-30:], FLAT_WORLD, path)
     assert path.read_bytes().startswith(b"GIF89a") and path.stat().st_size > 3000
 
 
@@ -110,8 +110,8 @@ def test_a_slow_machine_is_told():
 
 
 def test_a_figure_that_is_too_large_is_marked():
-    assert driving_report.bounded(0.5, driving_report.HEADING, "degrees") == ""
-    assert driving_report.bounded(0.9, driving_report.HEADING, "degrees") == "  <-- more than 0.8 degrees"
+    assert driving_report.bounded(0.5, driving_report.LIMIT_HEADING, "degrees") == ""
+    assert driving_report.bounded(0.9, driving_report.LIMIT_HEADING, "degrees") == "  <-- more than 0.8 degrees"
 
 
 def lost(seconds):

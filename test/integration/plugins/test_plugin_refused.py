@@ -15,7 +15,7 @@ from solfer.config import load
 from solfer.errors import ClaimRefused
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate, run
-from solfer.transport.lower_level import REFUSED
+from solfer.transport.lower_level import REFUSALS_TOPIC
 from solfer.transport.messages import REFUSALS, RefusalMessage
 
 
@@ -130,7 +130,7 @@ def test_stopped_hardware_informs_its_plugin(tmp_path):
 
 
 def test_refusals_are_published_at_50_hz(world):
-    published = MemoryMiddleware(world.bus, "ear").queue(REFUSED, REFUSALS)
+    published = MemoryMiddleware(world.bus, "ear").queue(REFUSALS_TOPIC, REFUSALS)
     lower_level = world.simulation.lower_level
     for _ in range(100):
         command(world, "wrong", "position_controller", ("torso_jaw",), position=[0.1])
@@ -148,7 +148,7 @@ def test_refusals_are_published_at_50_hz(world):
 
 def test_a_wrong_command_stops_no_plugin(world, caplog):
     plugin = drive(world)
-    writer = MemoryMiddleware(world.bus, "simulator").writer(REFUSED, REFUSALS)
+    writer = MemoryMiddleware(world.bus, "simulator").writer(REFUSALS_TOPIC, REFUSALS)
     for _ in range(5):
         writer.write(RefusalMessage(("other", "joint_states"), (True, False), ("emergency stop", "too far")))
         world.run(0.02)

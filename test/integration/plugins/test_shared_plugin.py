@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from support.shared.figure_5 import ORDER, SharedWorld, write
 
 from solfer.plugins import CycleTrace, PluginState
-from solfer.transport.plugin_state import FAILED
+from solfer.transport.plugin_state import FAILED_STATES
 
 NEEDS = {
     "estimation": (),
@@ -102,7 +102,7 @@ def test_one_component_fails_alone(shared, name, fault):
     assert {other: world.plugins[other].component.cycles - before[other] for other in untouched} == dict.fromkeys(
         untouched, 200
     )
-    assert not any(world.parts[other].state in FAILED for other in others)
+    assert not any(world.parts[other].state in FAILED_STATES for other in others)
     assert all(np.isfinite(plugin.robot.state.position).all() for plugin in world.plugins.values())
     world.plugins[name].component.fault = ""
     assert world.ask(f"{name}/switch", data=True).success

@@ -13,9 +13,9 @@ from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.discovery import published_topics, services
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.inbox import Inbox
-from solfer.transport.messages import POINTS, BodyMessage, JointMessage, PointsMessage
+from solfer.transport.messages import ROBOT_POINTS, BodyMessage, JointMessage, PointsMessage
 
-INWARDS = [Route("wanted", "solfer/JointCommand"), Route("goals", POINTS)]
+INWARDS = [Route("wanted", "solfer/JointCommand"), Route("goals", ROBOT_POINTS)]
 
 
 class Layer:
@@ -45,9 +45,9 @@ def layer(tmp_path):
 
 
 def test_joints_and_points_go_in(layer):
-    joints, points = layer.rt.reader("wanted", "solfer/JointCommand"), layer.rt.reader("goals", POINTS)
+    joints, points = layer.rt.reader("wanted", "solfer/JointCommand"), layer.rt.reader("goals", ROBOT_POINTS)
     layer.nrt.writer("wanted", "solfer/JointCommand").write(JointMessage(("a", "b"), position=np.array([1.0, 2.0])))
-    layer.nrt.writer("goals", POINTS).write(PointsMessage("world", ("hand",), np.array([[1.0, 2.0, 3.0]])))
+    layer.nrt.writer("goals", ROBOT_POINTS).write(PointsMessage("world", ("hand",), np.array([[1.0, 2.0, 3.0]])))
     layer.turn()
     assert joints.read() is MessageStatus.NEW and points.read() is MessageStatus.NEW
     assert (joints.message.names, joints.message.position.tolist()) == (("a", "b"), [1.0, 2.0])

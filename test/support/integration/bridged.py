@@ -9,7 +9,7 @@ from support.shared_memory.xbot_bridge import made
 
 from solfer.config import Configuration
 from solfer.middleware.bridge import routes
-from solfer.middleware.bridge.bridge import PERIOD
+from solfer.middleware.bridge.bridge import BRIDGE_PERIOD
 from solfer.middleware.memory import FaultsRecord, MemoryMiddleware
 from solfer.plugins import Plugin
 
@@ -32,7 +32,7 @@ class BridgedWorld(XbotWorld):
         end = self.node(BRIDGE)
         inwards, outwards = routes(inside)
         self.bridge = made(end.namespace, end, MemoryMiddleware(self.bus, BRIDGE), inwards, outwards)
-        self.bus.every(PERIOD, self.bridge.cycle)
+        self.bus.every(BRIDGE_PERIOD, self.bridge.cycle)
 
     def outside(self, name: str, file: Path = CONFIG / "centauro.yaml") -> Plugin:
         """Make a plugin that is not in the layer, and put its cycle on the bus."""

@@ -9,7 +9,7 @@ import time
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
-from solfer.transport.lower_level import CLAIM, LOWER_LEVEL, ClaimAnswer, ClaimRequest
+from solfer.transport.lower_level import CLAIM_INTERFACE, LOWER_LEVEL, ClaimAnswer, ClaimRequest
 from solfer.transport.messages import JointMessage
 
 RATE = 500.0  # [Hz]
@@ -25,7 +25,7 @@ def main(name: str, speed: float) -> None:
     message = JointMessage.empty(wheels, ("velocity",))
     message.velocity[:] = speed
     request = ClaimRequest(middleware.name, ("velocity_controller",))
-    middleware.call(f"{LOWER_LEVEL}/claim", CLAIM, request, ClaimAnswer, PATIENCE)
+    middleware.call(f"{LOWER_LEVEL}/claim", CLAIM_INTERFACE, request, ClaimAnswer, PATIENCE)
     statistics = RuntimeStatistics.create(namespace.folder, RATE, ["driver"], ["component"])
     due = middleware.now()
     while True:

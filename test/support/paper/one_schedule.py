@@ -14,9 +14,9 @@ from support.integration.world import CONFIG, STEP, World
 
 from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
-from solfer.demo.driving import RATE
+from solfer.demo.driving import COURSE_RATE
 from solfer.demo.waving import Waving
-from solfer.middleware.bridge.bridge import PERIOD as BRIDGED
+from solfer.middleware.bridge.bridge import BRIDGE_PERIOD as BRIDGED
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.navigation import Navigation, ScenarioCourse
 from solfer.plugins import PluginSet, Registry, generate
@@ -75,9 +75,9 @@ class Outside:
     """
 
     def __init__(self, middleware):
-        player = Player(read_scenario(COURSE), 1.0 / RATE)
+        player = Player(read_scenario(COURSE), 1.0 / COURSE_RATE)
         course = ScenarioCourse(middleware, player, "locomotion", "odometry/odom", positions=True)
-        self.navigation = Navigation(middleware, course, "navigation", RATE)
+        self.navigation = Navigation(middleware, course, "navigation", COURSE_RATE)
         self._waving = Waving(middleware, "hands", {name: np.array(place) for name, place in HANDS.items()})
         self._now, self._begin = middleware.now, None
 
@@ -118,7 +118,7 @@ class _Scheduled:
         self.bus.run_until(BEGIN)
         self._pause(False)
         self.outside = Outside(MemoryMiddleware(self.bus, "driver"))
-        self.bus.every(1.0 / RATE, self.outside.cycle, FIRST - 2.0 * BEFORE)
+        self.bus.every(1.0 / COURSE_RATE, self.outside.cycle, FIRST - 2.0 * BEFORE)
         self._schedule()
         for each in self._sets:
             names = [managed.name for managed in each.plugins]

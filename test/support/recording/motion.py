@@ -3,7 +3,7 @@
 import numpy as np
 from support.integration.world import ROBOT, STEP, World
 
-from solfer.recording.model import COLUMNS, JOINTS, Channel, Event, Recording
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Event, Recording
 
 AGE = "joint_states/feedback/link_side_online/age"
 POSITION = "joint_states/feedback/link_side_online/position"
@@ -58,8 +58,8 @@ class Motion:
         times, *values = (np.array(each) for each in zip(*self._cycles, strict=True))
         stages = ("calls", "read", "robot", "component", "gate", "write")
         names = (POSITION, "joint_states/command/position_controller/position", "joint_states/timing", AGE)
-        joints = (self.joints, ("rad",) * len(self.joints), JOINTS)
-        forms = (joints, joints, (stages, ("s",) * len(stages), COLUMNS), (("age",), ("s",), COLUMNS))
+        joints = (self.joints, ("rad",) * len(self.joints), JOINTS_KIND)
+        forms = (joints, joints, (stages, ("s",) * len(stages), COLUMNS_KIND), (("age",), ("s",), COLUMNS_KIND))
         channels = {}
         for name, (columns, units, kind), numbers in zip(names, forms, values, strict=True):
             numbers = numbers[:, -len(columns) :]
@@ -74,4 +74,4 @@ class Motion:
         times = clock + np.arange(len(rows)) / rate
         values = rows + noise * np.random.default_rng(seed).standard_normal(rows.shape)
         units = ("rad",) * len(self.joints)
-        return Recording({POSITION: Channel(POSITION, JOINTS, self.joints, units, "", times, values)})
+        return Recording({POSITION: Channel(POSITION, JOINTS_KIND, self.joints, units, "", times, values)})

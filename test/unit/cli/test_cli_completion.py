@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from solfer.cli.completion import candidates
-from solfer.cli.main import COMMANDS, main, parser
+from solfer.cli.main import SUB_COMMANDS, main, parser
 from solfer.config import module_names
 
 REPOSITORY = Path(__file__).parents[3]
@@ -23,7 +23,7 @@ def folder(monkeypatch):
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
-        ("", sorted(COMMANDS)),
+        ("", sorted(SUB_COMMANDS)),
         ("ch", ["check"]),
         ("list jo", ["joints"]),
         ("check config/cen", ["config/centauro.yaml"]),

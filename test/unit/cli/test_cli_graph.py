@@ -12,7 +12,7 @@ from support.plugins.fleet import tree
 from support.unit.cart import URDF
 
 from solfer.cli.diagram import Network, dot_text, plain_text
-from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, PluginBox
+from solfer.cli.diagram.network import LOWER_LEVEL_END, SENSORS, Arrow, End, Kind, PluginBox
 from solfer.cli.main import main
 from solfer.cli.plugins import network_of
 from solfer.components import Component, Port, TopicIn, TopicOut
@@ -74,8 +74,8 @@ def test_figure_4_has_the_arrows_of_the_paper(figure_4):
         (SENSORS, whole, "link_side_online", "map FEEDBACK"),
         (plugin("upper_body"), whole, "upper_body", "map RBDL_UPPER"),
         (plugin("lower_body"), whole, "lower_body", "map RBDL_LOWER"),
-        (whole, LOWER_LEVEL, "position_controller", "map LOWER_LEVEL"),
-        (whole, LOWER_LEVEL, "velocity_controller", "map LOWER_LEVEL"),
+        (whole, LOWER_LEVEL_END, "position_controller", "map LOWER_LEVEL"),
+        (whole, LOWER_LEVEL_END, "velocity_controller", "map LOWER_LEVEL"),
     }
     contents = {arrow.pipe: arrow.content for arrow in figure_4.arrows}
     assert contents["link_side_online"] == "measured position, velocity, effort"
@@ -178,7 +178,7 @@ def test_figure_5_shares_two_robots_among_four_plugins():
         ("locomotion", "gravity_compensation", "legs"),
         ("manipulation", "gravity_compensation", "upper"),
     }
-    assert [arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL] == ["gravity_compensation"]
+    assert [arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL_END] == ["gravity_compensation"]
     forces = next(arrow for arrow in network.arrows if arrow.pipe == "forces")
     assert (forces.content, forces.reference) == ("force of 4 points", "axes of world")
 
@@ -199,7 +199,7 @@ def test_a_configuration_listed_twice_is_two_plugins(tmp_path):
         ("joint_states_2", "JointStates"),
     ]
     assert network.shared == {"shared": (("joint_states", "joint_states_2"),)}
-    assert {arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL} == {
+    assert {arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL_END} == {
         box.name for box in network.plugins
     }
 
@@ -222,10 +222,10 @@ def test_two_sources_of_a_shared_robot_are_refused(tmp_path):
 
 
 def test_an_idle_plugin_has_a_dashed_arrow():
-    arrow = Arrow(plugin("one"), LOWER_LEVEL, "position_controller", idle=True)
+    arrow = Arrow(plugin("one"), LOWER_LEVEL_END, "position_controller", idle=True)
     text = dot_text(Network("SM", (box("one", idle=True),), (arrow,)))
     assert "dashed" in text and "idle" in text
-    assert "dashed" not in dot_text(Network("SM", (box("one"),), (Arrow(plugin("one"), LOWER_LEVEL, "p"),)))
+    assert "dashed" not in dot_text(Network("SM", (box("one"),), (Arrow(plugin("one"), LOWER_LEVEL_END, "p"),)))
 
 
 @pytest.mark.parametrize(

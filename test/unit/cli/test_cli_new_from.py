@@ -77,7 +77,7 @@ def test_a_robot_of_robot_descriptions(name, message, folder, tmp_path_factory, 
     for module, text in DESCRIPTIONS.items():
         (package / f"{module}.py").write_text(text.format(urdf=urdf))
     monkeypatch.syspath_prepend(str(package.parent))
-    monkeypatch.setattr(collections, "DESCRIPTIONS", package.name)
+    monkeypatch.setattr(collections, "DESCRIPTIONS_PACKAGE", package.name)
     monkeypatch.setattr(collections, "COLLECTIONS", (package.name,))
     assert main(["new", "robot", "arm", "--from", f"{package.name}:{name}"]) == (2 if message else 0)
     assert message in capsys.readouterr().err

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from solfer.cli.main import COMMANDS, main
+from solfer.cli.main import SUB_COMMANDS, main
 from solfer.errors import SolferError
 from solfer.simulation.bundle import read_bundle
 from solfer.simulation.server.publications import robot_parameters
@@ -49,7 +49,7 @@ def test_streams_that_cannot_be_written_to(words):
 @pytest.mark.slow
 @pytest.mark.parametrize("environment", [ASCII, {"PYTHONOPTIMIZE": "2"}], ids=["ascii", "optimized"])
 def test_a_terminal_of_ascii_and_a_python_without_docstrings(tmp_path, environment):
-    for command in COMMANDS:
+    for command in SUB_COMMANDS:
         assert run([command, "--help"], **environment) == (0, "")
     assert run(["scenario", SCENARIO], **environment)[0] == 0
     text = "text: \u4f60\n"

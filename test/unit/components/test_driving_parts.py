@@ -11,7 +11,7 @@ from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.delay import ROLLED, ClockDelay
 from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from, turned
-from solfer.components.wheeled_motion.support.weight import ACCELERATION, SPEED, WeightShift
+from solfer.components.wheeled_motion.support.weight import WEIGHT_SHIFT_ACCELERATION, WEIGHT_SHIFT_SPEED, WeightShift
 
 PERIOD = 0.005  # [s]
 
@@ -90,7 +90,7 @@ def test_the_weight_goes_there_and_back():
                 break
             joints.velocity[:] = references.velocity
             speed = float(np.linalg.norm(references.velocity))
-            assert speed <= SPEED + 1e-12 and speed - last <= ACCELERATION * PERIOD + 1e-12
+            assert speed <= WEIGHT_SHIFT_SPEED + 1e-12 and speed - last <= WEIGHT_SHIFT_ACCELERATION * PERIOD + 1e-12
             last = speed
             references.step(PERIOD)
         joints.velocity[:] = 0.0

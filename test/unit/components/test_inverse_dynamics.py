@@ -15,7 +15,7 @@ from solfer.components.geometry import Pose, Vector
 from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.components.inverse_dynamics.component import SECOND_LEVEL
-from solfer.components.inverse_dynamics.problem import ACCELERATION, FORCE
+from solfer.components.inverse_dynamics.problem import QP_ACCELERATION, QP_FORCE
 from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
 from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins import check_file
@@ -150,7 +150,7 @@ class Second:
         jacobian, wanted = self.tasks(q, v)
         unit = pin.computeTotalMass(self._model) * 9.81 / 4.0
         count = len(held)
-        hessian = np.diag([ACCELERATION] * size + [FORCE] * count)
+        hessian = np.diag([QP_ACCELERATION] * size + [QP_FORCE] * count)
         hessian[:size, :size] += jacobian.T @ jacobian
         gradient = np.concatenate((-jacobian.T @ wanted, np.zeros(count)))
         dynamics = np.hstack((inertia, -unit * held.T))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solfer.components.odometry.height_kernel import TOLERANCE
+from solfer.components.odometry.height_kernel import TRACK_TOLERANCE
 from solfer.components.odometry.height_map import HeightMap
 
 PERIOD, SPEED, RADIUS, HEIGHT = 0.005, 0.3, 0.078, 0.6
@@ -70,8 +70,8 @@ def test_a_wrong_tilt_counts_by_the_way():
 
 @pytest.mark.slow
 def test_a_floor_that_is_uneven_stays_one():
-    errors, heights = drive(lambda x: 0.5 * TOLERANCE * np.sin(4.0 * x), 20.0)
-    assert heights.floor == 0.0 and np.abs(errors).max() < TOLERANCE
+    errors, heights = drive(lambda x: 0.5 * TRACK_TOLERANCE * np.sin(4.0 * x), 20.0)
+    assert heights.floor == 0.0 and np.abs(errors).max() < TRACK_TOLERANCE
 
 
 @pytest.mark.slow

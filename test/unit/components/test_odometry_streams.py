@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.unit.golden import lower_body
 
-from solfer.components.odometry.imu_samples import LAG
+from solfer.components.odometry.imu_samples import IMU_SAMPLES_LAG
 from solfer.components.odometry.samples import SortedSamples
-from solfer.components.odometry.stamps import PERSISTENT, StampCheck
-from solfer.components.odometry.streams import AHEAD, Streams
+from solfer.components.odometry.stamps import STAMP_PERSISTENT, StampCheck
+from solfer.components.odometry.streams import IMU_LEAD, Streams
 from solfer.model.history import History
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002
@@ -123,7 +123,7 @@ def test_each_measurement_has_both_at_one_time(late, lost, close):
         if turned is not None and elapsed < 0.02:
             assert speed == pytest.approx((heading(time) - heading(before)) / elapsed, abs=20.0 * close)
         turned = angle
-    assert passed == pytest.approx(time - begin, abs=1e-6) and time > 4.0 - 2.0 * LAG
+    assert passed == pytest.approx(time - begin, abs=1e-6) and time > 4.0 - 2.0 * IMU_SAMPLES_LAG
     assert count > (0.99 - 1.3 * lost[0] - 0.5 * (late[0] > 0.0)) * 4.0 / JOINTS
 
 
@@ -153,7 +153,7 @@ def test_frozen_joints_are_no_measurement():
     streams.start()
     list(measurements(sensors, streams, 0.1))
     sensors.frozen = sensors.time
-    assert len(list(measurements(sensors, streams, 1.0))) <= 1 and streams.ahead == AHEAD
+    assert len(list(measurements(sensors, streams, 1.0))) <= 1 and streams.ahead == IMU_LEAD
     sensors.frozen = math.inf
     time, elapsed, measured, _, speed = next(measurements(sensors, streams, 0.05))
     assert measured and elapsed == pytest.approx(1.0, abs=0.01)
@@ -172,7 +172,7 @@ def test_the_base_goes_on_while_joints_are_silent():
     list(measurements(sensors, streams, 0.06))
     assert streams.ahead == pytest.approx(0.06, abs=JOINTS + IMU)
     list(measurements(sensors, streams, 1.0))
-    assert streams.ahead == AHEAD
+    assert streams.ahead == IMU_LEAD
 
 
 def test_a_known_offset_of_the_clocks_counts():
@@ -209,7 +209,7 @@ def test_stamps_of_the_future_are_refused_until_they_persist():
     assert not check.accepts(7.0, 1.0, 0.0, "driver") and check.complaint == "a stamp of driver is of the future"
     assert check.accepts(6.01, 1.01, 0.0, "")  # one that is wrong changes nothing
     clocks = [check.accepts(9.0 + k * 0.01, 1.02 + 0.01 * k, 0.0, "") for k in range(40)]
-    assert clocks.index(True) == pytest.approx(PERSISTENT / 0.01, abs=1) and all(clocks[21:])
+    assert clocks.index(True) == pytest.approx(STAMP_PERSISTENT / 0.01, abs=1) and all(clocks[21:])
 
 
 def test_a_transport_that_stood_still_is_no_clock_of_the_future():

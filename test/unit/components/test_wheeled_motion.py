@@ -13,7 +13,7 @@ from solfer.components.following.requests import GetReference
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
-from solfer.components.wheeled_motion.original.resteering import LARGEST, Resteering
+from solfer.components.wheeled_motion.original.resteering import RESTEERING_MAXIMUM, Resteering
 from solfer.components.wheeled_motion.targets import LEAD, WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
@@ -113,7 +113,7 @@ def test_a_wheel_at_its_end_turns_back():
         if not joint.sides[0]:
             break
         state, steps = command, steps + 1
-    assert steps == np.ceil(LARGEST / np.radians(5.0)) and joint.sides[0] == 0.0
+    assert steps == np.ceil(RESTEERING_MAXIMUM / np.radians(5.0)) and joint.sides[0] == 0.0
     assert_allclose(state, -1.997 + steps * np.radians(5.0))
 
 

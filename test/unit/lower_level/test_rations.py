@@ -14,7 +14,7 @@ from solfer.lower_level.claims.claims import BARRED
 from solfer.lower_level.records import RationRecord
 from solfer.lower_level.server.ration import largest_command, largest_request
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.throttle import KEYS, OTHERS, Throttle
+from solfer.throttle import KEYS, OTHER_KEYS, Throttle
 from solfer.transport.backlog import SENDERS, Backlog
 from solfer.transport.inbox import Inbox
 from solfer.transport.messages import JointMessage
@@ -135,4 +135,4 @@ def test_a_throttle_has_a_limited_number_of_keys(caplog):
     for number in range(3 * KEYS):
         throttle.warning(f"key {number}", "message %d", number)
     assert len(caplog.records) == KEYS + 1 and len(throttle._last) == KEYS + 1
-    assert throttle._held == {OTHERS: 2 * KEYS - 1}
+    assert throttle._held == {OTHER_KEYS: 2 * KEYS - 1}

@@ -6,7 +6,7 @@ from support.unit.cart import claim, make
 from solfer.lower_level import LowerLevelServer
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport.inbox import Inbox
-from solfer.transport.lower_level import ALL_OWNERS, REFUSED
+from solfer.transport.lower_level import ALL_OWNERS, REFUSALS_TOPIC
 from solfer.transport.messages import REFUSALS, JointMessage
 
 
@@ -16,7 +16,7 @@ class Stage:
     def __init__(self):
         self.bus, self.lower_level = Bus(), make()
         self.server = LowerLevelServer(self.lower_level, MemoryMiddleware(self.bus, "robot"), Inbox())
-        self._ear = MemoryMiddleware(self.bus, "ear").queue(REFUSED, REFUSALS)
+        self._ear = MemoryMiddleware(self.bus, "ear").queue(REFUSALS_TOPIC, REFUSALS)
         self._driver = MemoryMiddleware(self.bus, "/driver").writer("wheel/command", "solfer/JointCommand")
 
     def drive(self, name="roll"):

@@ -10,13 +10,13 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import JointCommandPipe, PipeContext, factory
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointReceiver
-from solfer.plugins.joint_claim import AGAIN, IGNORED, SETTLE, JointClaim
+from solfer.plugins.joint_claim import CLAIM_REPEAT_PERIOD, CLAIM_SETTLING_TIME, REFUSAL_GRACE, JointClaim
 from solfer.transport import Inbox
 from solfer.transport.lower_level import (
     ALL_OWNERS,
-    CLAIM,
+    CLAIM_INTERFACE,
     LOWER_LEVEL,
-    REFUSED,
+    REFUSALS_TOPIC,
     RELEASE,
     TOPIC,
     Answer,
@@ -33,7 +33,7 @@ class LowerLevel:
     def __init__(self, bus, answer):
         self.answer, self.asked, self.requests, self.inbox = answer, [], [], Inbox()
         services = [
-            Service("claim", CLAIM, ClaimRequest, ClaimAnswer, self._claim),
+            Service("claim", CLAIM_INTERFACE, ClaimRequest, ClaimAnswer, self._claim),
             Service("release", RELEASE, ReleaseRequest, Answer, self._release),
         ]
         MemoryMiddleware(bus, "simulator").serve(LOWER_LEVEL, services, self.inbox.submit)
@@ -68,11 +68,11 @@ def test_it_asks_again_after_a_pause():
     for _ in range(3):
         assert not claim.granted() and claim.reason == "the robot has fallen"
         lower_level.inbox.apply()
-    bus.run_until(AGAIN - 0.01)
+    bus.run_until(CLAIM_REPEAT_PERIOD - 0.01)
     claim.granted()
     lower_level.inbox.apply()
     assert lower_level.asked == [REQUEST]
-    bus.run_until(AGAIN)
+    bus.run_until(CLAIM_REPEAT_PERIOD)
     lower_level.answer = ClaimAnswer()
     assert not claim.granted()
     lower_level.inbox.apply()
@@ -113,7 +113,7 @@ def test_a_claim_has_what_is_measured_in_the_numbers_of_the_hardware():
 def test_a_robot_in_another_state_is_known_while_waiting():
     """Also before a claim, and to a plugin that commands nothing; refusals of others do not matter."""
     claim, _, bus = meet(ClaimAnswer())
-    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSALS_TOPIC, REFUSALS)
     refusals.write(RefusalMessage(("cart", "other"), (True, True), ("early", "else")))
     assert not claim.restarts()
     refusals.write(RefusalMessage(("other", ALL_OWNERS), (True, True), ("else", "another state")))
@@ -127,8 +127,8 @@ def test_a_component_claims_and_releases_in_its_name():
     claim.granted()
     lower_level.inbox.apply()
     assert claim.granted()
-    bus.run_until(2.0 * IGNORED)
-    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    bus.run_until(2.0 * REFUSAL_GRACE)
+    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSALS_TOPIC, REFUSALS)
     for owner, lost in (("/limbs", False), ("/limbs#other", False), ("/limbs#cart", True)):
         refusals.write(RefusalMessage((owner,), (True,), ("not yours",)))
         assert claim.lost() is lost
@@ -152,8 +152,10 @@ def test_what_happens_to_joints_is_noted():
     claim.granted()
     lower_level.inbox.apply()
     assert claim.granted()
-    bus.run_until(bus.time + 2.0 * IGNORED)
-    MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS).write(RefusalMessage(("cart",), (True,), ("fallen",)))
+    bus.run_until(bus.time + 2.0 * REFUSAL_GRACE)
+    MemoryMiddleware(bus, "simulator").writer(REFUSALS_TOPIC, REFUSALS).write(
+        RefusalMessage(("cart",), (True,), ("fallen",))
+    )
     assert claim.lost() and claim.lost()
     claim.release()
     joints = "arm: 2 joints"
@@ -166,15 +168,15 @@ def granted(**claimed):
     claim.granted()
     lower_level.inbox.apply()
     claim.granted()
-    return claim, lower_level, bus, MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    return claim, lower_level, bus, MemoryMiddleware(bus, "simulator").writer(REFUSALS_TOPIC, REFUSALS)
 
 
 def test_refusals_of_earlier_commands_are_ignored():
     claim, _, bus, refusals = granted()
-    bus.run_until(0.9 * IGNORED)
+    bus.run_until(0.9 * REFUSAL_GRACE)
     refusals.write(RefusalMessage(("cart",), (True,), ("early",)))
     assert not claim.lost() and claim.refused == 0
-    bus.run_until(IGNORED)
+    bus.run_until(REFUSAL_GRACE)
     refusals.write(RefusalMessage(("cart", "other"), (True, True), ("fallen", "else")))
     assert claim.lost() and (claim.reason, claim.refused, claim.restarted) == ("fallen", 1, False)
     refusals.write(RefusalMessage((ALL_OWNERS, "cart"), (True, True), ("another state", "void")))
@@ -185,7 +187,7 @@ def test_refusals_of_earlier_commands_are_ignored():
 
 def test_a_wrong_command_is_a_complaint(caplog):
     claim, _, bus, refusals = granted()
-    bus.run_until(2.0 * IGNORED)
+    bus.run_until(2.0 * REFUSAL_GRACE)
     refusals.write(RefusalMessage(("cart",), (False,), ("beyond its limit",)))
     assert not claim.lost() and claim.refused == 1
     complaint = "the lower level refuses a command: beyond its limit"
@@ -216,11 +218,11 @@ def test_a_follower_waits_for_its_publishers():
     claim.granted()
     lower_level.inbox.apply()
     assert not claim.granted()
-    bus.run_until(0.9 * SETTLE)
+    bus.run_until(0.9 * CLAIM_SETTLING_TIME)
     assert not claim.granted()
-    bus.run_until(SETTLE)
+    bus.run_until(CLAIM_SETTLING_TIME)
     assert claim.granted()
-    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSALS_TOPIC, REFUSALS)
     refusals.write(RefusalMessage(("topic goal", f"{TOPIC}goal"), (True, True), ("not ours", "not ours")))
     assert not claim.lost()
     refusals.write(RefusalMessage((f"{TOPIC}pose",), (True,), ("a follower begins anew",)))

@@ -7,7 +7,7 @@ from support.plugins.fleet import RATE, Fleet, still, tree
 from solfer.components import Component
 from solfer.errors import ComponentError
 from solfer.plugins.plugin_log import PluginLog
-from solfer.recording.model import COLUMNS
+from solfer.recording.model import COLUMNS_KIND
 
 
 class Logs(Component):
@@ -56,9 +56,9 @@ def test_points_are_logged_by_their_columns(tmp_path):
     assert goal.array is inputs["goal"].value and marks.array is inputs["marks"].value
     assert [(each.channel.kind, each.channel.columns, each.channel.units) for each in (goal, marks, push, feet)] == [
         ("geometry_msgs/PoseStamped", ("x", "y", "z", "qx", "qy", "qz", "qw"), ("m",) * 3 + ("",) * 4),
-        (COLUMNS, ("0 x", "0 y", "0 z", "1 x", "1 y", "1 z"), ("m",) * 6),
+        (COLUMNS_KIND, ("0 x", "0 y", "0 z", "1 x", "1 y", "1 z"), ("m",) * 6),
         ("geometry_msgs/Vector3Stamped", ("x", "y", "z"), ("N",) * 3),
-        (COLUMNS, ("left 0", "left 1", "left 2", "right 0", "right 1", "right 2"), ("",) * 6),
+        (COLUMNS_KIND, ("left 0", "left 1", "left 2", "right 0", "right 1", "right 2"), ("",) * 6),
     ]
 
 

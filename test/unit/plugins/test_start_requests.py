@@ -7,7 +7,7 @@ from solfer.components.declaration import Service
 from solfer.config import TextRecord
 from solfer.errors import PipeError
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins.outputs.start_requests import PATIENCE, StartRequests, requests_of
+from solfer.plugins.outputs.start_requests import REQUEST_PATIENCE, StartRequests, requests_of
 from solfer.transport import Inbox
 from solfer.transport.lower_level import LOAD_GAINS, SWITCH_FEED_FORWARD, Answer, FileRequest
 from solfer.transport.middleware import Flag
@@ -57,5 +57,5 @@ def test_refusals_are_logged_and_change_nothing(caplog):
     assert got == [Flag(True)] * 2
     lost = published(name="leg", type="impedance", sink="/command", ff_service="set_ff")
     StartRequests("cart", MemoryMiddleware(bus, "cart"), list(requests_of([lost], None))).send()
-    bus.run_until(2.0 * PATIENCE)
+    bus.run_until(2.0 * REQUEST_PATIENCE)
     assert caplog.messages[1].startswith("cart: leg/set_ff does not switch feed-forward torques on: ")

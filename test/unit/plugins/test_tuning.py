@@ -12,7 +12,7 @@ from support.recording.sine import recorded, tree
 from solfer.cli.main import main
 from solfer.components import Component, LiveParameter
 from solfer.errors import ComponentError, MiddlewareError, Overtaken
-from solfer.plugins.tuning import AT_ONCE, KEPT, RAMP, Tuning
+from solfer.plugins.tuning import MOVING_PARAMETERS, RAMP, WAITING_CHANGES, Tuning
 from solfer.recording.reader import read
 from solfer.transport.parameters import SetParameters
 
@@ -166,7 +166,7 @@ def test_parameters_are_described(fleet):
 def test_many_changes_take_turns_and_all_arrive(fleet):
     component, tuning = fleet.plugins[0].component, fleet.plugins[0].tuning
     assert put(fleet, gain=1.0, **{"parts.hand.weight": 3.0, "parts.foot.weight": 4.0}).success
-    assert len(tuning._moving) == 3 > AT_ONCE
+    assert len(tuning._moving) == 3 > MOVING_PARAMETERS
     for _ in range(120):
         fleet.cycle(**still())
     assert component.gain == pytest.approx(1.0) and component.weights["foot"].tolist() == [4.0, 4.0]
@@ -228,7 +228,7 @@ def test_a_flood_costs_a_cycle_next_to_nothing(fleet):
         return np.percentile(times, 30)
 
     assert min(lasted(0.1) - lasted(3.0) for _ in range(3)) < 20e-6
-    assert len(plugin.tuning._unsaid) <= KEPT and plugin.component.tags.gain > 0.15
+    assert len(plugin.tuning._unsaid) <= WAITING_CHANGES and plugin.component.tags.gain > 0.15
 
 
 def test_changes_are_recorded_and_repeated(tmp_path, capsys):

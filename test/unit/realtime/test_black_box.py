@@ -9,7 +9,7 @@ from support.plugins.several import Several
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.black_box import TRUTH, BlackBox
+from solfer.realtime.telemetry.black_box import TRUTH_MESSAGE, BlackBox
 from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter
@@ -36,8 +36,8 @@ def test_ros_time_is_a_column(tmp_path):
 def test_the_truth_of_a_simulated_base_is_recorded(tmp_path):
     """It is NaN until the first message, then the newest one."""
     bus = Bus()
-    simulator = MemoryMiddleware(bus, "simulator").writer("floating_base", TRUTH)
-    truth = MemoryMiddleware(bus, "node").reader("floating_base", TRUTH)
+    simulator = MemoryMiddleware(bus, "simulator").writer("floating_base", TRUTH_MESSAGE)
+    truth = MemoryMiddleware(bus, "node").reader("floating_base", TRUTH_MESSAGE)
     plugins = Several(names=("one",)).plugins
     numbers = np.arange(13.0)
     parts = numbers[:3], np.array((0.0, 0.0, 0.6, 0.8)), numbers[7:10], numbers[10:]
@@ -50,7 +50,7 @@ def test_the_truth_of_a_simulated_base_is_recorded(tmp_path):
             drain.into(writer).fill()
             writer.finish(drain.lost)
     channel = read(tmp_path / "run.mcap")["one/truth"]
-    assert (channel.kind, channel.frame, channel.columns[:3]) == (TRUTH, "world", ("x", "y", "z"))
+    assert (channel.kind, channel.frame, channel.columns[:3]) == (TRUTH_MESSAGE, "world", ("x", "y", "z"))
     assert np.isnan(channel.values[0]).all()
     np.testing.assert_array_equal(channel.values[1], np.concatenate(parts))
 

@@ -12,7 +12,7 @@ import pytest
 
 from solfer.errors import MiddlewareError, RecordingError
 from solfer.realtime.telemetry.drain import RecordDrain
-from solfer.realtime.telemetry.recorder import EVENT_WIDTH, EVENTS, Recorder
+from solfer.realtime.telemetry.recorder import EVENT_WIDTH, RECORDER_EVENTS, Recorder
 from solfer.recording.log import Logger
 from solfer.recording.model import Event
 from solfer.recording.reader import read
@@ -131,10 +131,10 @@ def test_only_some_plugins_are_drained(tmp_path, loop):
 def test_events_that_are_overwritten_do_no_harm(tmp_path, loop):
     recorder = Recorder(tmp_path, loop.sources, 1000.0)
     drain = RecordDrain(tmp_path)
-    for number in range(EVENTS + 10):
+    for number in range(RECORDER_EVENTS + 10):
         recorder.event(Event(1e-3 * number, "arm", "hold", str(number)))
     texts = [event.text for event in drain.events()]
-    assert texts[-1] == str(EVENTS + 9) and len(texts) >= EVENTS - 2
+    assert texts[-1] == str(RECORDER_EVENTS + 9) and len(texts) >= RECORDER_EVENTS - 2
 
 
 def test_a_missing_recording_is_an_error(tmp_path):

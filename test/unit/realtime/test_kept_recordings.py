@@ -9,7 +9,7 @@ import numpy as np
 
 from solfer.middleware.shared_memory.memory.lock import Lock
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.recorder import FILE, Recorder
+from solfer.realtime.telemetry.recorder import RECORDER_FILE, Recorder
 from solfer.realtime.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep, write_kept
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
@@ -65,7 +65,7 @@ def test_what_dead_nodes_of_other_masters_left_is_swept(tmp_path):
 
     def leave(name, age=2.0 * YOUNG, crash=None):
         """Make a namespace of some age [s] with the lock of a node and, after a crash, its recording."""
-        file = Namespace(name, tmp_path).place("recordings", "arm", FILE)
+        file = Namespace(name, tmp_path).place("recordings", "arm", RECORDER_FILE)
         lock = Lock(file)
         if crash is not None:
             file.write_bytes(b"seconds")

@@ -7,7 +7,7 @@ import pytest
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.emergency_stop import TEXT, EmergencyStopLatch
+from solfer.realtime.emergency_stop import ESTOP_TEXT_BYTES, EmergencyStopLatch
 from solfer.realtime.namespaces import cure, find, living, no_layer
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 
@@ -56,9 +56,9 @@ def test_the_first_reason_of_a_stop_stays(tmp_path):
     mine, other = EmergencyStopLatch(tmp_path), EmergencyStopLatch(tmp_path)
     assert not mine and mine.reason == "" and mine.answered == 0
     before = time.monotonic_ns()
-    other.trip("x" * (TEXT + 1))
+    other.trip("x" * (ESTOP_TEXT_BYTES + 1))
     mine.trip("later")
-    assert mine and mine.reason == f"{'x' * TEXT} (process {os.getpid()})"
+    assert mine and mine.reason == f"{'x' * ESTOP_TEXT_BYTES} (process {os.getpid()})"
     assert before <= mine.time <= time.monotonic_ns() and mine.answered == 0
     mine.answer("legs at rest")
     assert mine.time <= other.answered <= time.monotonic_ns()
@@ -73,8 +73,8 @@ def test_the_first_reason_of_a_stop_stays(tmp_path):
 
 def test_a_reason_is_cut_between_any_bytes(tmp_path):
     latch = EmergencyStopLatch(tmp_path)
-    latch.trip(f"x{'é' * TEXT}")  # the cut goes through a letter of two bytes
-    assert latch.reason == f"x{'é' * (TEXT // 2 - 1)}\ufffd (process {os.getpid()})"
+    latch.trip(f"x{'é' * ESTOP_TEXT_BYTES}")  # the cut goes through a letter of two bytes
+    assert latch.reason == f"x{'é' * (ESTOP_TEXT_BYTES // 2 - 1)}\ufffd (process {os.getpid()})"
     latch.clear()
     latch.trip("\udcff")  # no letter at all, as of a file's name
     assert latch.reason == f"? (process {os.getpid()})"

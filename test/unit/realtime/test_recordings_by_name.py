@@ -30,7 +30,7 @@ def record(tmp_path):
 
         def record(namespace, *plugins, beside=None):
             space = Namespace(namespace, tmp_path)
-            folder = space.folder if beside is None else space.place(recordings.BESIDE, beside, "f").parent
+            folder = space.folder if beside is None else space.place(recordings.SHARED_FOLDER, beside, "f").parent
             sources = []
             for plugin in plugins:
                 log = Logger(plugin)
@@ -155,7 +155,7 @@ def test_a_watchdog_looks_until_it_is_lost(tmp_path, monkeypatch):
     with pytest.raises(MiddlewareError, match="the folder is gone"):
         Watchdog(heartbeat, stop, presence=Lost(4)).run(lambda: True)
     assert stop.reason.startswith("the folder is gone (")
-    assert len(slept) == 4 and all(0.0 <= each <= watchdog.PERIOD for each in slept)
+    assert len(slept) == 4 and all(0.0 <= each <= watchdog.WATCHDOG_PERIOD for each in slept)
     looks = iter([True, True, False])
     Watchdog(heartbeat, stop).run(lambda: next(looks))
     assert len(slept) == 6

@@ -7,7 +7,7 @@ from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.telemetry.count_durations import count_durations
 from solfer.realtime.telemetry.health import layer_report, plugin_report
-from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
 from solfer.realtime.telemetry.summaries import StatisticsReader
 from solfer.transport.health import Health
 
@@ -33,7 +33,9 @@ def cycle(statistics, count=1, **times):
         statistics.counts[LoopCount.CYCLES] += 1
         taken = np.zeros(len(statistics.histograms.rows), dtype=np.int64)
         for name, time in times.items():
-            taken[LOOP.index(name) if name in LOOP else statistics.row(0, STAGES.index(name))] = 1000 * time
+            taken[LOOP_HISTOGRAMS.index(name) if name in LOOP_HISTOGRAMS else statistics.row(0, STAGES.index(name))] = (
+                1000 * time
+            )
         count_durations(statistics.histograms.rows, taken, 0)
 
 
@@ -52,7 +54,7 @@ def test_only_the_longest_time_covers_the_run(statistics, observer):
     cycle(statistics, 50, cycle=200, component=100)
     second = observer.look()
     for figures, median, count in ((first, 900e-6, 100), (second, 200e-6, 150)):
-        whole = figures.loop[LOOP.index("cycle")]
+        whole = figures.loop[LOOP_HISTOGRAMS.index("cycle")]
         assert (whole.name, whole.count) == ("cycle", count)
         assert whole.median == pytest.approx(median, rel=1 / 16) and whole.p99 == pytest.approx(median, rel=1 / 16)
         assert whole.longest == pytest.approx(900e-6)

@@ -11,8 +11,8 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.clock import MonotonicClock, SteppedClock
 from solfer.plugins import PluginState
 from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.histograms import WIDTH, Histograms, bucket_of, upper_edge
-from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, PluginCount, RuntimeStatistics
+from solfer.realtime.telemetry.histograms import HISTOGRAM_WORDS, Histograms, bucket_of, upper_edge
+from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
 
 
 def count(histograms, row, *times):
@@ -31,7 +31,7 @@ def test_buckets_are_at_most_a_sixteenth_wide(nanoseconds):
 
 @pytest.mark.parametrize("nanoseconds", [-5, 10**12])
 def test_times_out_of_range_count_in_outer_buckets(nanoseconds):
-    histograms = Histograms(np.zeros(WIDTH, dtype=np.int64))
+    histograms = Histograms(np.zeros(HISTOGRAM_WORDS, dtype=np.int64))
     count(histograms, 0, nanoseconds)
     assert histograms.count(0) == 1
     assert histograms.longest(0) == max(nanoseconds, 0)
@@ -39,7 +39,7 @@ def test_times_out_of_range_count_in_outer_buckets(nanoseconds):
 
 def test_quantiles_are_those_of_numpy_within_a_bucket():
     times = np.random.default_rng(3).lognormal(11.0, 1.0, 20000).astype(int)
-    histograms = Histograms(np.zeros(2 * WIDTH, dtype=np.int64))
+    histograms = Histograms(np.zeros(2 * HISTOGRAM_WORDS, dtype=np.int64))
     count(histograms, 1, *times)
     assert histograms.count(0) == histograms.quantile(0, 0.5) == 0
     assert histograms.count(1) == 20000 and histograms.longest(1) == times.max()
@@ -50,7 +50,7 @@ def test_quantiles_are_those_of_numpy_within_a_bucket():
 
 
 def test_a_zero_counts_for_the_loop_only():
-    histograms = Histograms(np.zeros(3 * WIDTH, dtype=np.int64))
+    histograms = Histograms(np.zeros(3 * HISTOGRAM_WORDS, dtype=np.int64))
     count_durations(histograms.rows, np.array([0, 0, 70]), 1)
     assert [histograms.count(row) for row in range(3)] == [1, 0, 1]
 
@@ -72,7 +72,7 @@ def test_statistics_are_shared_with_other_processes(tmp_path):
     )
     assert [seen.life(1, word) for word in PluginCount] == [6, 3, 2, 1]
     assert seen.text() == "granted nothing" and seen.text(1) == "because" and seen.text(0) == ""
-    assert seen.histograms.longest(seen.row(1, 1)) == 12345 and seen.histograms.count(len(LOOP)) == 0
+    assert seen.histograms.longest(seen.row(1, 1)) == 12345 and seen.histograms.count(len(LOOP_HISTOGRAMS)) == 0
     assert seen.alive and seen.pid == statistics.pid
     statistics.close()
     assert not seen.alive
@@ -119,7 +119,7 @@ def test_the_monotonic_clock_never_wakes_early():
 
 
 def test_counts_since_a_snapshot():
-    histograms = Histograms(np.zeros(WIDTH, dtype=np.int64))
+    histograms = Histograms(np.zeros(HISTOGRAM_WORDS, dtype=np.int64))
     count(histograms, 0, 10**6)
     before = histograms.snapshot()
     count(histograms, 0, 1000, 1000, 1000)

@@ -10,7 +10,7 @@ import pytest
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import ProcessorShare
-from solfer.realtime.watchdog import PERIOD, Watchdog
+from solfer.realtime.watchdog import WATCHDOG_PERIOD, Watchdog
 
 
 class Beats:
@@ -50,7 +50,7 @@ def look(watchdog, heartbeat, count=10):
     """Look repeatedly; the newest beat grows older meanwhile."""
     for _ in range(count):
         watchdog.look()
-        heartbeat.old += PERIOD
+        heartbeat.old += WATCHDOG_PERIOD
 
 
 def test_without_a_process_nothing_happens(watchdog, heartbeat, stop):
@@ -92,7 +92,7 @@ def trips_within(watchdog, heartbeat, stop, most):
     begin = time.monotonic()
     while not stop and time.monotonic() < begin + most:
         watchdog.look()
-        time.sleep(PERIOD)
+        time.sleep(WATCHDOG_PERIOD)
         heartbeat.old = time.monotonic() - begin
     return heartbeat.old
 

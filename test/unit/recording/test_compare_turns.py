@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.recording.comparison import Difference, compare
-from solfer.recording.model import JOINTS, Channel, Recording
+from solfer.recording.model import JOINTS_KIND, Channel, Recording
 
 NAMES, RATE, DURATION = ("wheel", "knee", "hip"), 200.0, 12.0
 URDF = b"""<robot name="r"><joint name="wheel" type="continuous"/><joint name="knee" type="revolute"/>
@@ -19,7 +19,7 @@ def recording(change=lambda positions: positions, urdf=URDF):
     swing = [0.4 * np.sin(1.3 * times), 0.3 * np.sin(2.1 * times) + 0.1 * np.sin(0.7 * times)]
     positions = np.stack([2.0 * times + 0.5 * np.sin(1.7 * times), *swing], axis=1)
     name = "plugin/feedback/pipe/position"
-    channel = Channel(name, JOINTS, NAMES, ("rad",) * 3, "", times, change(positions))
+    channel = Channel(name, JOINTS_KIND, NAMES, ("rad",) * 3, "", times, change(positions))
     return Recording({name: channel}, (), {"robot.urdf": urdf})
 
 

@@ -12,7 +12,7 @@ from mcap.records import Channel as ChannelRecord
 
 from solfer.cli.main import main
 from solfer.errors import RecordingError
-from solfer.recording.model import COLUMNS, Channel, Recording
+from solfer.recording.model import COLUMNS_KIND, Channel, Recording
 from solfer.recording.reader import read
 from solfer.recording.writer import save
 
@@ -21,7 +21,7 @@ from solfer.recording.writer import save
 def file(tmp_path):
     times = np.arange(10) / 100.0
     save(
-        Recording({"arm/a": Channel("arm/a", COLUMNS, ("x",), ("m",), "", times, np.ones((10, 1)))}),
+        Recording({"arm/a": Channel("arm/a", COLUMNS_KIND, ("x",), ("m",), "", times, np.ones((10, 1)))}),
         tmp_path / "a.mcap",
     )
     return tmp_path / "a.mcap"

@@ -5,19 +5,19 @@ import pytest
 
 from solfer.errors import RecordingError, SizeMismatch, UnknownName
 from solfer.recording.log import Logger
-from solfer.recording.model import COLUMNS, JOINTS, Channel
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel
 
 
 def test_arrays_are_declared_with_names_and_units():
     log = Logger("arm")
     log.section("log").add("error", np.zeros(2), ("x", "y"), ("m", "m/s"), "world")
-    log.add("position", np.zeros(2), ("a", "b"), "rad", kind=JOINTS)
+    log.add("position", np.zeros(2), ("a", "b"), "rad", kind=JOINTS_KIND)
     log.add("counts", np.zeros((2, 2), dtype=np.int64), factor=1e-9)
     channels = [source.channel for source in log.sources]
     assert [(each.name, each.kind, each.columns, each.units, each.frame) for each in channels] == [
-        ("arm/log/error", COLUMNS, ("x", "y"), ("m", "m/s"), "world"),
-        ("arm/position", JOINTS, ("a", "b"), ("rad", "rad"), ""),
-        ("arm/counts", COLUMNS, ("0", "1", "2", "3"), ("",) * 4, ""),
+        ("arm/log/error", COLUMNS_KIND, ("x", "y"), ("m", "m/s"), "world"),
+        ("arm/position", JOINTS_KIND, ("a", "b"), ("rad", "rad"), ""),
+        ("arm/counts", COLUMNS_KIND, ("0", "1", "2", "3"), ("",) * 4, ""),
     ]
 
 
@@ -46,6 +46,6 @@ def test_name_can_be_declared_once():
 
 def test_shapes_of_a_channel_have_to_fit():
     with pytest.raises(SizeMismatch, match="values of the shape"):
-        Channel("arm/x", COLUMNS, ("x",), ("",), "", np.zeros(2), np.zeros((2, 2)))
+        Channel("arm/x", COLUMNS_KIND, ("x",), ("",), "", np.zeros(2), np.zeros((2, 2)))
     with pytest.raises(UnknownName, match="unknown column 'y'"):
-        Channel("arm/x", COLUMNS, ("x",), ("",)).column("y")
+        Channel("arm/x", COLUMNS_KIND, ("x",), ("",)).column("y")

@@ -15,8 +15,8 @@ from solfer.cli.recordings.limits import limits_of
 from solfer.cli.recordings.progress import progress
 from solfer.model import Description
 from solfer.recording.kinds import NAMED
-from solfer.recording.model import COLUMNS, JOINTS, REQUEST, Channel, Event, Recording
-from solfer.recording.pictures.canvas import MOST, outline
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, REQUEST, Channel, Event, Recording
+from solfer.recording.pictures.canvas import LINE_POINTS, outline
 from solfer.recording.pictures.plugin_page import plugin_page
 from solfer.recording.pictures.tracks import tracks_of
 from solfer.recording.reader import read
@@ -27,7 +27,7 @@ RATE, START = 100.0, 50.0
 JOINTS_OF_ARM = ("j_arm1_1", "j_arm1_2", "j_wheel_1")
 
 
-def channel(name, columns, kind=JOINTS, unit="rad", times=None, seed=0):
+def channel(name, columns, kind=JOINTS_KIND, unit="rad", times=None, seed=0):
     times = START + np.arange(200) / RATE if times is None else times
     values = np.cumsum(np.random.default_rng(seed).standard_normal((len(times), len(columns))), axis=0) / RATE
     return Channel(name, kind, tuple(columns), (unit,) * len(columns), "", times, values)
@@ -42,10 +42,10 @@ def recording():
         channel("arm/measured/velocity", JOINTS_OF_ARM, unit="rad/s", seed=1),
         channel("arm/command/direct/position", JOINTS_OF_ARM[:2], times=late, seed=2),
         channel("arm/command/wheels/velocity", JOINTS_OF_ARM[2:], unit="rad/s", seed=3),
-        channel("arm/feedback/direct/age", ("age",), COLUMNS, "s", seed=4),
-        channel("arm/timing", ("read", "component"), COLUMNS, "s", seed=5),
+        channel("arm/feedback/direct/age", ("age",), COLUMNS_KIND, "s", seed=4),
+        channel("arm/timing", ("read", "component"), COLUMNS_KIND, "s", seed=5),
         channel("arm/log/com", ("x", "y", "z"), "geometry_msgs/PointStamped", "m", seed=6),
-        channel("leg/log/slip", ("slip",), COLUMNS, "m", seed=7),
+        channel("leg/log/slip", ("slip",), COLUMNS_KIND, "m", seed=7),
     ]
     events = [Event(START, "arm", "start"), Event(START + 1.5, "arm", "stop", "asked to")]
     files = {"arm/robot.urdf": URDF.read_bytes()}
@@ -154,12 +154,12 @@ def test_a_bag_has_the_same_numbers(file, recording, capsys):
     assert labels == "read,component"
 
 
-@pytest.mark.parametrize("kind", [COLUMNS, JOINTS])
+@pytest.mark.parametrize("kind", [COLUMNS_KIND, JOINTS_KIND])
 @pytest.mark.parametrize("first", [0.0, 1e-10])
 def test_no_message_of_a_bag_is_at_time_0(kind, first, tmp_path, monkeypatch, capsys):
     """Time 0 stands for no time in ROS 1, whose `rosbag play` leaves such messages out."""
     monkeypatch.chdir(tmp_path)
-    name = "arm/measured/position" if kind == JOINTS else "arm/log/x"
+    name = "arm/measured/position" if kind == JOINTS_KIND else "arm/log/x"
     times = first + 0.005 * np.arange(4)
     save(Recording({name: Channel(name, kind, ("x",), ("rad",), "", times, times[:, None], "")}), tmp_path / "run.mcap")
     assert main(["log", "export", "run.mcap", "--bag", "out.bag"]) == 0
@@ -228,7 +228,7 @@ def test_long_lines_keep_their_peaks():
     values = np.zeros(100_000)
     values[[777, 54_321]] = 1.0, -1.0
     kept = outline(values)
-    assert len(kept) <= MOST + 2 and {777, 54_321, 0, 99_999} <= set(kept)
+    assert len(kept) <= LINE_POINTS + 2 and {777, 54_321, 0, 99_999} <= set(kept)
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ from pybag.mcap_reader import McapFileReader
 from rosbags.highlevel import AnyReader
 
 from solfer.errors import RecordingError, UnknownName
-from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
-from solfer.recording.model import COLUMNS, JOINTS, Channel, Event, Recording
+from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Event, Recording
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter, save
 
@@ -26,7 +26,7 @@ def channel(name, kind, columns, times, frame="", child=""):
     """Make numbers of all kinds, among them those that do not survive a detour over text or float32."""
     values = np.random.default_rng(len(name)).standard_normal((len(times), len(columns)))
     values.flat[: len(STRANGE)] = STRANGE[: values.size]
-    units = tuple(UNITS.get(column, "") for column in columns)
+    units = tuple(CHANNEL_UNITS.get(column, "") for column in columns)
     return Channel(name, kind, tuple(columns), units, frame, times, values, child)
 
 
@@ -34,14 +34,14 @@ def channel(name, kind, columns, times, frame="", child=""):
 def recording():
     """Channels of every kind at two rates."""
     fast, slow = 100.0 + 1e-3 * np.arange(700), 100.5 + 0.25 * np.arange(3)
-    joints = [channel(f"arm/feedback/link/{part}", JOINTS, JOINT_NAMES, fast) for part in ("velocity", "position")]
+    joints = [channel(f"arm/feedback/link/{part}", JOINTS_KIND, JOINT_NAMES, fast) for part in ("velocity", "position")]
     shaped = [channel(f"arm/{kind}", kind, columns, slow, "world") for kind, columns in NAMED.items()]
     odometry = channel("arm/base", ODOMETRY, NAMED[ODOMETRY], fast, "world", "pelvis")
     others = [
-        channel("arm/log/error", COLUMNS, ("one", "two"), fast, "tool"),
-        channel("arm/log/nothing", COLUMNS, (), fast),
-        channel("arm/log/never", COLUMNS, ("one",), np.zeros(0)),
-        channel("arm/command/direct/effort", JOINTS, JOINT_NAMES[:2], slow),
+        channel("arm/log/error", COLUMNS_KIND, ("one", "two"), fast, "tool"),
+        channel("arm/log/nothing", COLUMNS_KIND, (), fast),
+        channel("arm/log/never", COLUMNS_KIND, ("one",), np.zeros(0)),
+        channel("arm/command/direct/effort", JOINTS_KIND, JOINT_NAMES[:2], slow),
     ]
     events = [
         Event(100.0, "arm", "start", ""),
@@ -80,9 +80,9 @@ def test_everything_is_read_back(recording, path):
 
 def numbers_of(kind, message):
     """Return the numbers of a message that another reader decoded, by the last part of our channel."""
-    if kind == JOINTS:
+    if kind == JOINTS_KIND:
         return {part: getattr(message, part) for part in ("position", "velocity", "effort")}
-    if kind == COLUMNS:
+    if kind == COLUMNS_KIND:
         return {"": message.values}
     if kind == ODOMETRY:
         return {"": [*_leaves(message.pose.pose), *_leaves(message.twist.twist)]}
@@ -148,8 +148,10 @@ def test_pybag_reads_it(recording, tmp_path):
     """A reader that shares no code with ours: messages, attachments, metadata and events agree."""
     # joints with all fields: pybag cannot read an empty list behind which nothing follows
     times = 100.0 + 1e-3 * np.arange(700)
-    whole = [channel(f"arm/measured/{part}", JOINTS, JOINT_NAMES, times) for part in JOINT_PARTS]
-    kept = [each for each in recording.channels.values() if each.kind != JOINTS and each.columns and len(each.times)]
+    whole = [channel(f"arm/measured/{part}", JOINTS_KIND, JOINT_NAMES, times) for part in JOINT_PARTS]
+    kept = [
+        each for each in recording.channels.values() if each.kind != JOINTS_KIND and each.columns and len(each.times)
+    ]
     recording = replace(recording, channels={each.name: each for each in (*whole, *kept)})
     path = tmp_path / "whole.mcap"
     save(recording, path)
@@ -184,7 +186,7 @@ def test_rosbags_reads_it(recording, path):
 def written(path, rows, block_rows=10):
     """Write a file that is not finished; return where each of its chunks ends."""
     writer, ends = RecordingWriter(path, {"robot.urdf": b"<robot/>"}), []
-    block = writer.block([Channel("arm/log/x", COLUMNS, ("x",), ("m",))])
+    block = writer.block([Channel("arm/log/x", COLUMNS_KIND, ("x",), ("m",))])
     for first in range(1, rows, block_rows):
         numbers = np.arange(first, first + block_rows)
         writer.write(block, numbers, 1_000_000 * numbers, numbers[:, None] * 1.0)
@@ -220,7 +222,7 @@ def test_damaged_chunk_is_left_out(tmp_path):
 
 def test_rows_that_lack_are_counted(tmp_path):
     writer = RecordingWriter(tmp_path / "gaps.mcap")
-    block = writer.block([Channel("arm/log/x", COLUMNS, ("x",), ("m",))])
+    block = writer.block([Channel("arm/log/x", COLUMNS_KIND, ("x",), ("m",))])
     numbers = np.array([2**32 - 1, 2**32 + 3, 2**32 + 4])
     writer.write(block, numbers, numbers, np.zeros((3, 1)))
     writer.close()
@@ -231,7 +233,7 @@ def test_rows_that_lack_are_counted(tmp_path):
     ("name", "kind", "columns", "error", "text"),
     [
         ("arm/x", "sensor_msgs/Joint", ("x",), UnknownName, "sensor_msgs/JointState"),
-        ("arm/positions", JOINTS, ("x",), RecordingError, "expected: <name>/{position,velocity,effort}"),
+        ("arm/positions", JOINTS_KIND, ("x",), RecordingError, "expected: <name>/{position,velocity,effort}"),
         ("arm/x", WRENCH, ("x",), RecordingError, "expected: fx fy fz tx ty tz"),
     ],
 )

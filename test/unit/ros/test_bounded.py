@@ -11,13 +11,13 @@ from std_msgs.msg import String
 
 from solfer.middleware.ros.codecs import bounded
 from solfer.middleware.ros.codecs.bounded import Rate, bound_messages, bound_requests
-from solfer.middleware.ros.codecs.packed_message import LENGTH
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 
 
 def packed(text):
     """Pack a std_msgs/String as on the wire."""
-    body = LENGTH.pack(len(text)) + text.encode()
-    return LENGTH.pack(len(body)) + body
+    body = MESSAGE_LENGTH.pack(len(text)) + text.encode()
+    return MESSAGE_LENGTH.pack(len(body)) + body
 
 
 class Reading:
@@ -66,7 +66,7 @@ def test_a_large_request_is_answered_instead():
 
 def test_a_message_of_no_end_closes_its_connection():
     reading = Reading(lambda protocol: bound_messages(protocol, 100, lambda size: None))
-    reading.send(LENGTH.pack(2**32 - 1) + 1000 * b"x")
+    reading.send(MESSAGE_LENGTH.pack(2**32 - 1) + 1000 * b"x")
     recv_buff(reading.sock, reading.buffer, 4096)
     with pytest.raises(TransportTerminated, match="4294967295 bytes"):
         reading.protocol.read_messages(reading.buffer, [], reading.sock)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solfer.middleware.ros.scene.markers import LENGTH, markers_of
+from solfer.middleware.ros.scene.markers import FORCE_SCALE, markers_of
 from solfer.scene import ContactForce, ScenePose, SceneState, ShownReference
 
 FRICTION = 0.5
@@ -60,7 +60,7 @@ def test_a_cone_holds_the_tip_of_what_friction_holds(sideways, holds):
     markers = list(markers_of(scene(forces=(ContactForce("leg", np.ones(3), force, True),))))
     (arrow,), (cone,) = named(markers, "forces"), named(markers, "cones")
     begin, tip = map(xyz, arrow.points)
-    assert_allclose(tip - begin, LENGTH * force)
+    assert_allclose(tip - begin, FORCE_SCALE * force)
     corners = np.array([xyz(point) for point in cone.points]).reshape(-1, 3, 3)
     assert_allclose(corners[:, 0] - begin, 0.0, atol=1e-12)
     rim = corners[:, 1:].reshape(-1, 3)

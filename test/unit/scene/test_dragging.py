@@ -10,7 +10,7 @@ from solfer.config import read
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.robot import Robot
 from solfer.scene import DraggedReferences, LiveScene, ScenePose
-from solfer.scene.dragging import SILENCE
+from solfer.scene.dragging import OPERATOR_SILENCE
 from solfer.transport import Inbox, JointMessage
 from solfer.transport.declared import bind
 
@@ -92,8 +92,8 @@ def test_one_client_drags_until_it_is_silent(hands):
     assert not hands.dragged.drag(shown, "second", moved(shown, 0.0, 0.0, 0.02))
     hands.dragged.release(shown, "second")
     for _ in range(4):
-        hands.run(SILENCE / 2)
+        hands.run(OPERATOR_SILENCE / 2)
         assert hands.dragged.drag(shown, "first")
-    hands.run(SILENCE + 0.1)
+    hands.run(OPERATOR_SILENCE + 0.1)
     assert not hands.dragged.is_dragged(shown)
     assert hands.dragged.drag(shown, "second", moved(shown, 0.0, 0.0, 0.02))

@@ -8,7 +8,7 @@ import pytest
 from solfer.components.declaration import Service
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.discovery import published_topics, services
-from solfer.middleware.shared_memory.health_reports import SIZE, Reports
+from solfer.middleware.shared_memory.health_reports import REPORT_SIZE, Reports
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
@@ -62,11 +62,11 @@ def test_reports_are_those_of_the_living(space):
 
 @pytest.mark.parametrize(
     ("summary", "values", "kept"),
-    [("hot", {"first": 1.0, "long": "x" * SIZE}, {"first": 1.0}), ("é" * SIZE, {"first": 1.0}, {})],
+    [("hot", {"first": 1.0, "long": "x" * REPORT_SIZE}, {"first": 1.0}), ("é" * REPORT_SIZE, {"first": 1.0}, {})],
 )
 def test_a_long_report_is_cut_at_its_end(space, summary, values, kept):
     mine, others = Reports(space), Reports(space)
     mine.write("arm", HealthReport(Health.ERROR, summary, values), 1.0)
     report = others.read()["arm"]
-    assert report == HealthReport(Health.ERROR, summary if kept else summary[: SIZE // 8], kept)
+    assert report == HealthReport(Health.ERROR, summary if kept else summary[: REPORT_SIZE // 8], kept)
     mine.close()

@@ -9,7 +9,7 @@ from support.processes import BOUND, process
 from support.unit.writers import KIND, WIDTH, die_in_mid_write, flood
 
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import STATE, Slot
+from solfer.middleware.shared_memory.memory.slot import SLOT_STATE, Slot
 from solfer.transport import MessageStatus
 
 NEWS = 20_000
@@ -49,7 +49,7 @@ def test_an_unfinished_record_is_not_read(pair):
     assert reader.read() is MessageStatus.NEW
     writer.values[:] = 2.0
     writer.write(2)
-    writer.words[writer._places[0] + STATE] = 5  # the slot of record 2 is being written again
+    writer.words[writer._places[0] + SLOT_STATE] = 5  # the slot of record 2 is being written again
     assert reader.read() is MessageStatus.OLD
     assert reader.values.tolist() == [1.0, 1.0, 1.0]
     assert (reader.sequence, reader.stamp, reader.given_up) == (1, 1, 1)

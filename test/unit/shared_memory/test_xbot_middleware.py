@@ -12,7 +12,7 @@ from support.unit.shared_world import SharedWorld, ask, scale
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory import files
-from solfer.middleware.shared_memory.topics.sender_segment import DEPTH
+from solfer.middleware.shared_memory.topics.sender_segment import SENDER_DEPTH
 from solfer.transport import BodyMessage, JointMessage, MessageStatus
 from solfer.transport.messages import (
     JOINT_FIELDS,
@@ -364,7 +364,7 @@ def test_a_reader_of_every_message_keeps_as_many_as_a_sender_does(world):
     read = []
     while reader.read_next() is not None:
         read.append(float(reader.message.position[0]))
-    assert read == list(map(float, range(101 - len(read), 101))) and len(read) in (DEPTH - 1, DEPTH)
+    assert read == list(map(float, range(101 - len(read), 101))) and len(read) in (SENDER_DEPTH - 1, SENDER_DEPTH)
     assert reader.dropped == 101 - len(read) and reader.read_next() is None
 
 

@@ -11,7 +11,7 @@ from support.unit.upper_body import upper_body  # noqa: E402
 from solfer import Robot  # noqa: E402
 from solfer.errors import RecordingError  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
-from solfer.recording.model import JOINTS, Channel, Recording  # noqa: E402
+from solfer.recording.model import JOINTS_KIND, Channel, Recording  # noqa: E402
 from solfer.scene import LiveScene  # noqa: E402
 from solfer.view import Playback  # noqa: E402
 from solfer.view.playback import robot_of_recording  # noqa: E402
@@ -30,7 +30,7 @@ def recording(robot):
     values = np.sin(TIMES - 100.0)[:, None] * np.linspace(0.1, 0.5, len(names))
     units = ("rad",) * len(names)
     channels = [
-        Channel(f"hands/{what}/position", JOINTS, names, units, times=TIMES, values=values + more)
+        Channel(f"hands/{what}/position", JOINTS_KIND, names, units, times=TIMES, values=values + more)
         for what, more in (("measured", 0.0), ("command/position_controller", 0.1))
     ]
     texts = {"hands/robot.urdf": robot.description.text.encode()}

@@ -23,10 +23,10 @@ from solfer.robot.shipped import RobotFiles
 UNUSUAL = 5
 """First cycles with a trace, in which Python itself makes what it keeps."""
 
-CYCLES = 200
+MEASURED_CYCLES = 200
 """Most cycles that are run after the start."""
 
-PATIENCE = 10.0
+MEASURED_PATIENCE = 10.0
 """Longest time until a plugin runs on the simulation [s]."""
 
 FEWEST = 40
@@ -132,7 +132,7 @@ def on_simulation(configuration: Configuration, given: RobotFiles | None) -> Cyc
     configuration = idle(configuration)
     with closing(StandingRobot(configuration, given, where)) as robot:
         with closing(generate(configuration, robot.middleware, generator_of(configuration))) as plugin:
-            return measured(plugin, CYCLES, lambda meter: _simulated(robot, plugin, meter, where=where))
+            return measured(plugin, MEASURED_CYCLES, lambda meter: _simulated(robot, plugin, meter, where=where))
 
 
 def _simulated(robot: StandingRobot, plugin: Plugin, meter: CycleMeter, where: str) -> None:
@@ -140,7 +140,7 @@ def _simulated(robot: StandingRobot, plugin: Plugin, meter: CycleMeter, where: s
     robot.every(1.0 / plugin.rate, meter.cycle)
     while not meter.done:
         robot.run(10.0 / plugin.rate)
-        if robot.time > PATIENCE and not plugin.running:
+        if robot.time > MEASURED_PATIENCE and not plugin.running:
             raise SimulationError(
                 f"the plugin does not start: {plugin.health()[1]}",
                 where=where,
@@ -165,4 +165,4 @@ def _enough(rows: RecordedRows) -> int:
     ran = int(rows.running.sum())
     if ran < FEWEST:
         raise RecordingError(f"'{rows.plugin}' runs in {ran} cycles", where=rows.where, expected=f"at least {FEWEST}")
-    return min(CYCLES, ran - 2)  # the cycle of a start is not like others
+    return min(MEASURED_CYCLES, ran - 2)  # the cycle of a start is not like others

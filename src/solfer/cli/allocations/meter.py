@@ -13,21 +13,21 @@ import numpy as np
 
 from solfer.cli.allocations.ownership import CodeOwner, Ownership
 
-LEAST = sys.getsizeof(np.empty(0))
+SMALLEST_PIECE = sys.getsizeof(np.empty(0))
 """Smallest piece of memory that counts [bytes]: an array, also one on the memory of another. Numbers are smaller."""
 
 OFTEN = 0.1
 """How often a line takes memory in each cycle, at least, to count; a status that is sent now and then does not."""
 
-KEPT = 8.0
+KEPT_BYTES = 8.0
 """Least memory that a line keeps in each cycle, to be named [bytes]."""
 
-DEPTH = 12
+ALLOCATION_DEPTH = 12
 """Calls that are remembered of memory that stays."""
 
 # events of CPython's tracing
 CALL = 0
-LINE = 2
+ALLOCATION_LINE = 2
 RETURN = 3
 _EVENT = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.py_object, ctypes.c_int, ctypes.c_void_p)
 _set_trace = ctypes.pythonapi.PyEval_SetTrace
@@ -35,7 +35,7 @@ _set_trace.argtypes = (_EVENT, ctypes.py_object)
 _set_trace.restype = None
 
 Key = tuple[CodeType, int]
-OUTSIDE, IGNORED = None, ()
+OUTSIDE_FRAME, IGNORED_FRAMES = None, ()
 """What the stack has for the caller of the work, and for stand-ins with all that they call."""
 
 
@@ -78,20 +78,20 @@ class LineMeter:
     def __init__(self, whose: Ownership):
         self.lines: dict[tuple[str, int], LineCost] = {}
         self._whose, self._before = whose, tracemalloc.Snapshot((), 0)
-        self._stack: list[Any] = [OUTSIDE]
+        self._stack: list[Any] = [OUTSIDE_FRAME]
         self._ended: FrameType | None = None
         self._base = 0
         self._own = 0
         self._counts = False
         self._callback = _EVENT(self._trace)
         self._probed = 0
-        self._own = LEAST - self._probe()
+        self._own = SMALLEST_PIECE - self._probe()
 
     def measure(self, work: Callable[[], object], counts: bool = True) -> None:
         """Do some work, and count what its lines take, if it `counts`."""
         tracemalloc.start()
         self._counts = counts
-        self._stack[:] = [OUTSIDE]
+        self._stack[:] = [OUTSIDE_FRAME]
         self._base = 0
         _set_trace(self._callback, None)
         try:
@@ -103,7 +103,7 @@ class LineMeter:
 
     def watch(self) -> None:
         """Watch from now on what is taken and given back; nothing else may be measured before `end`."""
-        tracemalloc.start(DEPTH)
+        tracemalloc.start(ALLOCATION_DEPTH)
 
     def begin(self) -> None:
         """Begin to count what stays; what is replaced in each cycle was taken under these eyes before."""
@@ -128,17 +128,17 @@ class LineMeter:
         size = peak - self._base + self._own
         if event == CALL:
             size -= sys.getsizeof(frame)  # made for the trace alone
-        if size >= LEAST and key and self._counts:
+        if size >= SMALLEST_PIECE and key and self._counts:
             self._charge(key, size)
-        if frame.f_code is _VIEW and event == LINE:
+        if frame.f_code is _VIEW and event == ALLOCATION_LINE:
             self._probed = max(self._probed, size)
         if event == RETURN:
             stack.pop()
-        elif event in (CALL, LINE):
+        elif event in (CALL, ALLOCATION_LINE):
             owner = self._whose.of(frame.f_code.co_filename)
             if event == CALL:
-                stack.append(IGNORED if key is IGNORED or owner is CodeOwner.STAND_IN else key)
-            if owner is CodeOwner.LINES and stack[-1] is not IGNORED:
+                stack.append(IGNORED_FRAMES if key is IGNORED_FRAMES or owner is CodeOwner.STAND_IN else key)
+            if owner is CodeOwner.LINES and stack[-1] is not IGNORED_FRAMES:
                 stack[-1] = frame.f_code, frame.f_lineno
         # what Python frees of a function that has ended would hide what its caller takes: it stays until the next event
         self._ended = frame if event == RETURN else None

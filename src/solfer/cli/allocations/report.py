@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from solfer.cli.allocations.cycles import CycleMeter, on_recording, on_simulation
-from solfer.cli.allocations.meter import KEPT, OFTEN, LineCost
+from solfer.cli.allocations.meter import KEPT_BYTES, OFTEN, LineCost
 from solfer.cli.allocations.ownership import SOLFER
 from solfer.cli.columns import aligned
 from solfer.cli.robots import given_robot
@@ -14,7 +14,7 @@ from solfer.config import CheckReport, Configuration
 from solfer.errors import ConfigError
 from solfer.plugins.generation.unbuilt import importable_beside
 
-HEAD = ("line", "function", "times", "bytes", "kept", "because of")
+ALLOCATION_HEAD = ("line", "function", "times", "bytes", "kept", "because of")
 
 
 def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
@@ -30,7 +30,7 @@ def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
         costs = [cost for cost in meter.lines if cost.times or _keeps(cost, meter)]
         what = f"{options.recording}" if options.recording else "the simulated robot"
         print(f"{configuration.name}: {meter.traced} cycles on {what}, after {meter.warm + meter.kept} others")
-        for line in aligned([HEAD, *_table(costs, meter)], "  ") if costs else ("no line allocates",):
+        for line in aligned([ALLOCATION_HEAD, *_table(costs, meter)], "  ") if costs else ("no line allocates",):
             print(line)
         found = found or any(
             cost.blamed and (cost.times >= OFTEN * meter.traced or _keeps(cost, meter)) for cost in costs
@@ -61,7 +61,7 @@ def _chosen(options: argparse.Namespace, report: CheckReport) -> Iterator[Config
 
 
 def _keeps(cost: LineCost, meter: CycleMeter) -> bool:
-    return cost.kept >= KEPT * meter.kept
+    return cost.kept >= KEPT_BYTES * meter.kept
 
 
 def _table(costs: Sequence[LineCost], meter: CycleMeter) -> Iterator[tuple[str, ...]]:

@@ -13,11 +13,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the script, or one line for each completion."""
-    from solfer.cli.completion import SCRIPT, candidates
+    from solfer.cli.completion import BASH_SCRIPT, candidates
     from solfer.cli.main import parser
 
     if options.words:
         print("".join(f"{word}\n" for word in candidates(parser(), options.words)), end="")
     else:
-        print(SCRIPT, end="")
+        print(BASH_SCRIPT, end="")
     return 0

@@ -22,10 +22,10 @@ SWITCHES = ("control", "gui", "lockstep", "rviz", "view")
 ROBOT = "centauro"
 """Default of the launch files."""
 
-RVIZ, VIEW = "rviz.launch", "view.launch"
+RVIZ, VIEW_LAUNCH = "rviz.launch", "view.launch"
 """The launch files that start RViz and the page in the browser, which others include."""
 
-FILES = {
+FILE_ARGUMENTS = {
     "config": "a configuration",
     "mock": "the file of a mock",
     "file": "the file of a real-time layer",
@@ -58,10 +58,10 @@ def run(options: argparse.Namespace) -> int:
             where=RVIZ,
             expected="RViz, in Debian the package `rviz` (apt-get install rviz), or rviz:=false",
         )
-    if options.file.name == VIEW and find_spec("viser") is None:
+    if options.file.name == VIEW_LAUNCH and find_spec("viser") is None:
         raise MissingDependency(
             "there is no module 'viser'",
-            where=VIEW,
+            where=VIEW_LAUNCH,
             expected="pip install -r requirements-view.txt, or view:=false",
         )
     given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file)))
@@ -158,8 +158,10 @@ def check(known: Mapping[str, str], given: Mapping[str, str], launch: str) -> li
             except argparse.ArgumentTypeError as error:
                 what, _, expected = str(error).partition(", expected ")
                 errors.append(SolferError(f"{name} is {what}", where=where, expected=expected))
-        elif name in FILES and not Path(value).is_file():
-            errors.append(SolferError(f"there is no file '{value}'", where=f"{launch}, {name}", expected=FILES[name]))
+        elif name in FILE_ARGUMENTS and not Path(value).is_file():
+            errors.append(
+                SolferError(f"there is no file '{value}'", where=f"{launch}, {name}", expected=FILE_ARGUMENTS[name])
+            )
         elif name == "namespace" and not known[name] and value and not NAMESPACE.fullmatch(value):
             expected = "a letter, then letters, digits and underscores"
             errors.append(SolferError(f"'{value}' is no namespace", where=f"{launch}, namespace", expected=expected))
@@ -206,9 +208,9 @@ def _of_the_robot(given: Mapping[str, str], launch: str) -> list[SolferError]:
 
 def _together(given: Mapping[str, str], launch: str) -> list[SolferError]:
     """Find arguments that exclude each other."""
-    from solfer.config.records.middlewares import DEFAULT, MIDDLEWARES
+    from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE, MIDDLEWARES
 
-    middleware = given.get("middleware", DEFAULT)
+    middleware = given.get("middleware", DEFAULT_MIDDLEWARE)
     kind = MIDDLEWARES.get(middleware)
     is_hardware = given.get("system") == "HW"
     is_layer = kind is not None and kind.layer == "RT"
@@ -217,7 +219,7 @@ def _together(given: Mapping[str, str], launch: str) -> list[SolferError]:
     errors = [
         SolferError(f"{name} with {other}", where=launch, expected=f"{name} with {needed} alone")
         for is_refused, other, needed in (
-            (is_layer, f"middleware:={middleware}", f"middleware:={DEFAULT}"),
+            (is_layer, f"middleware:={middleware}", f"middleware:={DEFAULT_MIDDLEWARE}"),
             (is_hardware, "system:=HW", "system:=SM"),
         )
         if is_refused

@@ -40,9 +40,9 @@ def run(options: argparse.Namespace) -> int:
         MiddlewareError: The plugin refuses, or does not answer.
         ConfigError: The file cannot be written.
     """
-    from solfer.cli.params.actions import ACTIONS
+    from solfer.cli.params.actions import PARAMETER_ACTIONS
     from solfer.cli.params.callers import caller
 
     with caller(options.namespace) as made:
-        ACTIONS[options.action](options, made)
+        PARAMETER_ACTIONS[options.action](options, made)
     return 0

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
 
         trip(namespace, options.reason)
     else:
-        from solfer.cli.rt.actions import ACTIONS
+        from solfer.cli.rt.actions import LAYER_ACTIONS
 
-        ACTIONS[options.action](options, namespace)
+        LAYER_ACTIONS[options.action](options, namespace)
     return 0

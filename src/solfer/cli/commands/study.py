@@ -8,7 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
-REPORT = "report"
+REPORT_WORD = "report"
 """Word in place of a file that asks for the page of a study."""
 
 
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """
     from solfer.cli.study import actions
 
-    if options.file == REPORT:
+    if options.file == REPORT_WORD:
         return actions.report(options.folder or options.out, options.map)
     if options.rerun is not None:
         return actions.rerun(options)

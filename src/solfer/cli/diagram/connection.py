@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, Declared, End, Kind, Network, PluginBox
+from solfer.cli.diagram.network import LOWER_LEVEL_END, SENSORS, Arrow, Declared, End, Kind, Network, PluginBox
 from solfer.cli.pipes import content, received, sinks, state_of, topic_of
 from solfer.config import AnyPipeRecord, Configuration, FeedbackRecord
 
@@ -83,7 +83,7 @@ def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
     for pipe in sender.controllers:
         topic = topic_of(pipe)
         if pipe.lower_level:
-            yield _arrow(tail, LOWER_LEVEL, pipe, idle=idle)
+            yield _arrow(tail, LOWER_LEVEL_END, pipe, idle=idle)
         elif topic not in known:
             yield _arrow(tail, End(Kind.TOPIC, topic or pipe.name), pipe)
 

@@ -14,9 +14,9 @@ GREEN = "#d3ecc8"
 PINK = "#f8d3d8"
 YELLOW = "#fff0b8"
 PURPLE = "#e4daf5"
-LINE = "#3b4a5a"
-GREY = "#68778a"
-FONT = "Helvetica,Arial,sans-serif"
+LINE_COLOR = "#3b4a5a"
+DIAGRAM_GREY = "#68778a"
+FONTS = "Helvetica,Arial,sans-serif"
 SYSTEMS = {"SM": "simulation", "HW": "hardware"}
 
 
@@ -24,9 +24,9 @@ def dot_text(network: Network) -> str:
     """Write a network in DOT, laid out from the sensors on the left to the lower level on the right."""
     lines = [
         "digraph solfer {",
-        f'  graph [rankdir=LR, bgcolor=white, fontname="{FONT}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
-        f'  node [shape=plain, fontname="{FONT}", fontsize=11, color="{LINE}"];',
-        f'  edge [fontname="{FONT}", fontsize=10, color="{LINE}", fontcolor="{LINE}", arrowsize=0.8];',
+        f'  graph [rankdir=LR, bgcolor=white, fontname="{FONTS}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
+        f'  node [shape=plain, fontname="{FONTS}", fontsize=11, color="{LINE_COLOR}"];',
+        f'  edge [fontname="{FONTS}", fontsize=10, color="{LINE_COLOR}", fontcolor="{LINE_COLOR}", arrowsize=0.8];',
         *_plugins(network),
         *_third_parties(network),
         *(f"  {_edge(arrow)}" for arrow in network.arrows),
@@ -50,7 +50,7 @@ def _plugins(network: Network) -> Iterator[str]:
 
 
 def _area(title: str, colour: str) -> str:
-    return f'  label="{title}"; style="rounded,filled"; fillcolor="{colour}"; color="{LINE}"; margin=12;'
+    return f'  label="{title}"; style="rounded,filled"; fillcolor="{colour}"; color="{LINE_COLOR}"; margin=12;'
 
 
 def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
@@ -87,7 +87,7 @@ def _edge(arrow: Arrow) -> str:
 
 def _table(rows: list[str], colour: str) -> str:
     style = f'STYLE="ROUNDED" BORDER="1" CELLBORDER="0" CELLSPACING="4" CELLPADDING="4" BGCOLOR="{colour}"'
-    return f'<TABLE {style} COLOR="{LINE}">{"".join(rows)}</TABLE>'
+    return f'<TABLE {style} COLOR="{LINE_COLOR}">{"".join(rows)}</TABLE>'
 
 
 def _row(text: str, colour: str = "") -> str:
@@ -96,7 +96,7 @@ def _row(text: str, colour: str = "") -> str:
 
 
 def _small(text: str) -> str:
-    return f'<FONT POINT-SIZE="9" COLOR="{GREY}">{escape(text)}</FONT>'
+    return f'<FONT POINT-SIZE="9" COLOR="{DIAGRAM_GREY}">{escape(text)}</FONT>'
 
 
 def _robot(plugin: PluginBox) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from solfer.errors import ConfigError, MissingDependency, SolferError
 
 FORMATS = ("svg", "png", "dot")
-PATIENCE = 60.0  # longest time for one picture [s]
+DRAWING_PATIENCE = 60.0  # longest time for one picture [s]
 DOTS_PER_INCH = 110
 
 
@@ -46,7 +46,11 @@ def _rendered(dot: str, form: str) -> bytes:
     resolution = [f"-Gdpi={DOTS_PER_INCH}"] if form == "png" else []
     try:
         done = subprocess.run(
-            [program, f"-T{form}", *resolution], input=dot.encode(), capture_output=True, timeout=PATIENCE, check=False
+            [program, f"-T{form}", *resolution],
+            input=dot.encode(),
+            capture_output=True,
+            timeout=DRAWING_PATIENCE,
+            check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise SolferError(

@@ -25,7 +25,7 @@ class End:
 
 
 SENSORS = End(Kind.SENSORS)
-LOWER_LEVEL = End(Kind.LOWER_LEVEL)
+LOWER_LEVEL_END = End(Kind.LOWER_LEVEL)
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def export(options: argparse.Namespace) -> None:
         print(options.bag)
 
 
-ACTIONS = {"info": info, "cut": cut, "export": export}
+RECORDING_ACTIONS = {"info": info, "cut": cut, "export": export}
 
 
 def _chosen(options: argparse.Namespace) -> Recording:

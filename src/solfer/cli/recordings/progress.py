@@ -7,8 +7,8 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 AFTER = 1.0
-EVERY = 0.1
-WIDTH = 40  # [s], [s], characters
+PROGRESS_PERIOD = 0.1
+PROGRESS_WIDTH = 40  # [s], [s], characters
 
 
 def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
@@ -25,11 +25,14 @@ def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
     for count, item in enumerate(items, 1):
         yield item
         if time.monotonic() >= following and sys.stderr.isatty():
-            following = time.monotonic() + EVERY
+            following = time.monotonic() + PROGRESS_PERIOD
             shown = True
-            full = WIDTH * count // max(1, total)
+            full = PROGRESS_WIDTH * count // max(1, total)
             print(
-                f"\r[{'#' * full}{'.' * (WIDTH - full)}] {count} of {total} {unit}", end="", file=sys.stderr, flush=True
+                f"\r[{'#' * full}{'.' * (PROGRESS_WIDTH - full)}] {count} of {total} {unit}",
+                end="",
+                file=sys.stderr,
+                flush=True,
             )
     if shown:
-        print(f"\r{' ' * (WIDTH + 40)}\r", end="", file=sys.stderr, flush=True)
+        print(f"\r{' ' * (PROGRESS_WIDTH + 40)}\r", end="", file=sys.stderr, flush=True)

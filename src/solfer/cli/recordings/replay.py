@@ -23,7 +23,7 @@ from solfer.replay.replay import Replay, make
 from solfer.replay.rows import LIFE, RecordedRows
 from solfer.robot.shipped import RobotFiles, robot_files
 
-MOST = 20
+TABLE_LINES = 20
 """Most lines of the table."""
 
 
@@ -104,11 +104,11 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
     head = ("number", "channel", "first cycle", "at [s]", "largest")
     lines = [
         (each.column, each.channel, str(each.cycle), f"{each.time:.3f}", f"{each.largest:.3g} {each.unit}".rstrip())
-        for each in found.different[:MOST]
+        for each in found.different[:TABLE_LINES]
     ]
     yield from aligned([head, *lines], "  ")
-    if len(found.different) > MOST:
-        yield f"  ... and {len(found.different) - MOST} more"
+    if len(found.different) > TABLE_LINES:
+        yield f"  ... and {len(found.different) - TABLE_LINES} more"
     doubts = list(replay.doubts())
     for text in doubts:
         yield f"cannot be repeated: {text}"
@@ -123,13 +123,13 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
         RecordingError: The picture cannot be written.
     """
     from solfer.recording.pictures.canvas import save
-    from solfer.recording.pictures.replay_page import ROWS, replay_page
+    from solfer.recording.pictures.replay_page import REPLAY_ROWS, replay_page
 
     recorded = recorded_commands(replay)
     rows = replay.rows
-    chosen = [(each.channel, each.column) for each in found.different[:ROWS]] or [
+    chosen = [(each.channel, each.column) for each in found.different[:REPLAY_ROWS]] or [
         (name, column) for name, channel in replay.commands.items() if name in recorded for column in channel.columns
-    ][:ROWS]
+    ][:REPLAY_ROWS]
     both = replay.running & rows.running
     tracks = []
     for name, column in chosen:

@@ -17,7 +17,7 @@ from solfer.realtime.telemetry.summaries import StatisticsReader
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH, TRIGGER, NoFields, SwitchRequest
 
-PATIENCE = 2.0  # [s]
+LAYER_PATIENCE = 2.0  # [s]
 
 
 def switch(options: argparse.Namespace, namespace: Namespace) -> None:
@@ -47,7 +47,14 @@ def clear_stop(options: argparse.Namespace, namespace: Namespace) -> None:
     _call(namespace, f"{EXECUTOR}/estop_clear", TRIGGER, request=NoFields())
 
 
-ACTIONS = {"top": top_of_layer, "record": record, "switch": switch, "state": state, "abort": abort, "estop": clear_stop}
+LAYER_ACTIONS = {
+    "top": top_of_layer,
+    "record": record,
+    "switch": switch,
+    "state": state,
+    "abort": abort,
+    "estop": clear_stop,
+}
 
 
 def _require(name: str, plugins: Sequence[str]) -> None:
@@ -62,6 +69,6 @@ def _call(namespace: Namespace, service: str, interface: str, request: Any) -> N
         MiddlewareError: The service does not answer, or it refuses.
     """
     with contextlib.closing(XbotMiddleware(namespace, f"solfer_rt_{os.getpid()}")) as middleware:
-        answer = middleware.call(service, interface, request, Answer, PATIENCE)
+        answer = middleware.call(service, interface, request, Answer, LAYER_PATIENCE)
     if not answer.success:
         raise MiddlewareError(answer.message)

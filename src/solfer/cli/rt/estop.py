@@ -7,10 +7,10 @@ from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.namespaces import layer_of, no_layer
 
-PATIENCE = 2.0
+LATCH_PATIENCE = 2.0
 """Longest time until the layer reads the latch, which it does in each cycle [s]."""
 
-EVERY = 0.005
+LATCH_PERIOD = 0.005
 """Period at which the latch is polled [s]."""
 
 
@@ -28,13 +28,13 @@ def trip(namespace: Namespace, reason: str) -> None:
     while stop.answered < begin:
         if layer is None or not layer.owned():
             raise _not_obeyed(namespace)
-        if time.monotonic_ns() > begin + 1e9 * PATIENCE:
+        if time.monotonic_ns() > begin + 1e9 * LATCH_PATIENCE:
             raise MiddlewareError(
-                f"no plugin obeys yet: process {layer.pid} has not read the emergency stop for {PATIENCE:g} s",
+                f"no plugin obeys yet: process {layer.pid} has not read the emergency stop for {LATCH_PATIENCE:g} s",
                 where=str(namespace.folder),
                 expected=f"an RT layer that cycles; end process {layer.pid}: the robot holds when it is gone",
             )
-        time.sleep(EVERY)
+        time.sleep(LATCH_PERIOD)
     if not stop.holds:
         raise MiddlewareError(
             stop.answer_text,

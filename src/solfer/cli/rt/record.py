@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from solfer.realtime.telemetry.drain import FileDrain, RecordDrain
     from solfer.recording.writer import RecordingWriter
 
-EVERY = 0.1
+RECORD_PERIOD = 0.1
 """Period at which new rows are polled [s]."""
 
-SECONDS = Number(0.01, 86400.0, "seconds")
-WAIT = Number(0.1, 86400.0, "seconds", zero=True)
+RECORD_SECONDS = Number(0.01, 86400.0, "seconds")
+WAIT_SECONDS = Number(0.1, 86400.0, "seconds", zero=True)
 TRIED = 2.0
 """Time after which the size of an hour is estimated [s]."""
 
@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-n", dest="plugins", action="append", default=[], metavar="PLUGIN", help="plugin to record; may be repeated"
     )
-    parser.add_argument("--wait", type=WAIT, default=0.0, metavar="N", help="wait up to N seconds for -n (default: 0)")
+    parser.add_argument(
+        "--wait", type=WAIT_SECONDS, default=0.0, metavar="N", help="wait up to N seconds for -n (default: 0)"
+    )
     add_file(parser)
 
 
@@ -44,7 +46,7 @@ def add_file(parser: argparse.ArgumentParser) -> None:
     """Declare the file, and how long it shall be."""
     parser.add_argument("file", metavar="FILE", type=Path, help="the file, MCAP")
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--seconds", type=SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
+    length.add_argument("--seconds", type=RECORD_SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
     length.add_argument("--whole", action="store_true", help="begin with what is in memory already, until Ctrl-C")
     length.add_argument("--last", action="store_true", help="write what is in memory, also after a crash")
     parser.add_argument("--npz", action="store_true", help="write arrays for NumPy's `load` instead of MCAP")
@@ -58,12 +60,12 @@ def run(options: argparse.Namespace) -> int:
         MiddlewareError: Nothing was recorded.
         RecordingError: The file cannot be written.
     """
-    from solfer.realtime.telemetry.black_box import LOOP
+    from solfer.realtime.telemetry.black_box import LOOP_PREFIX
     from solfer.realtime.telemetry.recordings import of_namespace
 
     drains = _waited(options) if options.plugins else of_namespace(options.namespace)
     for index, drain in enumerate(drains[1:], start=2):  # each process has a loop
-        drain.layout = drain.layout.renamed(LOOP, f"{LOOP}_{index}")
+        drain.layout = drain.layout.renamed(LOOP_PREFIX, f"{LOOP_PREFIX}_{index}")
     write(options, drains)
     return 0
 
@@ -85,7 +87,7 @@ def _waited(options: argparse.Namespace) -> "list[RecordDrain]":
             except UnknownName:
                 if time.monotonic() >= end or not ending.running():
                     raise
-            time.sleep(EVERY)
+            time.sleep(RECORD_PERIOD)
 
 
 def record(options: argparse.Namespace, namespace: "Namespace") -> None:
@@ -173,7 +175,7 @@ def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "Record
                 print(f"{writer.path}: about {3600e-9 * writer.size / passed:.2g} GB an hour", flush=True)
             if over:
                 return
-            time.sleep(min(EVERY, max(0.0, end - time.monotonic())))
+            time.sleep(min(RECORD_PERIOD, max(0.0, end - time.monotonic())))
 
 
 def _print(path: Path, drains: "Sequence[RecordDrain]", writer: "RecordingWriter") -> None:

@@ -6,8 +6,8 @@ from solfer.cli.columns import aligned
 from solfer.realtime.telemetry.statistics_memory import COMPUTED
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
-TITLES = ("p50", "p99", "max", "left out")
-WIDTH = 8
+TIME_TITLES = ("p50", "p99", "max", "left out")
+COLUMN_WIDTH = 8
 LEGEND = (
     "overhead: a cycle without its components; lateness: from the deadline to the beginning of a cycle",
     "p50 and p99 are of {since}, max is since the start; left out: periods, by what took longest then",
@@ -55,7 +55,7 @@ def computed(plugins: Sequence[PluginSummary]) -> Iterator[str]:
 
 def times(layer: LayerSummary) -> Iterator[tuple[str, ...]]:
     """List times of the loop, and of the plugins and their stages [us], and the periods left out for each."""
-    yield "times [us]", "", *(title.rjust(WIDTH) for title in TITLES)
+    yield "times [us]", "", *(title.rjust(COLUMN_WIDTH) for title in TIME_TITLES)
     for name, stages in (("loop", layer.loop), *((plugin.name, plugin.stages) for plugin in layer.plugins)):
         for stage in stages:
             yield name, stage.name, *_figures(stage)
@@ -64,5 +64,5 @@ def times(layer: LayerSummary) -> Iterator[tuple[str, ...]]:
 
 def _figures(stage: StageSummary) -> Iterator[str]:
     for time in (stage.median, stage.p99, stage.longest):
-        yield (f"{1e6 * time:.1f}" if stage.count else "-").rjust(WIDTH)
-    yield str(stage.skipped).rjust(WIDTH)
+        yield (f"{1e6 * time:.1f}" if stage.count else "-").rjust(COLUMN_WIDTH)
+    yield str(stage.skipped).rjust(COLUMN_WIDTH)

@@ -19,7 +19,7 @@ CLEAR = "\x1b[H\x1b[2J"
 GATHERED = 2.5
 """Time in which each node reports each of its parts under ROS [s]."""
 
-SILENT = 5.0
+PART_SILENCE_LIMIT = 5.0
 """Time without a report after which a part under ROS is silent [s]."""
 
 
@@ -57,7 +57,9 @@ def top_of_nodes(options: argparse.Namespace) -> None:
         for name, report in dict(reports()).items():
             if name not in seen or seen[name][0] is not report:
                 seen[name] = report, now
-        silent = {name for name, (_, newest) in seen.items() if now - newest > max(SILENT, 2.0 * options.every)}
+        silent = {
+            name for name, (_, newest) in seen.items() if now - newest > max(PART_SILENCE_LIMIT, 2.0 * options.every)
+        }
         yield from health({name: report for name, (report, _) in seen.items()}, silent)
 
     with watched() as reports:

@@ -10,8 +10,8 @@ from solfer.errors import MissingDependency, ModelError, UnknownName
 
 EXAMPLES = "example-robot-data"
 PYBULLET = "pybullet_data"
-DESCRIPTIONS = "robot_descriptions"
-COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS)
+DESCRIPTIONS_PACKAGE = "robot_descriptions"
+COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS_PACKAGE)
 
 
 def find_in_collection(source: str) -> Path:
@@ -29,7 +29,7 @@ def find_in_collection(source: str) -> Path:
     collection, _, name = source.partition(":")
     if collection not in COLLECTIONS:
         raise UnknownName("collection of robots", collection, COLLECTIONS, where=f"--from {source}")
-    if collection == DESCRIPTIONS:
+    if collection == DESCRIPTIONS_PACKAGE:
         return _described(name, source)
     folder = folder_of(collection)
     files = {path.relative_to(folder).with_suffix("").as_posix(): path for path in sorted(folder.rglob("*.urdf"))}
@@ -65,14 +65,14 @@ def folder_of(collection: str) -> Path:
 def _described(name: str, source: str) -> Path:
     """Let the package robot_descriptions find a robot: in its cache, else by git."""
     try:
-        package = importlib.import_module(DESCRIPTIONS)
+        package = importlib.import_module(DESCRIPTIONS_PACKAGE)
     except ModuleNotFoundError as error:
-        raise _missing(DESCRIPTIONS) from error
+        raise _missing(DESCRIPTIONS_PACKAGE) from error
     names = [each.name for each in pkgutil.iter_modules(package.__path__) if each.name.endswith("_description")]
     if name not in names:
         raise UnknownName("robot", name, names, where=f"--from {source}")
     try:
-        module = importlib.import_module(f"{DESCRIPTIONS}.{name}")
+        module = importlib.import_module(f"{DESCRIPTIONS_PACKAGE}.{name}")
     except Exception as error:  # whatever git and the network raise
         reason = str(error).strip().splitlines()
         raise ModelError(

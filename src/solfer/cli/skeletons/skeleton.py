@@ -8,7 +8,7 @@ from pathlib import Path
 
 from solfer.errors import ConfigError, SolferError
 
-NAME = re.compile(r"[a-z][a-z0-9_]*")
+PACKAGE_NAME = re.compile(r"[a-z][a-z0-9_]*")
 ANOTHER = "another name, or --package DIR"
 
 
@@ -64,6 +64,6 @@ def _filled(text: str, words: Mapping[str, str]) -> str:
 
 
 def _check(name: str, kind: str) -> None:
-    if NAME.fullmatch(name) is None or keyword.iskeyword(name):
+    if PACKAGE_NAME.fullmatch(name) is None or keyword.iskeyword(name):
         expected = "a small letter, then small letters, digits and underscores, and not a keyword of Python"
         raise ConfigError(f"'{name}' cannot be the name of a {kind}", expected=expected)

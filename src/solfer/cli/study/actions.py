@@ -20,7 +20,7 @@ from solfer.study.search import search
 PACE = 1.5
 """Simulated seconds that one processor makes in a second, roughly, for the estimate of the hours."""
 
-SHOWN = 20
+RUNS_SHOWN_COUNT = 20
 """Most runs that `--dry` lists."""
 
 
@@ -46,11 +46,13 @@ def dry(options: argparse.Namespace) -> int:
     record = study.record
     count = len(plan.runs) if record.search is None else record.search.trials
     rows = [("run", "seed", *study.names)]
-    rows += [(str(run.index), str(run.seed), *map(str, run.variations.values())) for run in plan.runs[:SHOWN]]
+    rows += [
+        (str(run.index), str(run.seed), *map(str, run.variations.values())) for run in plan.runs[:RUNS_SHOWN_COUNT]
+    ]
     for line in aligned(rows):
         print(line)
-    if len(plan.runs) > SHOWN:
-        print(f"... and {len(plan.runs) - SHOWN} more")
+    if len(plan.runs) > RUNS_SHOWN_COUNT:
+        print(f"... and {len(plan.runs) - RUNS_SHOWN_COUNT} more")
     hours = count * (record.duration + record.settle) / PACE / 3600.0
     print(f"{count} runs of {record.duration + record.settle:g} s at most, about {hours:.2g} processor hours")
     return 0

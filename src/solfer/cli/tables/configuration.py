@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from solfer.cli.pipes import content, received, topic_of
 from solfer.cli.plugins import component_of, configurations_of, declared_by, report_of
 from solfer.config import AnyPipeRecord, CheckReport, Configuration, ControllerRecord, FeedbackRecord, MappingRecord
-from solfer.config.loading.library import CONTROLLER, FEEDBACK
+from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.plugins.generation.registry import Registry
 from solfer.robot.defaults import MODEL_MAPS
-from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
-from solfer.robot.names import LOWER_LEVEL, controller_map
+from solfer.robot.names import FEEDBACK_MAP as FEEDBACK_MAP
+from solfer.robot.names import LOWER_LEVEL_MAP, controller_map
 
 Row = tuple[str, ...]
-SHOWN = 3
+NAMED_CONFIGURATIONS = 3
 """Number of configurations that are named beside a pipe; more are only counted."""
 
 
@@ -50,9 +50,12 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
             key = _direction(record), record.name
             users.setdefault(key, []).append(configuration.module.name)
             records.setdefault(key, record)
-    for key, record in sorted(records.items(), key=lambda item: (item[0][0] != FEEDBACK, item[0][1])):
+    for key, record in sorted(records.items(), key=lambda item: (item[0][0] != FEEDBACK_SECTION, item[0][1])):
         names = users[key]
-        yield *_pipe(record), f"used by {', '.join(names) if len(names) <= SHOWN else f'{len(names)} configurations'}"
+        yield (
+            *_pipe(record),
+            f"used by {', '.join(names) if len(names) <= NAMED_CONFIGURATIONS else f'{len(names)} configurations'}",
+        )
     if options.name is None:
         yield from ((name, direction, "used by nothing") for direction, name in _unused(report, records))
 
@@ -64,13 +67,13 @@ def _pipe(record: AnyPipeRecord) -> Row:
 
 
 def _direction(record: AnyPipeRecord) -> str:
-    return CONTROLLER if isinstance(record, ControllerRecord) else FEEDBACK
+    return CONTROLLER if isinstance(record, ControllerRecord) else FEEDBACK_SECTION
 
 
 def _unused(report: CheckReport, used: dict[tuple[str, str], AnyPipeRecord]) -> list[tuple[str, str]]:
     """Return direction and name of the pipes that the file describes and no configuration uses."""
     tree = next((each.tree for each in configurations_of(report)), None)
-    libraries = {direction: tree and tree.get(direction) for direction in (FEEDBACK, CONTROLLER)}
+    libraries = {direction: tree and tree.get(direction) for direction in (FEEDBACK_SECTION, CONTROLLER)}
     named = [(direction, name) for direction, node in libraries.items() if node for name, _ in node.items()]
     return [key for key in named if key not in used]
 
@@ -111,7 +114,7 @@ def _own_maps(configuration: Configuration) -> Iterator[Row]:
     for controller in configuration.controllers:
         if controller.lower_level:
             yield controller_map(controller.leads_to), f"controller {controller.leads_to} of the lower level"
-            yield LOWER_LEVEL, "all controllers of the lower level that the plugin commands"
+            yield LOWER_LEVEL_MAP, "all controllers of the lower level that the plugin commands"
 
 
 def _first_message(record: FeedbackRecord | MappingRecord) -> str:

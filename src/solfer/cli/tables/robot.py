@@ -7,7 +7,7 @@ from solfer.model.urdf.description import Description
 from solfer.model.urdf.elements import JointInfo
 
 Row = tuple[str, ...]
-SHOWN = 4
+MEMBERS_SHOWN_COUNT = 4
 """Number of members of a group or a state that are named."""
 
 
@@ -60,5 +60,5 @@ def _count(members: Collection[str], noun: str) -> str:
 
 
 def _first(members: Sequence[str]) -> str:
-    more = ["..."] if len(members) > SHOWN else []
-    return ", ".join([*members[:SHOWN], *more])
+    more = ["..."] if len(members) > MEMBERS_SHOWN_COUNT else []
+    return ", ".join([*members[:MEMBERS_SHOWN_COUNT], *more])

@@ -8,7 +8,7 @@ from solfer.realtime.telemetry.health import reports_of
 from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
 from solfer.transport.middleware import HealthReport
 
-PERIOD = 1.0
+LAYER_PERIOD = 1.0
 """Time between two reports of the layer [s]."""
 
 
@@ -30,7 +30,7 @@ class LayerMiddleware(XbotMiddleware):
     def reports(self) -> Mapping[str, HealthReport]:
         """See `Middleware.reports`."""
         if self.now() >= self._next:
-            self._next = self.now() + PERIOD
+            self._next = self.now() + LAYER_PERIOD
             now = self._statistics.look()
             self._layer = reports_of(now, self._before)
             self._before = now

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 
-LAG = 0.2
+PACE_LAG = 0.2
 """Lag that is made up for [s]; what is slower falls behind the clock."""
 
 
@@ -29,5 +29,5 @@ class PacedMiddleware(MemoryMiddleware):
         early = self._begin + deadline - time.monotonic()
         if early > 0.0:
             time.sleep(early)
-        elif early < -LAG:
+        elif early < -PACE_LAG:
             self._begin -= early

@@ -14,7 +14,7 @@ from solfer.components.declaration import Accepted, Action, LiveParameter, Outco
 from solfer.components.following.generated import GeneratedPosture, require_speeds
 from solfer.components.following.quantity import quantity_of
 from solfer.components.following.requests import (
-    MESSAGES,
+    REFERENCE_MESSAGES,
     GetReference,
     MovePoint,
     ReachFeedback,
@@ -46,7 +46,7 @@ log = logging.getLogger(__name__)
 FOLLOWING = ("position", "orientation", "pose", "center_of_mass", "look_at")
 """What others may give references to: tasks on these points."""
 
-RATE = 20.0
+REFERENCE_RATE = 20.0
 """Messages with references in a second [Hz]."""
 
 
@@ -93,7 +93,12 @@ class ReferenceFollower(Component, abc.ABC):
     def topics(self) -> tuple[Any, ...]:
         """Receive references of all tasks, each on a topic of its own: `<name>/<task>/reference`; publish them all."""
         received = (
-            TopicIn(f"{target.name}/reference", *MESSAGES[target.quantity], self._listener(target), stream=target.name)
+            TopicIn(
+                f"{target.name}/reference",
+                *REFERENCE_MESSAGES[target.quantity],
+                self._listener(target),
+                stream=target.name,
+            )
             for target in self._list
         )
         published = TopicOut(
@@ -246,7 +251,7 @@ class ReferenceFollower(Component, abc.ABC):
         tags = self.tags
         self._filter = ReferenceFilter(len(self._list), self.period)
         self._residuals = np.zeros((len(self._list), 2))
-        self._countdown = self._interval = max(round(1.0 / (self.period * RATE)), 1)
+        self._countdown = self._interval = max(round(1.0 / (self.period * REFERENCE_RATE)), 1)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
         for index, target in enumerate(self._list):
             target.connect(

@@ -15,7 +15,7 @@ from solfer.points import Constant, Posture
 from solfer.references import ReferenceGenerator, build_reference
 from solfer.tasks import Task
 
-_SLACK = 1.0 + 1e-6
+_SPEED_SLACK = 1.0 + 1e-6
 """Relative slack of speeds, for those that were computed to be the largest."""
 
 
@@ -71,7 +71,7 @@ class GeneratedPosture:
 
     def _require_speeds(self) -> None:
         fastest = np.abs(self._generator.velocities()).max(axis=0)
-        beyond = np.flatnonzero(fastest > self._limits * _SLACK)
+        beyond = np.flatnonzero(fastest > self._limits * _SPEED_SLACK)
         if len(beyond):
             joint = int(beyond[0])
             raise ComponentError(
@@ -137,7 +137,7 @@ def require_speeds(generator: ReferenceGenerator, record: ReferenceRecord, motio
         (angular, motion.turn_speed, "turn_speed", "rad/s"),
     ):
         fastest = math.sqrt(float(np.square(part).sum(axis=1).max()))
-        if fastest > most * _SLACK:
+        if fastest > most * _SPEED_SLACK:
             raise ComponentError(
                 f"a speed of {fastest:.4g} {unit}",
                 where=record.where(record.kind),

@@ -9,9 +9,9 @@ from solfer.errors import NotFinite, SizeMismatch
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import quaternion_product
 from solfer.points import Constant
-from solfer.points.space import ORIENTATION, POSE
+from solfer.points.space import ORIENTATION, POSE_SPACE
 
-EMPTY = slice(0, 0)
+QUANTITY_EMPTY = slice(0, 0)
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class PoseNumbers:
             quantity,
             3 if is_turn else 0,
             QUANTITIES[quantity],
-            place=EMPTY if is_turn else slice(3),
-            turn=EMPTY if quantity == "position" else slice(-3, None),
+            place=QUANTITY_EMPTY if is_turn else slice(3),
+            turn=QUANTITY_EMPTY if quantity == "position" else slice(-3, None),
         )
 
     @property
@@ -94,4 +94,4 @@ def quantity_of(reference: Constant) -> str:
     """Return the quantity of a reference."""
     if reference.space == ORIENTATION:
         return "orientation"
-    return "pose" if reference.space == POSE else "position"
+    return "pose" if reference.space == POSE_SPACE else "position"

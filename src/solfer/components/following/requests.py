@@ -45,7 +45,7 @@ class PoseReference:
         return numbers_of(self.pose)
 
 
-MESSAGES = {
+REFERENCE_MESSAGES = {
     "position": ("geometry_msgs/PointStamped", PositionReference),
     "orientation": ("geometry_msgs/QuaternionStamped", OrientationReference),
     "pose": ("geometry_msgs/PoseStamped", PoseReference),

@@ -109,7 +109,7 @@ def _learn(
     _backward(solved, offsets)
 
 
-_MATRIX = "float64[:,::1]"
+_MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
 _INDICES = "int64[::1]"
 

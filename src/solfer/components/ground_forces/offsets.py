@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.components.ground_forces import kernel
 from solfer.components.ground_forces.tags import OffsetTags
-from solfer.components.ground_forces.weighted_forces import LEAST, weighed
+from solfer.components.ground_forces.weighted_forces import PRIOR_MINIMUM, weighed
 from solfer.points.contact.contacts import Contact
 
 
@@ -102,7 +102,7 @@ class TorqueOffsets:
             world,
             self._pushed if pushed else self._calm,
             self._columns,
-            LEAST,
+            PRIOR_MINIMUM,
             self._first,
             self._share,
             self._decay,

@@ -35,7 +35,7 @@ SECOND_LEVEL = 1e-5
 as long again: a task of the first level gives way by a hundred-thousandth of what the second demands against it, less
 than a millimetre where legs are nearly stretched."""
 
-PERIODS = 2.0
+HORIZON_PERIODS = 2.0
 """Least horizon of joint limits, in periods: a cycle acts one period after its measurement."""
 
 CHANGE = 0.2
@@ -138,7 +138,7 @@ class InverseDynamics(ReferenceFollower):
         )
         lower[:base], upper[:base] = -math.inf, math.inf
         speed = self._speed_limits(self.tags)
-        horizon = max(limits.horizon, PERIODS * self.period)
+        horizon = max(limits.horizon, HORIZON_PERIODS * self.period)
         self._bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
         self.problem = WholeBodyProblem(
             robot, self.ground, self._bounds, rows=len(self._desired), torque_limits=self._torque_limits(self.tags)

@@ -4,7 +4,7 @@ import numpy as np
 
 from solfer.tasks import Stack
 
-STEP = 1e-5
+DRIFT_STEP = 1e-5
 """Time by which the robot is moved ahead and back [s]: errors are those of third derivatives times its square."""
 
 
@@ -27,7 +27,7 @@ class TaskDrift:
 
     def update(self, position: np.ndarray, velocity: np.ndarray) -> None:
         """Compute `value` at a position [rad, m] and a velocity [rad/s, m/s], shape (n,) each."""
-        np.multiply(velocity, STEP, out=self._move)
+        np.multiply(velocity, DRIFT_STEP, out=self._move)
         for sign, out in ((1.0, self.value), (-1.0, self._back)):
             np.multiply(self._move, sign, out=self._robot.state.position)
             self._robot.state.position += position
@@ -35,4 +35,4 @@ class TaskDrift:
             self._stack.update_jacobian()
             np.dot(self._stack.jacobian, velocity, out=out)
         self.value -= self._back
-        self.value /= 2.0 * STEP
+        self.value /= 2.0 * DRIFT_STEP

@@ -13,7 +13,7 @@ from solfer.points.contact.contact_constraint import held_acceleration
 from solfer.points.contact.contacts import Contact, RollingContact, across
 from solfer.robot import Robot
 
-INNER = math.sqrt(0.5)
+INNER_FRICTION = math.sqrt(0.5)
 """Share of the friction with which a pyramid of four sides lies within the cone."""
 
 
@@ -153,7 +153,10 @@ def _cone(name: str, contact: Contact, tags: InverseDynamicsTags) -> np.ndarray:
     """Return the rows of G of a contact, shape (g, rows)."""
     local = _local(contact)
     normal = local[2]
-    sides: list[tuple[np.ndarray, float]] = [(local[0], INNER * tags.friction), (local[1], INNER * tags.friction)]
+    sides: list[tuple[np.ndarray, float]] = [
+        (local[0], INNER_FRICTION * tags.friction),
+        (local[1], INNER_FRICTION * tags.friction),
+    ]
     if local[3:].any():
         if tags.sole is None and local[3:5].any():
             raise ComponentError(

@@ -9,13 +9,13 @@ from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, 
 from solfer.numerics.solvers.qp import Problem
 from solfer.robot import Robot
 
-TOLERANCE = 1e-9
+QP_TOLERANCE = 1e-9
 """Largest residual of a solution, see `numerics.solvers.qp.Solution`."""
 
 TOUCHES = 1e-6
 """Share of a limit, or of 1, within which it counts as active."""
 
-ACCELERATION, FORCE = 1e-8, 1e-5
+QP_ACCELERATION, QP_FORCE = 1e-8, 1e-5
 """Weights of the squares of each acceleration [s^4/rad^2, s^4/m^2], and of each force in units of a contact's share of
 the weight, beside tasks of weight 1: what tasks leave open is small, and forces are shared out."""
 
@@ -68,7 +68,7 @@ class WholeBodyProblem:
         self._limits = torque_limits[self._driven]
         fixed = len(self._passive) + forces
         free = size - len(self._passive)
-        self._smallest = np.concatenate((np.full(size, ACCELERATION), np.full(forces, FORCE)))
+        self._smallest = np.concatenate((np.full(size, QP_ACCELERATION), np.full(forces, QP_FORCE)))
         self._rows = np.zeros((fixed, size + forces))
         self._sides = np.zeros(fixed)
         self._fixed = np.zeros(fixed, dtype=np.int64)
@@ -78,7 +78,7 @@ class WholeBodyProblem:
         contacts = len(ground.normals)
         first = len(self._driven) + len(ground.cones) + contacts
         self._problem = Problem.empty(free, 0, first + fixed)
-        self._method = ActiveSet(free, first + fixed, TOLERANCE)
+        self._method = ActiveSet(free, first + fixed, QP_TOLERANCE)
         self._z = np.zeros(free)
         self.acceleration = np.zeros(size)
         self.torque = np.zeros(size)

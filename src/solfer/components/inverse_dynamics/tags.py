@@ -10,7 +10,7 @@ from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.config.tasks.stack import Gain, Positive, TaskLevelsRecord, TaskRecord
 
-LEVELS = 2
+MAX_LEVELS = 2
 """Most levels of tasks."""
 
 CRITICAL = 4.0
@@ -68,7 +68,7 @@ class DynamicStackRecord(TaskLevelsRecord):
 
     @model_validator(mode="after")
     def _check(self) -> "DynamicStackRecord":
-        if len(self.levels) > LEVELS:
+        if len(self.levels) > MAX_LEVELS:
             raise ValueError(f"{len(self.levels)} levels; expected one or two: contacts and limits come before them")
         return self
 

@@ -11,17 +11,17 @@ from solfer.robot import Robot
 SMOOTHING = 0.2
 """Time over which torques are compared [s]: motors swing, and take a while."""
 
-CALM = 3.0
+CONTACT_CALM_TIME = 3.0
 """Time at the start in which torques are not compared [s]: commands blend in from those of before."""
 
-LOST, LEAST = 0.5, 0.03
+LOST_EFFORT_SHARE, CONTACT_MINIMUM = 0.5, 0.03
 """A joint has lost its effort where that differs by more than this share of the commanded one, and by more than the
 second number [m] times the robot's weight: friction of wrists is more than they carry."""
 
-SLIP, MEMORY = 0.02, 0.5
+CONTACT_SLIP, MEMORY = 0.02, 0.5
 """Way of a contact that slips [m], within about the second number [s]."""
 
-ABSENT, CARRIES, DELAY = 0.05, 0.3, 0.2
+ABSENT, CARRIES, CONTACT_DELAY = 0.05, 0.3, 0.2
 """Share of a contact's part of the weight below which it touches nothing, though it is to carry more than the second
 share, for the third number [s]."""
 
@@ -42,7 +42,7 @@ class DynamicsWatch:
     def __init__(self, robot: Robot, ground: Ground, efforts: np.ndarray):
         self._robot, self._ground, self._efforts = robot, ground, efforts.astype(np.int64)
         count = len(ground.normals)
-        self._limit = LEAST * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
+        self._limit = CONTACT_MINIMUM * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         contacts = robot.contacts
         self._tracked = np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64)
         self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
@@ -83,7 +83,7 @@ class DynamicsWatch:
         self._add_springs()
         found = watch(
             step,
-            self._time > CALM,
+            self._time > CONTACT_CALM_TIME,
             robot.command.torque,
             self._springs,
             robot.state.torque,
@@ -142,7 +142,7 @@ def _lost(share, torque, springs, measured, efforts, limit, sent, difference, is
         away = measured[dof] - torque[dof]
         away -= min(max(away, least), most)
         difference[dof] += share * (away - difference[dof])
-        if abs(difference[dof]) > max(LOST * abs(sent[dof]), limit) and found < 0:
+        if abs(difference[dof]) > max(LOST_EFFORT_SHARE * abs(sent[dof]), limit) and found < 0:
             found = dof
     return found if any_measured and is_calm else -1
 
@@ -186,7 +186,7 @@ def _watch(
             if shares[i] < 1.0:
                 moved[i, k] = 0.0
             distance += moved[i, k] ** 2
-        if math.sqrt(distance) > SLIP:
+        if math.sqrt(distance) > CONTACT_SLIP:
             return size + i
         pressed = 0.0
         computed = 0.0
@@ -196,7 +196,7 @@ def _watch(
             computed += normals[i, k] * force[k]
         is_absent = math.sqrt(pressed) < ABSENT * unit and computed > CARRIES * unit and shares[i] == 1.0
         missing[i] = missing[i] + step if are_measured and is_absent else 0.0
-        if missing[i] > DELAY:
+        if missing[i] > CONTACT_DELAY:
             return size + count + i
     return -1
 

@@ -9,7 +9,7 @@ from solfer.tasks import Task
 AT_LIMIT = 5e-3
 """Distance to the end of a range at which a joint counts as there [rad, m]."""
 
-PRESSED = 0.01
+OBSTACLE_PRESSURE = 0.01
 """Part of its largest pull from which an error presses a joint against the end of its range."""
 
 ACROSS = 0.35
@@ -33,8 +33,8 @@ def obstacles(task: Task, command: State, bounds: VelocityBounds, moved: np.ndar
     length = float(np.linalg.norm(error))
     pull = jacobian.T @ error
     reach = np.linalg.norm(jacobian, axis=0) * length
-    is_low = (command.position - bounds.lower_position < AT_LIMIT) & (pull < -PRESSED * reach)
-    is_high = (bounds.upper_position - command.position < AT_LIMIT) & (pull > PRESSED * reach)
+    is_low = (command.position - bounds.lower_position < AT_LIMIT) & (pull < -OBSTACLE_PRESSURE * reach)
+    is_high = (bounds.upper_position - command.position < AT_LIMIT) & (pull > OBSTACLE_PRESSURE * reach)
     ends = [(dof, "lower", bounds.lower_position) for dof in moved if is_low[dof]]
     ends += [(dof, "upper", bounds.upper_position) for dof in moved if is_high[dof]]
     free = [dof for dof in moved if not is_low[dof] and not is_high[dof]]

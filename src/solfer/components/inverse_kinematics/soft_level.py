@@ -11,7 +11,7 @@ from solfer.tasks import Task
 NEGLIGIBLE = 1e-3
 """Share of the square of its own damping below which a level is not damped any more."""
 
-OTHERS, FAR = 0.1, 1e-4
+DAMPING_SHARE, DAMPING_SHARE_FAR = 0.1, 1e-4
 """Share of an added damping D^2 far above the second number [m2] that a task without a reference of others gets."""
 
 
@@ -62,7 +62,7 @@ class SoftLevel:
             return
         added = self._length * way
         if added > NEGLIGIBLE * self._least:
-            others = added * (FAR + OTHERS * added) / (FAR + added)
+            others = added * (DAMPING_SHARE_FAR + DAMPING_SHARE * added) / (DAMPING_SHARE_FAR + added)
             for task, damping, target in self._dampings:
                 is_held = target is not None and target.is_held
                 part = others if target is None else added

@@ -4,13 +4,13 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
-LIKELY = 4.0
+CONSENSUS_LIKELIHOOD = 4.0
 """Variances of the gyroscope's rate by which wheels may contradict it: two standard deviations."""
 
 DOUBT = 1e4
 """Largest factor of a wheel's variance: where all slide, they still are all that measures the base's way."""
 
-STEPS = 3
+CONSENSUS_STEPS = 3
 """Steps of reweighting to the Cauchy estimate."""
 
 
@@ -86,7 +86,7 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
     if cost == math.inf:
         distances[:] = 0.0
         return 0.0
-    for _ in range(STEPS):
+    for _ in range(CONSENSUS_STEPS):
         write_distances(wheels, arms, twist, distances)
         for i in range(count):
             weights[i] = inliers[i] / (tolerance + distances[i])
@@ -97,7 +97,7 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
     alone = fit_twist(wheels, arms, weights, rate, 0.0)
     if alone[3] < 1e-6:  # wheels above each other measure no turn
         return 0.0
-    return max(0.0, (alone[2] - rate) ** 2 - LIKELY * variance)
+    return max(0.0, (alone[2] - rate) ** 2 - CONSENSUS_LIKELIHOOD * variance)
 
 
 @part

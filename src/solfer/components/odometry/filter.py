@@ -14,31 +14,31 @@ from solfer.components.odometry.wheels import Wheels
 from solfer.numerics.filters import LowPass
 from solfer.points.contact.support_vertex import UP
 
-FORGET = 2.0
+ODOMETRY_FORGETTING_TIME = 2.0
 """Time in which a wheel's rise above the others is forgotten while it touches [s]."""
 
-AT_REST = 0.1
+REST_TIME = 0.1
 """Time for which wheels and joints have to stand still before the gyroscope's bias is estimated at rest [s]."""
 
 SWAYING = 0.05
 """Share of the speed of a robot at rest which its joints may have on average: one that has stopped still sways."""
 
-LIKELY, UNKNOWN = 5.0, 2e-3
+GYROSCOPE_STD, UNKNOWN_BIAS_STD = 5.0, 2e-3
 """Standard deviations of a gyroscope's noise at rest, and how fast a robot at rest may sway besides [rad/s]."""
 
-ENCODERS, STANDING = 2e-3, 1e-5
+ENCODERS, ENCODER_STD = 2e-3, 1e-5
 """Standard deviation of a wheel's velocity by encoders, and the same of a robot at rest [m/s]."""
 
-SLIP, SKID = 0.008, 0.02
+SLIP_SHARE, SKID = 0.008, 0.02
 """Standard deviation of a wheel's velocity as a share of it, and of its way where wheels alone measure the turn."""
 
-GROUND = 0.005
+GROUND_HEIGHT_STD = 0.005
 """Standard deviation of the height of level ground [m]."""
 
-LOOKS = 10
+TILT_INTERVAL = 10
 """Measurements from one of the tilt by the ground to the next: grounds and IMUs err for longer."""
 
-SETTLE, RAISING = 0.005, 0.2
+HEIGHT_SETTLING_TIME, RAISING = 0.005, 0.2
 """Time in which the base comes to the height of the map [s], and its largest speed [m/s]."""
 
 SHAKES, SHAKING = 2.5e-3, 0.3
@@ -179,7 +179,7 @@ class FilteredOdometry:
         self._wheels.update(self._base.heading)
         self._period = period
         np.subtract(self._wheels.position, self._joints_before, out=self._step)
-        keep = AT_REST / (AT_REST + period)
+        keep = REST_TIME / (REST_TIME + period)
         moved, legs, sway = filter_kernel.joint_motion(self._step, self._wheels.legs, self._sway, keep)
         shaken, sample = self._follow_imu(legs / period)
         self._weigh()
@@ -235,7 +235,7 @@ class FilteredOdometry:
         sample = NO_SAMPLE
         x, y, _ = base.turned.tolist()
         before_x, before_y = kalman.tilt.tolist()
-        if self._rest > AT_REST:  # a robot at rest does not turn
+        if self._rest > REST_TIME:  # a robot at rest does not turn
             kalman.lean(0.0, x, y)
             kalman.rest(self._rate @ kalman.axes, time)
             base.turned[:2] = 0.0
@@ -289,7 +289,7 @@ class FilteredOdometry:
         still = moved <= limit and sway <= SWAYING * limit
         if still and imu_time:
             deviation = math.sqrt(self.kalman.bias_variance + self._gyroscope / imu_time)
-            still = abs(float(self._rate[2]) - self.kalman.bias) <= LIKELY * deviation + UNKNOWN
+            still = abs(float(self._rate[2]) - self.kalman.bias) <= GYROSCOPE_STD * deviation + UNKNOWN_BIAS_STD
         self._rest = self._rest + self._period if still else 0.0
 
     def _correct(self, turn: float, imu_time: float, leg_speed: float) -> None:
@@ -300,9 +300,9 @@ class FilteredOdometry:
         period = self._period
         x, y, _ = kalman.velocity.tolist()
         speed = math.hypot(x, y)
-        least = STANDING if self._rest > AT_REST else ENCODERS
+        least = ENCODER_STD if self._rest > REST_TIME else ENCODERS
         filter_kernel.measure_speeds(
-            self._displacements, self._tilting, period, SLIP, least, self._spreads, self._variances, self._speeds
+            self._displacements, self._tilting, period, SLIP_SHARE, least, self._spreads, self._variances, self._speeds
         )
         rate = turn / period
         share = imu_time / period
@@ -357,12 +357,14 @@ class FilteredOdometry:
             turn=turn / period,
         )
         most = RAISING * period
-        raised = 0.0 if math.isnan(missing) else min(max(missing * period / (SETTLE + period), -most), most)
+        raised = (
+            0.0 if math.isnan(missing) else min(max(missing * period / (HEIGHT_SETTLING_TIME + period), -most), most)
+        )
         self.position[2] += raised
         self._map.note(raised, self._trusted)
         filter_kernel.find_lifted(
             self._displacements, self._arms, turn, base.turned, self._weights, self._trusted, wheels.normal,
-            self._tags.clearance, 1.0 - period / FORGET, self._slope, self._rise, self.lifted,
+            self._tags.clearance, 1.0 - period / ODOMETRY_FORGETTING_TIME, self._slope, self._rise, self.lifted,
         )  # fmt: skip
 
     def _settle_floor(self) -> None:
@@ -373,8 +375,8 @@ class FilteredOdometry:
         if self._map.floor != self._floor:
             self._floor = self._map.floor
             self._floor_variance = variance
-        if variance > self._floor_variance + GROUND * GROUND:
-            self.kalman.settle_height(GROUND * math.sqrt(self._tags.settle / self._period))
+        if variance > self._floor_variance + GROUND_HEIGHT_STD * GROUND_HEIGHT_STD:
+            self.kalman.settle_height(GROUND_HEIGHT_STD * math.sqrt(self._tags.settle / self._period))
 
     def _find_ground(self) -> None:
         """Find the normal of the ground; level ground measures the error of the tilt."""
@@ -390,7 +392,7 @@ class FilteredOdometry:
             return
         self._looks += 1
         self._since_look += self._period
-        if self._looks >= LOOKS:
+        if self._looks >= TILT_INTERVAL:
             self.kalman.settle_tilt(self._since_look)
             self._looks = 0
             self._since_look = 0.0

@@ -4,7 +4,7 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
-SILENT = 1e-6
+GYROSCOPE_SILENCE_LIMIT = 1e-6
 """Angular velocity below which a gyroscope is silent [rad/s]: no real one is as quiet."""
 
 
@@ -72,7 +72,7 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
         largest = max(largest, abs(angular[axis]))
     square = 0.0
     for axis in range(3):
-        measured = angular[axis] if largest > SILENT else turned[axis] / time
+        measured = angular[axis] if largest > GYROSCOPE_SILENCE_LIMIT else turned[axis] / time
         rate[axis] = measured if averages else 0.5 * (measured + before[axis])
         square += (measured - before[axis]) ** 2
         before[axis] = measured

@@ -12,7 +12,7 @@ from solfer.numerics.filters import LowPass
 from solfer.numerics.rotations import cross
 from solfer.robot import Robot
 
-NORMAL = np.array((0.0, 0.0, 1.0))
+GROUND_NORMAL = np.array((0.0, 0.0, 1.0))
 
 
 class GeometricOdometry:
@@ -95,7 +95,7 @@ class GeometricOdometry:
         self._turn += self._rate * period
         turned = self._state.position[self._dofs]
         for index, (axis, radius) in enumerate(zip(self._axes, self._radii, strict=True)):
-            along = cross(axis, NORMAL)
+            along = cross(axis, GROUND_NORMAL)
             along *= radius * (turned[index] - self._before[index]) / np.linalg.norm(along)
             center = about_vertical(self._centers[index], self._turn)
             self._places[index] += about_vertical(along, self._turn)
@@ -136,7 +136,7 @@ class GeometricOdometry:
         axis = self._tilted[:, 2]
         rows = []
         for center, moving, radius in zip(self._centers, self._moving, self._radii, strict=True):
-            rolled = cross(tilting + moving[3:], radius * NORMAL)
+            rolled = cross(tilting + moving[3:], radius * GROUND_NORMAL)
             rows.append((cross(axis, center), rolled - cross(tilting, center) - moving[:3]))
         solved = middle(np.array([_solution(rows[i], rows[j]) for i, j in self._pairs]))
         if self.smoothing is not None:

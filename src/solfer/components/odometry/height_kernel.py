@@ -7,25 +7,25 @@ from solfer.numerics.compilation import cached, part
 SPACING = 0.02
 """Distance of the samples of a track [m]."""
 
-BESIDE, NEAR = 0.05, 0.03
+TRACK_OFFSET, TRACK_NEARNESS = 0.05, 0.03
 """How far a wheel may be beside a track that it follows, and from a sample where it begins to [m]."""
 
-OWN = 8
+SKIPPED_SAMPLES = 8
 """Newest samples of its own track that a wheel does not follow: it has just left them."""
 
 LEADING = 0.01
 """Weight of a wheel that leads onto a floor that may end there; that of one that follows a track is 1."""
 
-SMALL = 5e-4
+TRACK_SMALLNESS = 5e-4
 """How far a wheel that leaves a floor may be off it while it still counts as on it [m]."""
 
-STILL = 1e-3
+TRACK_STILLNESS = 1e-3
 """Speed below which no wheel leads [m/s]."""
 
-TOLERANCE = 0.008
+TRACK_TOLERANCE = 0.008
 """How far a wheel may be above or below a floor and still be on it [m]: twice what floors are uneven (DIN 18202)."""
 
-FLAT, UNEVEN = 0.2, 0.003
+TRACK_FLATNESS, TRACK_UNEVENNESS = 0.2, 0.003
 """Way on ground that is even within the second number [m] after which it is a floor."""
 
 
@@ -39,9 +39,9 @@ def squared_distance(tracks, track, sample, x, y):
 @part
 def find_track(tracks, heads, wheel, x, y, followed):
     """Let a wheel follow the track of the sample that is nearest to it."""
-    nearest = NEAR * NEAR
+    nearest = TRACK_NEARNESS * TRACK_NEARNESS
     for track in range(len(tracks)):
-        newest = heads[track] - (OWN if track == wheel else 0)
+        newest = heads[track] - (SKIPPED_SAMPLES if track == wheel else 0)
         for sample in range(max(0, heads[track] - tracks.shape[1]), newest - 1):
             square = squared_distance(tracks, track, sample, x, y)
             if square < nearest:
@@ -64,7 +64,7 @@ def height_on_track(tracks, heads, wheel, x, y, slope, followed):
         along = other[0] - one[0]
         across = other[1] - one[1]
         square = along * along + across * across
-        if square > BESIDE * BESIDE or square == 0.0:
+        if square > TRACK_OFFSET * TRACK_OFFSET or square == 0.0:
             break
         share = ((x - one[0]) * along + (y - one[1]) * across) / square
         if share < 0.0 or share > 1.0:
@@ -72,7 +72,7 @@ def height_on_track(tracks, heads, wheel, x, y, slope, followed):
             continue
         off_x = x - one[0] - share * along
         off_y = y - one[1] - share * across
-        if off_x * off_x + off_y * off_y > BESIDE * BESIDE:
+        if off_x * off_x + off_y * off_y > TRACK_OFFSET * TRACK_OFFSET:
             break
         followed[wheel, 1] = sample
         return one[2] + share * (other[2] - one[2]) + slope[0] * off_x + slope[1] * off_y
@@ -86,7 +86,7 @@ def leads(arm, x, y, velocity, turn, before):
     u = velocity[0] - turn * arm[1]
     v = velocity[1] + turn * arm[0]
     length = math.sqrt((u * u + v * v) * (x * x + y * y))
-    if u * u + v * v > STILL * STILL and length > 0.0:
+    if u * u + v * v > TRACK_STILLNESS * TRACK_STILLNESS and length > 0.0:
         return (u * x + v * y) / length
     return before
 
@@ -129,7 +129,7 @@ def _missing_height(
         if followed[i, 0] >= 0:
             height = height_on_track(tracks, heads, i, places[i, 0], places[i, 1], slope, followed)
         if math.isnan(height):
-            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > TOLERANCE:
+            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > TRACK_TOLERANCE:
                 continue
             height = floor[0]
             share = LEADING + (0.5 - 0.5 * leading[i]) ** 2
@@ -145,7 +145,7 @@ def end_floor(tracks, heads, risen, wheel):
     later = math.inf
     for sample in range(heads[wheel] - 1, max(0, heads[wheel] - size) - 1, -1):
         off = risen[wheel, sample % size]
-        if abs(off) < SMALL or abs(off) > later:
+        if abs(off) < TRACK_SMALLNESS or abs(off) > later:
             break
         tracks[wheel, sample % size, 2] += off
         risen[wheel, sample % size] = 0.0
@@ -175,7 +175,7 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
         lowest = min(lowest, z)
         highest = max(highest, z)
         mean = mean + z
-        level = not math.isnan(floor[0]) and abs(z - floor[0]) <= TOLERANCE
+        level = not math.isnan(floor[0]) and abs(z - floor[0]) <= TRACK_TOLERANCE
         on_floor += level
         square = SPACING * SPACING if heads[i] == 0 else squared_distance(tracks, i, heads[i] - 1, x, y)
         if square < SPACING * SPACING:
@@ -192,11 +192,11 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
         if on_floor == 0:
             floor[0] = math.nan
             floor[1] = 0.0
-    elif touching < 3 or highest - lowest > UNEVEN:
+    elif touching < 3 or highest - lowest > TRACK_UNEVENNESS:
         floor[1] = 0.0
     else:
         floor[1] += distance
-        if floor[1] > FLAT:
+        if floor[1] > TRACK_FLATNESS:
             floor[0] = mean / touching
     return on_floor > 0 and on_floor == touching
 

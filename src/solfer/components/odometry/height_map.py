@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.components.odometry import height_kernel as kernel
 
-SAMPLES = 256
+TRACK_SAMPLES = 256
 """Samples of a track: 5 m; older ones are dropped."""
 
 
@@ -29,8 +29,8 @@ class HeightMap:
         count = len(radii)
         self._radii = radii
         self._cycle = 0
-        self._tracks = np.zeros((count, SAMPLES, 3))
-        self._risen = np.zeros((count, SAMPLES))
+        self._tracks = np.zeros((count, TRACK_SAMPLES, 3))
+        self._risen = np.zeros((count, TRACK_SAMPLES))
         self._heads = np.zeros(count, dtype=np.int64)
         self._followed = np.zeros((count, 2), dtype=np.int64)
         self._leading = np.zeros(count)

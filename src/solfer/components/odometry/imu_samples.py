@@ -9,16 +9,16 @@ from solfer.components.odometry.stamps import StampCheck
 from solfer.model.state import State
 from solfer.numerics.base_chart import BaseChart
 
-LAG = 0.03
+IMU_SAMPLES_LAG = 0.03
 """Longest time for which joints wait for what the IMU measures at their time [s]."""
 
-KEPT = 0.1
+IMU_SAMPLES_KEPT_COUNT = 0.1
 """Time for which samples of the IMU are kept, for others that come late [s]."""
 
 CAPACITY = 256
 """Samples that are kept of each sensor: half a second of an IMU at 500 Hz."""
 
-ANGLES, RATES, TURNED = slice(0, 3), slice(3, 6), slice(6, 9)
+ANGLES, RATES, IMU_SAMPLES_TURN_LIMIT = slice(0, 3), slice(3, 6), slice(6, 9)
 """Numbers of a sample of the IMU: angles of the base, their rates, and the integral of the rates."""
 
 
@@ -66,7 +66,7 @@ class ImuSamples:
                 continue
             history.copy(index, samples.rows[row, :6])
             for later in range(max(row, 1), samples.count):
-                samples.rows[later, TURNED] = self._turned_at(later - 1, later, 1.0)
+                samples.rows[later, IMU_SAMPLES_TURN_LIMIT] = self._turned_at(later - 1, later, 1.0)
 
     def turned_since(self, time: float) -> np.ndarray | None:
         """Return how the base has turned since the measurement of a time [s], in its axes; None: not known."""
@@ -114,7 +114,7 @@ class ImuSamples:
             state.velocity[3:6] = (turned_by - 2.0 * math.pi * np.round(turned_by / (2.0 * math.pi))) / passed
         self._turned[:] = turned
         self.measured_at = time
-        samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - KEPT)) - 1))
+        samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - IMU_SAMPLES_KEPT_COUNT)) - 1))
         return True
 
     def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
@@ -123,7 +123,9 @@ class ImuSamples:
         first = samples.rows[before]
         second = samples.rows[after]
         span = samples.stamps[after] - samples.stamps[before]
-        if span > LAG:  # too long for rates: angles do not drift in it
+        if span > IMU_SAMPLES_LAG:  # too long for rates: angles do not drift in it
             turn = second[ANGLES] - first[ANGLES]
-            return first[TURNED] + share * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
-        return first[TURNED] + share * span * (first[RATES] + 0.5 * share * (second[RATES] - first[RATES]))
+            return first[IMU_SAMPLES_TURN_LIMIT] + share * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
+        return first[IMU_SAMPLES_TURN_LIMIT] + share * span * (
+            first[RATES] + 0.5 * share * (second[RATES] - first[RATES])
+        )

@@ -6,18 +6,26 @@ from typing import NamedTuple
 import numpy as np
 
 from solfer.components.odometry import kalman_kernel as kernel
-from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, RADIUS, SCRUB, SLOPE, TILT, VELOCITY
+from solfer.components.odometry.kalman_kernel import (
+    GYRO_BIAS,
+    SCRUB,
+    SLOPE,
+    STATE_HEADING,
+    STATE_RADIUS,
+    STATE_TILT,
+    STATE_VELOCITY,
+)
 
 SLIDE = 3e-3
 """Standard deviation of the way after a metre, by slip that lasts, before it is estimated [m/sqrt(m)]."""
 
-TILT_TIME = 30.0
+TILT_TIME_CONSTANT = 30.0
 """Time constant of the error of the tilt that an IMU measures [s]."""
 
-RESTING = 1e-3
+KALMAN_REST_ERROR = 1e-3
 """Standard deviation of the velocity of a robot at rest at the start [m/s]."""
 
-UNEVEN, PATCH = math.radians(0.2), 0.1
+KALMAN_UNEVENNESS, PATCH = math.radians(0.2), 0.1
 """Standard deviation of a level floor from the plane under four wheels [rad] (DIN 18202: 4 mm within 1 m), and the way
 after which it is another one [m]."""
 
@@ -94,7 +102,7 @@ class WheelInertialFilter:
     def __init__(
         self, count: int, acceleration: float, noise: float, bias: float, walk: float, radius: float, tilt: float = 0.0
     ):
-        size = RADIUS + count
+        size = STATE_RADIUS + count
         self._acceleration = acceleration**2
         self._noise = noise**2
         self._bias = bias**2
@@ -103,9 +111,9 @@ class WheelInertialFilter:
         self._tilt = tilt**2
         self.covariance = np.zeros((size, size))
         self.state = np.zeros(size)
-        self.correction = self.state[: HEADING + 1]
-        self.velocity = self.state[VELOCITY:GYRO_BIAS]
-        self.tilt = self.state[TILT:SLOPE]
+        self.correction = self.state[: STATE_HEADING + 1]
+        self.velocity = self.state[STATE_VELOCITY:GYRO_BIAS]
+        self.tilt = self.state[STATE_TILT:SLOPE]
         self.axes = np.eye(3)
         self._vertical = self.axes[2]
         self._bias_of_base = self.state[GYRO_BIAS : GYRO_BIAS + 3]
@@ -122,21 +130,21 @@ class WheelInertialFilter:
         self.rolling[:] = 1.0
         self.slide = SLIDE**2
         variances = np.zeros(len(self.state))
-        variances[VELOCITY:GYRO_BIAS] = RESTING**2
+        variances[STATE_VELOCITY:GYRO_BIAS] = KALMAN_REST_ERROR**2
         variances[GYRO_BIAS : GYRO_BIAS + 3] = self._bias
-        variances[RADIUS:] = self._radius
+        variances[STATE_RADIUS:] = self._radius
         if self._tilt:
-            variances[TILT:SLOPE] = self._tilt
-            variances[SLOPE:RADIUS] = UNEVEN**2
+            variances[STATE_TILT:SLOPE] = self._tilt
+            variances[SLOPE:STATE_RADIUS] = KALMAN_UNEVENNESS**2
         self.covariance[:] = np.diag(variances)
 
     def place(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set position and heading to known values with variances [m^2, rad^2]."""
-        self.covariance[: HEADING + 1] = 0.0
-        self.covariance[:, : HEADING + 1] = 0.0
+        self.covariance[: STATE_HEADING + 1] = 0.0
+        self.covariance[:, : STATE_HEADING + 1] = 0.0
         self.covariance[0, 0] = x
         self.covariance[1, 1] = y
-        self.covariance[HEADING, HEADING] = heading
+        self.covariance[STATE_HEADING, STATE_HEADING] = heading
 
     @property
     def biases(self) -> np.ndarray:
@@ -189,7 +197,7 @@ class WheelInertialFilter:
             (SCRUB_SHARE * rolled / period) ** 2 * scrub * (2.0 - scrub),
             self._noise / period + shaken,
             self._noise * imu_time + shaken * imu_time * imu_time,
-            UNEVEN**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
+            KALMAN_UNEVENNESS**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
         )
         kernel.predict(
             self.covariance, self.state, self.axes, _ORIGIN if arm is None else arm, heading, (turn, tilt_turn),
@@ -216,8 +224,8 @@ class WheelInertialFilter:
     def settle_tilt(self, time: float) -> None:
         """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
         if self._tilt:
-            variance = 2.0 * TILT_TIME / time * self._tilt
-            for which in (TILT, TILT + 1):
+            variance = 2.0 * TILT_TIME_CONSTANT / time * self._tilt
+            for which in (STATE_TILT, STATE_TILT + 1):
                 kernel.measure(self.covariance, self.state, which, 0.0, variance, self._half)
 
     def rest(self, angular: np.ndarray, time: float) -> None:

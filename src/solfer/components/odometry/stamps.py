@@ -8,16 +8,16 @@ FUTURE = 0.05
 FOREIGN = 0.1
 """Largest difference of the newest stamps of two sensors that both send [s]."""
 
-PERSISTENT = 0.2
+STAMP_PERSISTENT = 0.2
 """A clock was set, or is another, if its stamps jump or differ for so long [s]."""
 
-FORGET = 1.0
+STAMP_FORGETTING_TIME = 1.0
 """Time in which a smallest delay is forgotten: a simulation that is slower than real time falls behind [s]."""
 
-STEP = 0.02
+LONGEST_COUNTED = 0.02
 """Longest time that counts for that between two messages: what comes late after a stall comes together [s]."""
 
-KINDS = ("zero", "of the future", "of another clock", "older than the estimate")
+STAMP_KINDS = ("zero", "of the future", "of another clock", "older than the estimate")
 
 
 class StampCheck:
@@ -32,7 +32,7 @@ class StampCheck:
         offset: Time by which the stamps are behind those of the reference [s].
 
     Attributes:
-        refused: How many stamps of each of the `KINDS` were refused.
+        refused: How many stamps of each of the `STAMP_KINDS` were refused.
         complaint: What was wrong last, and the publisher; empty: nothing since it was emptied.
         first: The first stamp that was accepted [s].
         newest: Latest stamp that was accepted [s].
@@ -43,7 +43,7 @@ class StampCheck:
     def __init__(self, reference: "StampCheck | None" = None, offset: float = 0.0) -> None:
         self._reference = reference
         self._offset = offset
-        self.refused = dict.fromkeys(KINDS, 0)
+        self.refused = dict.fromkeys(STAMP_KINDS, 0)
         self.complaint = ""
         self._before = 0.0
         self.start()
@@ -71,7 +71,7 @@ class StampCheck:
         if not self._is_plausible(arrival - stamp, arrival):
             return self._refuse("of the future", sender)
         if not self._shares_clock(stamp + self._offset, arrival):
-            return arrival - self._apart >= PERSISTENT and self._refuse("of another clock", sender)
+            return arrival - self._apart >= STAMP_PERSISTENT and self._refuse("of another clock", sender)
         if stamp < after:
             return self._refuse("older than the estimate", sender)
         if math.isnan(self.first):
@@ -104,15 +104,15 @@ class StampCheck:
     def _is_plausible(self, delay: float, arrival: float) -> bool:
         """Return whether a delay is not much smaller than all before, or has been as small for long; note it."""
         if not delay < self._delay - FUTURE:
-            passed = min(max(arrival - self._before, 0.0), STEP)
+            passed = min(max(arrival - self._before, 0.0), LONGEST_COUNTED)
             known = delay if math.isnan(self._delay) else self._delay
-            self._delay = min(delay, known + (delay - known) * -math.expm1(-passed / FORGET))
+            self._delay = min(delay, known + (delay - known) * -math.expm1(-passed / STAMP_FORGETTING_TIME))
             self._before = arrival
             self._jumped = math.nan
             return True
         if math.isnan(self._jumped):
             self._jumped = arrival
-        if arrival - self._jumped < PERSISTENT:
+        if arrival - self._jumped < STAMP_PERSISTENT:
             return False
         self._delay = delay
         self._before = arrival

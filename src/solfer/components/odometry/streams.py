@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.imu_samples import CAPACITY, LAG, ImuSamples
+from solfer.components.odometry.imu_samples import CAPACITY, IMU_SAMPLES_LAG, ImuSamples
 from solfer.components.odometry.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.stamps import StampCheck
 from solfer.numerics.base_chart import BaseChart
 from solfer.robot import Robot
 
-AHEAD = 0.1
+IMU_LEAD = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
-MOVING = 0.05
+IMU_MOTION_SPEED = 0.05
 """Speed above which joints that stay where they were measure nothing: they are frozen [rad/s]."""
 
 
@@ -52,7 +52,7 @@ class _JointSamples:
         """Return whether joints that move, all positions and then all velocities, are where they were before."""
         if row.tobytes() != self.before.tobytes():  # a tenth of the time of a comparison by numpy
             return False
-        return float(np.abs(row[len(row) // 2 :]).max()) > MOVING
+        return float(np.abs(row[len(row) // 2 :]).max()) > IMU_MOTION_SPEED
 
 
 class Streams:
@@ -142,7 +142,7 @@ class Streams:
             return False
         time = float(waiting.stamps[0])
         is_covered = self._samples.newest >= time
-        if not is_covered and self._waited < LAG and waiting.newest - time < LAG:
+        if not is_covered and self._waited < IMU_SAMPLES_LAG and waiting.newest - time < IMU_SAMPLES_LAG:
             return False
         self.elapsed = self._period if math.isnan(self._time) else time - self._time
         self._time = time
@@ -159,7 +159,9 @@ class Streams:
             return
         state = self._robot.state
         state.position[6:], state.velocity[6:] = self._measurements.newest
-        self.ahead = min(max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, AHEAD)
+        self.ahead = min(
+            max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, IMU_LEAD
+        )
 
     def turned_since(self) -> np.ndarray | None:
         """Return how the base has turned since the last measurement, in its axes, shape (3, 3); None: not known."""
@@ -178,7 +180,7 @@ class Streams:
         self._waited += self._period
         measurements = self._measurements
         if measurements.is_frozen(measurements.newest.ravel()):
-            self.ahead = min(self._waited, AHEAD)
+            self.ahead = min(self._waited, IMU_LEAD)
             return False
         state = self._robot.state
         base = [state.position[3:6].tolist(), state.velocity[3:6].tolist()]

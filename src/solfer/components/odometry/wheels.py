@@ -11,7 +11,7 @@ from solfer.points import Handler, make_contact
 from solfer.points.contact.contacts import RollingContact
 from solfer.robot import Robot
 
-LEVEL = 1.0 - 1e-9
+LEVEL_AXLE = 1.0 - 1e-9
 
 
 class _Ground:
@@ -35,7 +35,7 @@ class _Ground:
         length = math.sqrt(x * x + y * y + z * z)
         self.normal[:] = x / length, y / length, z / length
         was_level = self.is_level
-        self.is_level = bool(self.normal[2] >= LEVEL)
+        self.is_level = bool(self.normal[2] >= LEVEL_AXLE)
         if self.is_level and not was_level:
             self._tilt(self.normal)
 

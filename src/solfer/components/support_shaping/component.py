@@ -18,7 +18,7 @@ from solfer.robot import Robot
 STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)
 """Tasks of the original."""
 
-SIZES = ("margins", "workspaces")
+WHEEL_SIZES = ("margins", "workspaces")
 """Tags of distances of each wheel."""
 
 SHAPING = ("margin_gain", "workspace_gain", "horizon", "recovery", "reactive_margin")
@@ -77,7 +77,7 @@ class SupportShaping(WheeledMotion):
         """Offer margins, workspaces and how they are kept, beside what `WheeledMotion` offers."""
         return (
             *super().live_parameters(),
-            *(LiveParameter((key,), self._take_sizes, self._sizes_of) for key in SIZES),
+            *(LiveParameter((key,), self._take_sizes, self._sizes_of) for key in WHEEL_SIZES),
             *(LiveParameter((key,), self._take_shaping, self._shaping_of) for key in SHAPING),
             LiveParameter(("warn_below",)),
         )
@@ -88,13 +88,13 @@ class SupportShaping(WheeledMotion):
         self.shaping.governor.speed = float(numbers[LIMITS.index("vertex_speed")])
 
     def _sizes_of(self, tags: SupportShapingTags) -> list[tuple[float, ...]]:
-        return [tags.each(key, len(self.wheels.links)) for key in SIZES]
+        return [tags.each(key, len(self.wheels.links)) for key in WHEEL_SIZES]
 
     def _shaping_of(self, tags: SupportShapingTags) -> list[float]:
         return [getattr(tags, key) for key in SHAPING]
 
     def _take_sizes(self, numbers: np.ndarray) -> None:
-        """Go on with other numbers of `SIZES`, shape (2, count) [m]."""
+        """Go on with other numbers of `WHEEL_SIZES`, shape (2, count) [m]."""
         self.shaping.governor.limits[:] = numbers
         if self.original is not None:
             self.original.program.limits[:] = numbers

@@ -8,13 +8,13 @@ import numpy as np
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.numerics.solvers.qp import QpSolver
 
-LOST, PATIENCE = 0.5, 1.0
+MISSED_SHARE, MISSED_TIME = 0.5, 1.0
 """Share of the way back to a limit that has to be missed, and for how long [s], before the limit counts as lost."""
 
-SLOWER, FASTER, SLOWEST = 2.0, 1.0, 0.2
+GOVERNOR_DECAY_RATE, GOVERNOR_RECOVERY_RATE, GOVERNOR_LOWEST_SPEED = 2.0, 1.0, 0.2
 """How fast the share of the motion falls and rises [1/s], and the least one where it only slows down."""
 
-SMALL = 1e-6
+GOVERNOR_SMALLNESS = 1e-6
 """Difference of velocities that changes nothing [m/s]."""
 
 
@@ -111,7 +111,7 @@ class SupportGovernor:
         count = len(margins)
         self.limits = np.array((margins, workspaces))
         self.speed = speed
-        self._least = 0.0 if holds else SLOWEST
+        self._least = 0.0 if holds else GOVERNOR_LOWEST_SPEED
         self.velocities = np.zeros((count, 2))
         self._desired, self._reached, self._missed = np.zeros((3, 2 * count))
         self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
@@ -167,7 +167,7 @@ class SupportGovernor:
             self._missed[:] = 0.0
         else:
             self._solve()
-        step = self._period * (-SLOWER if self.infeasible.any() else FASTER)
+        step = self._period * (-GOVERNOR_DECAY_RATE if self.infeasible.any() else GOVERNOR_RECOVERY_RATE)
         self.share = min(max(self.share + step, self._least), 1.0)
 
     def _solve(self) -> None:
@@ -189,11 +189,11 @@ class SupportGovernor:
             return
         self.velocities.ravel()[:] = x[:size]
         np.dot(self._matrix, x[:size], out=self._reached)
-        np.less(self._reached, demand + SMALL, out=self.active)
-        is_missed = (x[size:] > LOST * demand) & (demand > SMALL)
+        np.less(self._reached, demand + GOVERNOR_SMALLNESS, out=self.active)
+        is_missed = (x[size:] > MISSED_SHARE * demand) & (demand > GOVERNOR_SMALLNESS)
         np.add(self._missed, self._period, out=self._missed)
         self._missed[~is_missed] = 0.0
-        if self._missed.max() > PATIENCE:
+        if self._missed.max() > MISSED_TIME:
             np.less(self.reserves, 0.0, out=self.infeasible)
 
 
@@ -273,5 +273,5 @@ class Reaction:
             vx = vx * self._speed / speed
             vy = vy * self._speed / speed
         self.velocity = (vx, vy)
-        self.is_active = speed > SMALL
+        self.is_active = speed > GOVERNOR_SMALLNESS
         return self.velocity

@@ -17,7 +17,7 @@ from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.robot import Robot
 from solfer.tasks.task import DAMPING_COLUMN
 
-MOVING = 1e-4
+VERTEX_MOTION_SPEED = 1e-4
 """Speed of a vertex from which its reference moves [m/s]."""
 
 
@@ -52,7 +52,7 @@ class WorldVertices:
         """Move references along the directions of rolling, shape (count, 2), by velocities of the vertices [m/s]."""
         along = (velocities * directions).sum(axis=1)
         for index in range(len(along)):
-            if np.hypot(*velocities[index]) > MOVING:
+            if np.hypot(*velocities[index]) > VERTEX_MOTION_SPEED:
                 self.references[index] += period * along[index] * directions[index]
 
     def see(self, places: np.ndarray, directions: np.ndarray, jacobians: np.ndarray) -> None:

@@ -12,7 +12,7 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
-RATE = 20.0
+REPORT_RATE = 20.0
 """Messages in a second [Hz]."""
 
 
@@ -43,7 +43,7 @@ class MarginsReport:
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz]."""
-        self._left = self._between = max(round(rate / RATE), 1)
+        self._left = self._between = max(round(rate / REPORT_RATE), 1)
 
     def start(self, edges: Sequence[tuple[int, int]]) -> None:
         """Begin with edges of the polygon between wheels."""

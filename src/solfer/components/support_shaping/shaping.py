@@ -10,7 +10,7 @@ from solfer.components.wheeled_motion.references import KeptVelocities, Referenc
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.robot import Robot
 
-FASTEST = 1.5
+POLYGON_TOP_SPEED = 1.5
 """Largest speed of the polygon under a robot that is pushed [m/s]."""
 
 
@@ -49,7 +49,7 @@ class FootprintShaping:
             speed=tags.vertex_speed,
             holds=tags.infeasible == "hold",
         )
-        self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
+        self.reaction = Reaction(count, tags.reactive_margin, POLYGON_TOP_SPEED)
         self.report = MarginsReport(name, wheels.links, self.governor, edges=self.measure.polygon.edges)
 
     def start(self) -> None:

@@ -9,17 +9,17 @@ from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.turns import whole_turns
 from solfer.numerics.via_points import ViaPoints
 
-LONGEST = 1000
+TRAJECTORY_POINTS = 1000
 """Points of a trajectory; checking more would take too long between two cycles."""
 
-LATEST = 60.0
+LATEST_BEGIN = 60.0
 """Longest time until a trajectory begins [s]; one that begins later has a stamp of another clock."""
 
-_SLACK = 1e-6
+_TRAJECTORY_SLACK = 1e-6
 """Relative slack of limits, for numbers that were printed and read again."""
 
 
-REACHED = 1e-2
+TRAJECTORY_REACH_TOLERANCE = 1e-2
 """How far joints may be from the end of a trajectory whose points have all passed, so that it is complete [rad, m]."""
 
 _INSTANT = 1e-3
@@ -104,8 +104,8 @@ class TrajectoryCheck:
             raise ComponentError("points with efforts", expected="positions, velocities and accelerations: no effort")
         stamp = trajectory.header.stamp
         elapsed = now - stamp if stamp else 0.0
-        if elapsed < -LATEST:
-            raise ComponentError(f"the trajectory begins in {-elapsed:.6g} s", expected=f"{LATEST:g} s at most")
+        if elapsed < -LATEST_BEGIN:
+            raise ComponentError(f"the trajectory begins in {-elapsed:.6g} s", expected=f"{LATEST_BEGIN:g} s at most")
         rows = [self._row(trajectory, kind) for kind in ("positions", "velocities", "accelerations")]
         left = times > elapsed
         if rows[0] is not None:
@@ -113,8 +113,8 @@ class TrajectoryCheck:
             rows[0] += whole_turns(start - first, self._turns[places])
         if not left.any():
             last = rows[0]
-            reached = last is not None and np.abs(last[-1] - measured).max() <= REACHED
-            if not reached or np.abs(velocity).max() > _SLACK:
+            reached = last is not None and np.abs(last[-1] - measured).max() <= TRAJECTORY_REACH_TOLERANCE
+            if not reached or np.abs(velocity).max() > _TRAJECTORY_SLACK:
                 raise StaleTrajectory(
                     f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
                     expected="a point in the future, or joints that are there already, at rest",
@@ -129,7 +129,7 @@ class TrajectoryCheck:
                 "points without positions, or with accelerations and without velocities",
                 expected="positions; with velocities; with both and accelerations",
             )
-        if velocities is not None and np.abs(velocities[-1]).max() > _SLACK:
+        if velocities is not None and np.abs(velocities[-1]).max() > _TRAJECTORY_SLACK:
             index = int(np.abs(velocities[-1]).argmax())
             raise ComponentError(
                 f"joint '{trajectory.joint_names[index]}' moves at {velocities[-1, index]:.6g} rad/s at the last point",
@@ -168,8 +168,8 @@ class TrajectoryCheck:
 
     @staticmethod
     def _times(points: Sequence[TrajectoryPoint]) -> np.ndarray:
-        if len(points) > LONGEST:
-            raise ComponentError(f"a trajectory of {len(points)} points", expected=f"{LONGEST} at most")
+        if len(points) > TRAJECTORY_POINTS:
+            raise ComponentError(f"a trajectory of {len(points)} points", expected=f"{TRAJECTORY_POINTS} at most")
         times = np.array([point.time_from_start for point in points], dtype=float)
         if not np.isfinite(times).all():
             raise NotFinite("a time of the trajectory is not a finite number")
@@ -206,9 +206,13 @@ class TrajectoryCheck:
         lowest, highest, fastest = motion.extremes()
         lower = np.minimum(self._lower[places], start)
         upper = np.maximum(self._upper[places], start)
-        self._require(places, lowest, lambda value, index: value >= lower[index] - _SLACK, what="position", unit="rad")
-        self._require(places, highest, lambda value, index: value <= upper[index] + _SLACK, what="position", unit="rad")
-        limits = self._speed[places] * (1.0 + _SLACK)
+        self._require(
+            places, lowest, lambda value, index: value >= lower[index] - _TRAJECTORY_SLACK, what="position", unit="rad"
+        )
+        self._require(
+            places, highest, lambda value, index: value <= upper[index] + _TRAJECTORY_SLACK, what="position", unit="rad"
+        )
+        limits = self._speed[places] * (1.0 + _TRAJECTORY_SLACK)
         self._require(places, fastest, lambda value, index: value <= limits[index], what="speed", unit="rad/s")
 
     def _require(

@@ -20,8 +20,15 @@ from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
 from solfer.components.wheeled_motion.references import References, about_z
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, WeightShift
-from solfer.components.wheeled_motion.tags import CAMBER, CASTER, POINTS, DrivingTags, SteeringRecord, WheeledMotionTags
+from solfer.components.wheeled_motion.support import LIFTING_TIMEOUT, Lifting, MotionGuard, SupportPolygon, WeightShift
+from solfer.components.wheeled_motion.tags import (
+    CAMBER,
+    CASTER,
+    TASK_POINTS,
+    DrivingTags,
+    SteeringRecord,
+    WheeledMotionTags,
+)
 from solfer.components.wheeled_motion.targets import BASE_PORT, VERTICES_PORT, Targets, WheelsSupport
 from solfer.components.wheeled_motion.tasks import DrivingTasks
 from solfer.components.wheeled_motion.wheels import DrivenWheels, moved_by
@@ -38,7 +45,7 @@ LIMITS = (
 )
 """Tags of limits that change together: speeds, accelerations, corrections, margins."""
 
-HELD = 0.02
+HOLD_PACE = 0.02
 """Pace below which joints and bounds hold the robot where it is."""
 
 
@@ -198,8 +205,8 @@ class WheeledMotion(Component):
             place[:2] = self.model.center_of_mass.value[:2]
         references.start(place, wheels.offsets.heading, wheels.pose.value[3:])
         references.vertices[:] = wheels.offsets.reference
-        references.camber[:] = wheels.points[POINTS[CAMBER]].value
-        references.caster[:] = wheels.points[POINTS[CASTER]].value
+        references.camber[:] = wheels.points[TASK_POINTS[CAMBER]].value
+        references.caster[:] = wheels.points[TASK_POINTS[CASTER]].value
         if self.tags.is_original:
             references.caster[references.caster <= -ROUNDED] += ROUNDED_TURN - 2.0 * ROUNDED
 
@@ -245,7 +252,7 @@ class WheeledMotion(Component):
         """Shorten a motion that may not go on, and log why where it comes to rest."""
         last = self.tasks.descent.last
         guard = self._guard
-        if guard.update(self.references.pace, last >= 0, step) and self._pace.held < HELD:
+        if guard.update(self.references.pace, last >= 0, step) and self._pace.held < HOLD_PACE:
             guard.warn(self.name, self.model.dofs[last])
 
     def move_world(self, move: PlanarMove) -> None:
@@ -301,7 +308,7 @@ class WheeledMotion(Component):
                 LiftContacts,
                 reply=LiftReply,
                 handler=self._lifting.lift,
-                timeout=TIMEOUT,
+                timeout=LIFTING_TIMEOUT,
             ),
             Service(
                 "get_reference", "solfer/GetReference", GetReference, reply=ReferenceReply, handler=self.get_reference

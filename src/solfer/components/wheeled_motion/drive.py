@@ -8,17 +8,17 @@ import numpy as np
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, follow
 from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.targets import PATIENCE, check
+from solfer.components.wheeled_motion.targets import TARGETS_PATIENCE, check
 from solfer.errors import ComponentError, NotFinite
 from solfer.numerics.planar_move import PlanarMove
 
-LATE = 0.1
+DRIVE_LATENESS = 0.1
 """Time of acceleration beyond which a first velocity is one in the middle of a motion [s]."""
 
 SPIKE = 0.01
 """Share of a velocity that the base may do below which it is a fault of the sender: the one before goes on."""
 
-REACHED = 0.99
+DRIVE_REACH_TOLERANCE = 0.99
 """Share of such a velocity at which the drive has reached it."""
 
 
@@ -83,7 +83,7 @@ class Drive:
     @property
     def is_abandoned(self) -> bool:
         """Whether it brakes since no velocity comes any more, though the last one was to go on."""
-        return self.is_active and self._state[AGE] > PATIENCE and bool(self._state[:IN_WORLD].any())
+        return self.is_active and self._state[AGE] > TARGETS_PATIENCE and bool(self._state[:IN_WORLD].any())
 
     def displace(self, move: PlanarMove) -> None:
         """Go on as seen from the base, whose estimate has jumped."""
@@ -133,7 +133,7 @@ class Drive:
         self._state[:BEFORE] = *velocity, turn, in_world, 0.0
         if not self.is_active:
             change, turn_change = self._limits
-            is_late = math.hypot(*velocity) > LATE * change or abs(turn) > LATE * turn_change
+            is_late = math.hypot(*velocity) > DRIVE_LATENESS * change or abs(turn) > DRIVE_LATENESS * turn_change
             self.progress = 0.0 if is_late else 1.0
         self.is_active = True
 
@@ -150,7 +150,7 @@ class Drive:
             return
         change, turn_change = self._limits
         given = self._state, references.velocity, references.turn, heading, share
-        if follow(*given, passed, PATIENCE, change * passed, turn_change * passed):
+        if follow(*given, passed, TARGETS_PATIENCE, change * passed, turn_change * passed):
             self.start()
         elif self.progress < 1.0:
             self._measure_progress(references, share)
@@ -163,4 +163,4 @@ class Drive:
             progress = math.hypot(*references.velocity.tolist()) / speed
         if rate := share * abs(turn):
             progress = min(progress, abs(references.turn.item(2)) / rate)
-        self.progress = 1.0 if progress > REACHED else progress
+        self.progress = 1.0 if progress > DRIVE_REACH_TOLERANCE else progress

@@ -6,7 +6,7 @@ from solfer.components.wheeled_motion.drive import Drive
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.support.straight import StraightAhead
 from solfer.components.wheeled_motion.tags import DrivingTags
-from solfer.components.wheeled_motion.targets import BASE_PORT, PATIENCE, Targets
+from solfer.components.wheeled_motion.targets import BASE_PORT, TARGETS_PATIENCE, Targets
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.throttle import Throttle
 
@@ -84,7 +84,9 @@ class ReferenceInputs:
         were_abandoned = self.are_abandoned
         if were_abandoned:
             what = "position" if self.targets.are_places_abandoned else "velocity"
-            self._throttle.warning("silence", "%s: no %s for %.2f s, it comes to rest", self._name, what, PATIENCE)
+            self._throttle.warning(
+                "silence", "%s: no %s for %.2f s, it comes to rest", self._name, what, TARGETS_PATIENCE
+            )
         self.drive.update(self._references, self._wheels.offsets.heading, self.share, passed)
         self.targets.update(self._references, self.share, passed)
         return were_abandoned and not self.are_abandoned and not self._references.waits

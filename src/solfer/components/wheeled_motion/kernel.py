@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
-from solfer.components.wheeled_motion.original.kernel import PERIOD, RESTING, merge, nearest
+from solfer.components.wheeled_motion.original.kernel import ORIGINAL_HALF_TURN, ORIGINAL_REST_ERROR, merge, nearest
 from solfer.numerics.compilation import cached, digest, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
-SMALL, AWAKE, PERSISTENT = 2.5e-3, 4e-3, 0.3
+STEERING_SMALLNESS, AWAKE, STEERING_PERSISTENT = 2.5e-3, 4e-3, 0.3
 """Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is desired [m], after the
 third number [s]: an estimate of the base that is late for a moment would turn wheels on the spot, and they the base."""
 
@@ -18,11 +18,11 @@ LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
 range another way has to end [rad]."""
 
-STANDING, TURNING = 0.15, 0.1
+STANDING_SHARE, STEERING_TURN_SHARE = 0.15, 0.1
 """Share of `turn_correction` of a base that is not to turn, and of the rate at which it is to turn: a gyroscope with a
 wrong scale or sign cannot turn the robot much faster than commanded."""
 
-AHEAD = 4.0
+STEERING_LEAD = 4.0
 """Cycles before the end of its range at which a wheel begins the other way."""
 
 PACE, LIMITS, HEADING, WAITS = range(4)
@@ -45,12 +45,12 @@ LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *TUNED, "period")])
 _MERGED = ("motion", "motion_speed", "error", "error_speed")
 _KEPT = ("rest", "turn_left", "desired", "turn")
 
-WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
+WHEEL_DTYPE = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
 """State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
 [rad, m/s]; whether it rests, 1 or less as its error persists, how far it has to turn [rad], the desired direction of
 its contact point, and its rate."""
 
-WHEELS = np.dtype(
+WHEELS_DTYPE = np.dtype(
     [
         *((name, np.int64) for name in ("count", "dofs", "rows")),
         # addresses of the steering: its law, states of the wheels, place and heading of the last cycle, and these rows
@@ -79,9 +79,9 @@ WHEELS = np.dtype(
 )
 """What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
 
-_wheels_at = record_at(WHEELS)
+_wheels_at = record_at(WHEELS_DTYPE)
 _law_at = record_at(LAW)
-_states_at = records_at(WHEEL)
+_states_at = records_at(WHEEL_DTYPE)
 
 
 @part
@@ -99,7 +99,7 @@ def _turn(wheel, wx, wy, period):
         return
     desired = math.atan2(wy, wx)
     # of a vertex that has just been at rest nothing is known
-    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(desired - wheel.desired, PERIOD) / period
+    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(desired - wheel.desired, ORIGINAL_HALF_TURN) / period
     wheel.desired = desired
 
 
@@ -110,14 +110,14 @@ def _keep(wheel, law, wx, wy, ex, ey):
     _turn(wheel, wx, wy, law.period)
     if wx != 0.0 or wy != 0.0:
         wheel.rest = 0.0
-    elif distance < (AWAKE if wheel.rest > 0.0 else SMALL):
+    elif distance < (AWAKE if wheel.rest > 0.0 else STEERING_SMALLNESS):
         wheel.rest = 1.0
     else:
-        wheel.rest = max(wheel.rest - law.period / PERSISTENT, 0.0)
+        wheel.rest = max(wheel.rest - law.period / STEERING_PERSISTENT, 0.0)
     if wheel.rest > 0.0:
         wheel.aim = wheel.angle
         return
-    gain = law.across * (1.0 - RESTING / distance) if distance > RESTING else 0.0
+    gain = law.across * (1.0 - ORIGINAL_REST_ERROR / distance) if distance > ORIGINAL_REST_ERROR else 0.0
     x = wx + gain * ex
     y = wy + gain * ey
     wheel.aim = nearest(math.atan2(y, x), wheel.angle)
@@ -232,17 +232,17 @@ def _choose_turns(wheels, angles, desired, rows, turning, measured, position, ve
         turn_left = wheels[index].turn_left
         row = rows[index, dof]
         place = measured[dof]
-        turn_left += _wrapped(desired[index] - angles[index] - turn_left, PERIOD)
+        turn_left += _wrapped(desired[index] - angles[index] - turn_left, ORIGINAL_HALF_TURN)
         further = position[dof] + velocity[dof] * ahead
         end = place + turn_left * row
         is_inside = lower[dof] < end < upper[dof]
         is_next_inside = lower[dof] < further < upper[dof]
         # what leaves the range shows which of the two others is the way back
         toward = (further - position[dof]) * row if is_inside and not is_next_inside else turn_left
-        other = turn_left - math.copysign(PERIOD, toward)
+        other = turn_left - math.copysign(ORIGINAL_HALF_TURN, toward)
         other_end = place + other * row
         is_inside = is_inside and is_next_inside
-        is_long = abs(turn_left) > PERIOD / 2.0 + LONGER
+        is_long = abs(turn_left) > ORIGINAL_HALF_TURN / 2.0 + LONGER
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             turn_left = other
         wheels[index].turn_left = turn_left
@@ -285,7 +285,7 @@ def _find_errors(start):
             turning = indices_at(memory.turning_dofs, count)
             position = vector_at(memory.position, dofs)
             velocity = vector_at(memory.velocity, dofs)
-            ahead = AHEAD * _law_at(memory.law).period
+            ahead = STEERING_LEAD * _law_at(memory.law).period
             wheels = _states_at(memory.wheels, count)
             angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
@@ -434,7 +434,10 @@ def _find_rates(start, is_paced, feeds_forward):
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration
             turn_most = memory.turn_correction
-            turn_most = min(turn_most, STANDING * turn_most + TURNING * abs(matrix_at(memory.motion, 3, 3)[TURN][2]))
+            turn_most = min(
+                turn_most,
+                STANDING_SHARE * turn_most + STEERING_TURN_SHARE * abs(matrix_at(memory.motion, 3, 3)[TURN][2]),
+            )
             _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
             _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import LAW, TUNED, WHEEL
+from solfer.components.wheeled_motion.kernel import LAW, TUNED, WHEEL_DTYPE
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 
-RELAXATION = 1e-3
+STEERING_RELAXATION = 1e-3
 """Way within which a wheel's direction follows that of its vertex, where errors across it count [m]."""
 
 
@@ -44,8 +44,8 @@ class Steering:
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         self._given = period
         self._step = period
-        self.law = np.array((across, period / RELAXATION, rests, *self.numbers(tuning), period), dtype=LAW)
-        self.wheels = np.zeros(count, WHEEL)
+        self.law = np.array((across, period / STEERING_RELAXATION, rests, *self.numbers(tuning), period), dtype=LAW)
+        self.wheels = np.zeros(count, WHEEL_DTYPE)
         self.before = np.zeros(3)
         self.steered = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.steered
@@ -64,7 +64,7 @@ class Steering:
         """Set the time since the cycle before [s]."""
         if step != self._step:
             self._step = step
-            self.law["rate"] = step / RELAXATION
+            self.law["rate"] = step / STEERING_RELAXATION
             self.law["period"] = step
 
     def measure(self, directions: np.ndarray) -> None:
@@ -89,7 +89,7 @@ class Steering:
         self.before[2] = heading
         self.wheels["turn_left"] = 0.0
         if angles is not None:
-            self.wheels[:] = np.zeros((), WHEEL)
+            self.wheels[:] = np.zeros((), WHEEL_DTYPE)
             for direction in ("angle", "aim", "motion", "error"):
                 np.subtract(angles, heading, out=self.wheels[direction])
         self.wheels["desired"] = np.nan

@@ -25,13 +25,13 @@ SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 SOFT_PACED = 0.2
 """That of the steering with `pace`, where the motion waits for its wheels [rad]."""
 
-POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
+TASK_POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
 """Points of the component, by the tasks that they belong to."""
 
 IMPROVED = ("rest", "across", "pace")
 """Tags of the improved law alone."""
 
-_OTHERS = "only `support_shaping` and `NwheelsZMPII` read it"
+_TASK_OTHERS = "only `support_shaping` and `NwheelsZMPII` read it"
 _UNREAD = "nothing reads it, in the original neither"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -211,7 +211,7 @@ class DrivingTags(OriginalTaskTags):
         Raises:
             SolferError: A tag is missing, or contradicts another.
         """
-        known = {name: TaskRecord(point=point) for name, point in POINTS.items()}
+        known = {name: TaskRecord(point=point) for name, point in TASK_POINTS.items()}
         known[CONSTRAINTS] = TaskRecord(point="rolling", link=self.track)
         known[STEERING] = TaskRecord(point="steering", link=self.track)
         record = translated(self, known, chain=self.chain)
@@ -231,7 +231,7 @@ class DrivingTags(OriginalTaskTags):
 class WheeledMotionTags(DrivingTags):
     """Tags of the component `wheeled_motion`."""
 
-    margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    workspaces: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    margin_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    workspace_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    margins: Any = Field(default=None, deprecated=_TASK_OTHERS, description="obsolete")
+    workspaces: Any = Field(default=None, deprecated=_TASK_OTHERS, description="obsolete")
+    margin_gain: Any = Field(default=None, deprecated=_TASK_OTHERS, description="obsolete")
+    workspace_gain: Any = Field(default=None, deprecated=_TASK_OTHERS, description="obsolete")

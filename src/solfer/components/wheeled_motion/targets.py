@@ -13,13 +13,13 @@ from solfer.components.wheeled_motion.references import References
 from solfer.errors import ComponentError, NotFinite, SizeMismatch
 from solfer.numerics.planar_move import PlanarMove
 
-PATIENCE = 0.55
+TARGETS_PATIENCE = 0.55
 """Time after the last velocity, or the last place of a stream, when what it drives begins to stop [s]."""
 
 LEAD = 0.5
 """Time by whose way places are ahead of a motion that is to be followed without a lag [s]."""
 
-JUMPS = (0.3, 0.5, 0.3)
+STREAM_JUMPS = (0.3, 0.5, 0.3)
 """Distances between two places of a stream from which on one is a mistake: of base, heading, vertices [m, rad, m]."""
 
 BASE_PORT, VERTICES_PORT, VELOCITIES_PORT = "base", "vertices", "vertex_velocities"
@@ -56,11 +56,11 @@ class Stream:
     @property
     def is_abandoned(self) -> bool:
         """Whether no more places come, though the last ones moved."""
-        return self.is_followed and self.is_moving and self.age > PATIENCE
+        return self.is_followed and self.is_moving and self.age > TARGETS_PATIENCE
 
     def note(self, step: float) -> None:
         """Take over a place that is so far from the one before [m or rad]."""
-        self.is_moving = self.is_followed and self.age <= PATIENCE and step > 0.0
+        self.is_moving = self.is_followed and self.age <= TARGETS_PATIENCE and step > 0.0
         self.age = 0.0
         self.is_followed = True
 
@@ -114,7 +114,7 @@ class Targets:
     @property
     def is_abandoned(self) -> bool:
         """Whether base or vertices brake since nothing comes any more, though the last ones were to go on."""
-        return self.are_places_abandoned or (PATIENCE < self._age < math.inf and bool(self._desired.any()))
+        return self.are_places_abandoned or (TARGETS_PATIENCE < self._age < math.inf and bool(self._desired.any()))
 
     @property
     def are_places_abandoned(self) -> bool:
@@ -211,14 +211,14 @@ class Targets:
         most = self._limits[2, 1] * passed
         np.multiply(self._desired, share, out=self._change)
         np.subtract(self._change, velocity, out=self._change)
-        if self._age > PATIENCE:
+        if self._age > TARGETS_PATIENCE:
             np.negative(velocity, out=self._change)
         for change in self._change:
             size = math.sqrt(float(change.dot(change)))
             if size > most:
                 change *= most / size
         velocity += self._change
-        if self._age > PATIENCE and not velocity.any():
+        if self._age > TARGETS_PATIENCE and not velocity.any():
             self._age = math.inf
             self.share = 1.0
 
@@ -229,7 +229,11 @@ class Targets:
         heading = heading_of(pose)
         step = float(np.linalg.norm(pose[:3] - self._places[0]))
         turn = abs(math.remainder(heading - self._places[1, 2], math.tau))
-        if self._base.is_moving and self._base.age <= PATIENCE and (step > JUMPS[0] or turn > JUMPS[1]):
+        if (
+            self._base.is_moving
+            and self._base.age <= TARGETS_PATIENCE
+            and (step > STREAM_JUMPS[0] or turn > STREAM_JUMPS[1])
+        ):
             return f"'{BASE_PORT}' jumps by {step:.2f} m and {turn:.2f} rad"
         self._base.note(step + turn)
         self._places[0] = pose[:3]
@@ -239,7 +243,7 @@ class Targets:
     def _aim_vertices(self, places: np.ndarray) -> str:
         """Take over desired places of the vertices, z for lifted ones only; return what is wrong with them."""
         step = float(np.linalg.norm(places - self._places[2:], axis=1).max())
-        if self._vertices.is_moving and self._vertices.age <= PATIENCE and step > JUMPS[2]:
+        if self._vertices.is_moving and self._vertices.age <= TARGETS_PATIENCE and step > STREAM_JUMPS[2]:
             return f"'{VERTICES_PORT}' jump by {step:.2f} m"
         self._age = math.inf
         self._vertices.note(step)

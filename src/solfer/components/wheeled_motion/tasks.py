@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
-from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, steer
-from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED
+from solfer.components.wheeled_motion.kernel import WHEELS_DTYPE, find_errors, find_rates, steer
+from solfer.components.wheeled_motion.original.kernel import ORIGINAL_HALF_TURN, ROUNDED
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import TaskRates
@@ -15,10 +15,10 @@ from solfer.components.wheeled_motion.tags import (
     CAMBER,
     CASTER,
     CONSTRAINTS,
-    POINTS,
     SOFT,
     SOFT_PACED,
     STEERING,
+    TASK_POINTS,
     VERTICES,
     DrivingTags,
 )
@@ -91,7 +91,7 @@ class DrivingTasks:
         points = wheels.points
         first = {name: rows.start for name, rows in self.rows.items()}
         self.numbers = Memory(
-            WHEELS,
+            WHEELS_DTYPE,
             count=len(wheels.links),
             dofs=self._robot.size,
             rows=len(self.gain),
@@ -114,15 +114,15 @@ class DrivingTasks:
             pose=wheels.pose.value,
             center=wheels.place if tags.base == "center_of_mass" else wheels.pose.value,
             place=wheels.place,
-            camber=points[POINTS[CAMBER]].value,
-            caster=points[POINTS[CASTER]].value,
+            camber=points[TASK_POINTS[CAMBER]].value,
+            caster=points[TASK_POINTS[CASTER]].value,
             turning_dofs=wheels.steering,
             measured=self._robot.state.position,
             position=joints.position,
             velocity=joints.velocity,
             lower=self.bounds.lower_position if self._feeds_forward else 0,
             upper=self.bounds.upper_position if self._feeds_forward else 0,
-            **{f"of_{rows}": first.get(task, -1) for task, rows in (*POINTS.items(), (STEERING, "steering"))},
+            **{f"of_{rows}": first.get(task, -1) for task, rows in (*TASK_POINTS.items(), (STEERING, "steering"))},
             steering_rows=self.stack.jacobian[self.rows[STEERING]] if STEERING in first else 0,
             aims=self.aims,
             most=np.array([SOFT_PACED if tags.is_paced else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
@@ -131,7 +131,7 @@ class DrivingTasks:
             rates=self.stack.velocity,
             away=self.rates.away,
             forward=self.rates.forward,
-            half=PERIOD if self._feeds_forward else ROUNDED,
+            half=ORIGINAL_HALF_TURN if self._feeds_forward else ROUNDED,
         )
         self.limit(tags.speeds, tags.accelerations, (tags.correction, tags.turn_correction, tags.furthest))
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, STEERING, VERTICES, DrivingTags
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, STEERING, TASK_POINTS, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.numerics.planar_move import PlanarMove
@@ -41,7 +41,7 @@ class DrivenWheels:
         self.links = [wheel.end_frame for wheel in self.contacts]
         self.pose = SpatialPoint(robot.kinematics.base_link, robot)
         self.points = make_points(robot, tags, self.contacts, pose=self.pose)
-        self.offsets: RollingOffsets = self.points[POINTS[VERTICES]]  # type: ignore[assignment]
+        self.offsets: RollingOffsets = self.points[TASK_POINTS[VERTICES]]  # type: ignore[assignment]
         steered = any(STEERING in level for level in tags.stack_record().levels)
         dofs = [steered_by(robot, tags, wheel) for wheel in self.contacts] if steered else []
         self.steering = np.array(dofs, dtype=int)
@@ -49,12 +49,12 @@ class DrivenWheels:
     @property
     def place(self) -> np.ndarray:
         """Place of the base that is tracked, shape (3,) [m]; live."""
-        return self.points[POINTS[BASE]].value[3:]
+        return self.points[TASK_POINTS[BASE]].value[3:]
 
     @property
     def center(self) -> CenterOfMass:
         """Centre of mass, up to date with the points."""
-        return self.points[POINTS[BASE]].center  # type: ignore[attr-defined]
+        return self.points[TASK_POINTS[BASE]].center  # type: ignore[attr-defined]
 
     @property
     def is_whole(self) -> bool:
@@ -122,10 +122,10 @@ def make_points(
     carriers = [carrier_of(robot, link) for link in links]
     carried = np.array([_carried_axle(robot, tags, *each) for each in zip(carriers, links, axles, strict=True)])
     return {
-        POINTS[BASE]: BasePose(robot, pose, CenterOfMass(robot), is_tracked=tags.base == "center_of_mass"),
-        POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose=pose, is_late=tags.is_original),
-        POINTS[CAMBER]: Camber(robot, links, axles),
-        POINTS[CASTER]: Caster(robot, carriers, carried),
+        TASK_POINTS[BASE]: BasePose(robot, pose, CenterOfMass(robot), is_tracked=tags.base == "center_of_mass"),
+        TASK_POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose=pose, is_late=tags.is_original),
+        TASK_POINTS[CAMBER]: Camber(robot, links, axles),
+        TASK_POINTS[CASTER]: Caster(robot, carriers, carried),
     }
 
 

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from solfer.config.records.pipes import (
-    COMMAND,
+    JOINT_COMMAND,
     LOWER_LEVEL_LAYERS,
     Content,
     ControllerRecord,
@@ -14,7 +14,7 @@ from solfer.config.records.pipes import (
 MEASUREMENT = "sensor_msgs/JointState"
 """Message of joints that a lower level measures."""
 
-CONTENT = Content(
+JOINT_CONTENT = Content(
     joints=True, measures=True, needed=("function",), online={"state": "joint_states", "motor": "motor_states"}
 )
 
@@ -22,19 +22,19 @@ CONTENT = Content(
 class JointFeedbackRecord(FeedbackRecord):
     """Joints that a plugin receives: DoFs of a State."""
 
-    content: ClassVar[Content] = CONTENT
+    content: ClassVar[Content] = JOINT_CONTENT
 
     @property
     def default_message(self) -> str:
         """See `PipeRecord.default_message`; the lower level publishes measurements."""
         measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
-        return MEASUREMENT if measured and self.interface.measurable else COMMAND
+        return MEASUREMENT if measured and self.interface.measurable else JOINT_COMMAND
 
 
 class JointCommandRecord(ControllerRecord):
     """Joints that a plugin publishes, or commands."""
 
-    content: ClassVar[Content] = CONTENT
+    content: ClassVar[Content] = JOINT_CONTENT
 
 
-RECORDS = KindRecords(JointFeedbackRecord, JointCommandRecord)
+JOINT_RECORDS = KindRecords(JointFeedbackRecord, JointCommandRecord)

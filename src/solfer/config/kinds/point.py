@@ -22,7 +22,7 @@ QUANTITIES = {
 }
 """Quantities of a Robot Point, with their count of numbers; linear before angular, quaternions (x, y, z, w)."""
 
-MESSAGES = {
+POINT_MESSAGES = {
     "position": "geometry_msgs/PointStamped",
     "orientation": "geometry_msgs/QuaternionStamped",
     "pose": "geometry_msgs/PoseStamped",
@@ -44,7 +44,7 @@ WITHOUT_MEANING = ("convention", "filter", "calibration", "offset_position", "of
 """Keys of other pipes that a Point or a contact cannot have."""
 
 
-ORIENTED = ("orientation", "pose")
+ORIENTED_QUANTITIES = ("orientation", "pose")
 """Quantities with an orientation, which has conventions."""
 
 
@@ -95,7 +95,7 @@ class PointTags(Record):
             if angles is not None:
                 raise ValueError("'output_angles' without angles; expected convention.orientation.type: EULER")
             return
-        if self.quantity not in ORIENTED:
+        if self.quantity not in ORIENTED_QUANTITIES:
             raise ValueError(f"a Point of the quantity '{self.quantity}' has no conventions; it has no orientation")
         if self.convention.twist.frame is not None:
             raise ValueError("a Point has no 'convention.twist'; its axes are those of the tag 'interface'")
@@ -121,7 +121,7 @@ class PointTags(Record):
         """See `PipeRecord.default_message`."""
         if self.size is not None:
             return SEVERAL
-        return MESSAGES["velocity" if self.euler else self.quantity]
+        return POINT_MESSAGES["velocity" if self.euler else self.quantity]
 
     @property
     def carried(self) -> tuple[str, ...]:
@@ -152,4 +152,4 @@ class PointControllerRecord(PointTags, ControllerRecord):
     """Points that a plugin publishes: an output of its component."""
 
 
-RECORDS = KindRecords(PointFeedbackRecord, PointControllerRecord, PointTags, title="Points")
+POINT_RECORDS = KindRecords(PointFeedbackRecord, PointControllerRecord, PointTags, title="Points")

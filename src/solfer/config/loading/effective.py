@@ -15,7 +15,7 @@ from solfer.config.yaml.search import anchored
 
 _PLAIN = re.compile(r"[A-Za-z_/$][A-Za-z0-9_/.+$()<>~ -]*(?<! )")
 _SWITCHES = frozenset(("yes", "no", "on", "off", "y", "n"))  # booleans of YAML 1.1, which other readers know
-_SPECIAL = re.compile(r'["\\]|[^\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
+_YAML_SPECIAL = re.compile(r'["\\]|[^\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
 _ORIGIN_COLUMN = 48
 
 
@@ -132,7 +132,7 @@ def _word(value: Scalar | Key) -> str:
     """Write a scalar as YAML; a text that would be read as something else is quoted."""
     if isinstance(value, str):
         plain = _PLAIN.fullmatch(value) and value.lower() not in _SWITCHES and isinstance(resolve(value), str)
-        return value if plain else f'"{_SPECIAL.sub(_escaped, value)}"'
+        return value if plain else f'"{_YAML_SPECIAL.sub(_escaped, value)}"'
     if isinstance(value, float) and not math.isfinite(value):
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
     text = "~" if value is None else json.dumps(value)

@@ -12,10 +12,10 @@ from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 
-FEEDBACK = "feedback"
+FEEDBACK_SECTION = "feedback"
 CONTROLLER = "controller"
 
-_RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK: FeedbackRecord, CONTROLLER: ControllerRecord}
+_RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK_SECTION: FeedbackRecord, CONTROLLER: ControllerRecord}
 
 
 class Library:

@@ -7,9 +7,9 @@ from pydantic import Field
 from solfer.config.loading.calibration import read_calibrations
 from solfer.config.loading.configuration import Configuration, Part, common_tags, own_tags
 from solfer.config.loading.layering import location_of
-from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
+from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION, Library, named_records
 from solfer.config.records.bounds import RATE
-from solfer.config.records.middlewares import DEFAULT, MIDDLEWARES
+from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE, MIDDLEWARES
 from solfer.config.records.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord, is_shared
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import Record, parse
@@ -95,7 +95,7 @@ class Reading:
     def _middleware(self) -> str:
         """Return the middleware of a skeleton with mistakes; the default if it is none."""
         node = self._tree.get("middleware")
-        return node.value if node is not None and node.value in tuple(MIDDLEWARES) else DEFAULT
+        return node.value if node is not None and node.value in tuple(MIDDLEWARES) else DEFAULT_MIDDLEWARE
 
     def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
         node = self._tree.nearest(("modules", name))
@@ -138,7 +138,9 @@ class Reading:
         choice = parse(chosen, FeedbackChoice, self._problems) if chosen else None
         if choice is None or (choice.layer is None and choice.list is None):
             return ()
-        return self._pipes(chosen.get("list") if choice.layer is None else chosen.get("layer"), middleware, FEEDBACK)
+        return self._pipes(
+            chosen.get("list") if choice.layer is None else chosen.get("layer"), middleware, FEEDBACK_SECTION
+        )
 
     def _controllers(self, chosen: YamlNode | None, middleware: str) -> tuple[ControllerRecord, ...]:
         if chosen is None or not isinstance(chosen.value, str | tuple):

@@ -1,7 +1,7 @@
 """Checks of the parts of a configuration that no module uses: they may be incomplete, but not wrong."""
 
 from solfer.config.loading.calibration import CalibrationRecord
-from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
+from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION, Library, named_records
 from solfer.config.loading.reading import NOT_CONFIGURATIONS, Used, misspelt_key
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.modules import MainRecord, RobotRecord
@@ -31,13 +31,13 @@ def check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
         source = section and section.get("source")
         if source is not None:
             parse(source, SourceRecord, problems)
-        for direction in (FEEDBACK, CONTROLLER):
+        for direction in (FEEDBACK_SECTION, CONTROLLER):
             _check_pipes(tree, middleware, direction, used=used if is_chosen else None, problems=problems)
 
 
 def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
     """Check robot configurations, and the pipes that they and the sets name."""
-    libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK, CONTROLLER)}
+    libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK_SECTION, CONTROLLER)}
     for direction, library in libraries.items():
         sets = tree.get(f"{direction}s")
         for _, node in sets.items() if sets else ():
@@ -52,9 +52,9 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
             continue
         chosen = node.get("feedback", "layer")
         if chosen is None:
-            libraries[FEEDBACK].check_list(node.get("feedback", "list"))
+            libraries[FEEDBACK_SECTION].check_list(node.get("feedback", "list"))
         else:
-            libraries[FEEDBACK].check_set(chosen)
+            libraries[FEEDBACK_SECTION].check_set(chosen)
 
 
 def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | None, problems: Problems) -> None:

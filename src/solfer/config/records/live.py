@@ -23,7 +23,7 @@ LIVE: Bounds = {"json_schema_extra": {"live": True}}
 
 Path = tuple[Key, ...]
 
-_SCALARS = {float: "number", int: "whole number", bool: "true or false", str: "text"}
+_LIVE_SCALARS = {float: "number", int: "whole number", bool: "true or false", str: "text"}
 
 
 @dataclass(frozen=True)
@@ -224,8 +224,8 @@ def _kinds(annotation: Any) -> Iterator[str]:
         yield "list"
     elif annotation is types.NoneType:
         yield "none"
-    elif annotation in _SCALARS:
-        yield _SCALARS[annotation]
+    elif annotation in _LIVE_SCALARS:
+        yield _LIVE_SCALARS[annotation]
 
 
 def _bounds(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Iterator[tuple[str, Any]]:

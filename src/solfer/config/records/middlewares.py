@@ -53,10 +53,10 @@ _ALL = (
 
 MIDDLEWARES = {kind.name: kind for kind in _ALL}
 SECTIONS = tuple(kind.section for kind in _ALL)
-MAPS = tuple(kind.map for kind in _ALL if kind.map is not None)
+MIDDLEWARE_MAPS = tuple(kind.map for kind in _ALL if kind.map is not None)
 """Names, sections and maps of all."""
 
-DEFAULT = _ALL[0].name
+DEFAULT_MIDDLEWARE = _ALL[0].name
 """The middleware of a configuration that names none, so that its other mistakes are found."""
 
 RT = next(kind for kind in _ALL if kind.layer == "RT")

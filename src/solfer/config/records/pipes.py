@@ -30,7 +30,7 @@ Function = Literal["state", "motor", "reference"]
 """State of a Robot that a pipe writes or publishes: measured on the link or the motor side, or desired."""
 
 
-COMMAND = "solfer/JointCommand"
+JOINT_COMMAND = "solfer/JointCommand"
 """Message of joints between plugins and to the lower level."""
 
 LOWER_LEVEL_LAYERS = ("online", "lower_level")
@@ -167,7 +167,7 @@ class PipeRecord(Record):
     @property
     def default_message(self) -> str:
         """Message of a pipe that names none, the same for every plugin and bridge at either end."""
-        return COMMAND
+        return JOINT_COMMAND
 
     @property
     def travels_as(self) -> str:

@@ -12,7 +12,7 @@ from solfer.config.yaml.nodes import Key, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 
-_EXPECTED = {
+_PYDANTIC_EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
     "int_type": "a whole number",
@@ -139,8 +139,8 @@ def _complain_at(
 
 
 def _expected(item: ErrorDetails) -> str:
-    if item["type"] in _EXPECTED:
-        return _EXPECTED[item["type"]].format(**item.get("ctx", {}))
+    if item["type"] in _PYDANTIC_EXPECTED:
+        return _PYDANTIC_EXPECTED[item["type"]].format(**item.get("ctx", {}))
     if item["type"] == "missing":
         return "a longer list"
     words = item["msg"].removeprefix("Input should be ")

@@ -51,7 +51,7 @@ _RT_SECTIONS: Sections = (
     ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", RtPluginsRecord),
     ("RT layer: `executor`", ExecutorRecord),
 )
-_SCALARS = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`", Any: "any"}
+_TABLE_SCALARS = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`", Any: "any"}
 _FILE = "file: a path, or `path` and `file`"
 _TEXT = "parameter's name, or `file` (and `path`)"
 
@@ -156,7 +156,7 @@ def _value(annotation: Any) -> str:
         return f"list{count}: {_value(inner[0])}"
     if inner:  # a union, or an annotated type
         return " or ".join(dict.fromkeys(_value(part) for part in inner if part is not type(None)))
-    return _SCALARS.get(annotation, str(annotation))
+    return _TABLE_SCALARS.get(annotation, str(annotation))
 
 
 def _default(field: FieldInfo) -> str:

@@ -19,7 +19,7 @@ _LOG = logging.getLogger(__name__)
 ARMS = "ARMS"
 """Task of the hands."""
 
-REACH = math.sqrt(0.53)
+HAND_REACH = math.sqrt(0.53)
 """Largest distance of a hand from its base [m]: the original limits its square, to a number in its code."""
 
 QP_GAIN = 2.0
@@ -88,7 +88,7 @@ def hands(tags: OriginalStackTags) -> StackRecord:
     task = TaskRecord(point="position", link=tags.track, **seen)
     limits = StackLimitsRecord()
     if tags.workspace_init is not None:
-        workspace = WorkspaceRecord(link=tags.track, relative=tags.workspace_init, farthest=REACH).placed_as(tags)
+        workspace = WorkspaceRecord(link=tags.track, relative=tags.workspace_init, farthest=HAND_REACH).placed_as(tags)
         limits = StackLimitsRecord(workspace={ARMS: workspace})
     return translated(tags, {ARMS: task}, limits=limits, chain=tags.chain)
 

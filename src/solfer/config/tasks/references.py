@@ -7,13 +7,13 @@ from pydantic import Field, model_validator
 from solfer.config.records.bounds import COORDINATE, DIRECTION
 from solfer.config.records.record import Record
 
-TURN = {"ge": -1.0, "le": 1.0}
+QUATERNION_BOUNDS = {"ge": -1.0, "le": 1.0}
 """Bounds of a number of a quaternion."""
 
 Period = Annotated[float, Field(ge=0.05, le=3600.0)]
 Place = Annotated[tuple[Annotated[float, Field(**COORDINATE)], ...], Field(min_length=3, max_length=3)]
 Normal = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]
-Quaternion = Annotated[tuple[Annotated[float, Field(**TURN)], ...], Field(min_length=4, max_length=4)]
+Quaternion = Annotated[tuple[Annotated[float, Field(**QUATERNION_BOUNDS)], ...], Field(min_length=4, max_length=4)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
 
 

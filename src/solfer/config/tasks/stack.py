@@ -27,7 +27,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 REFERRED = ("position", "orientation", "pose", "center_of_mass", "posture")
 """What may have a reference that needs no program."""
 
-_SPECIAL = ("link", "offset", "relative", "axes", "axis", "target")
+_POINT_SPECIAL = ("link", "offset", "relative", "axes", "axis", "target")
 
 Row = Literal["x", "y", "z", "rx", "ry", "rz"] | Annotated[int, Field(ge=0, le=999)]
 Gain = Annotated[float, Field(ge=0.0, le=1e4)]
@@ -115,7 +115,7 @@ class TaskRecord(Record):
     @model_validator(mode="after")
     def _check(self) -> "TaskRecord":
         if self.point in KINDS:
-            for key in _SPECIAL:
+            for key in _POINT_SPECIAL:
                 if key in self.model_fields_set and key not in KINDS[self.point]:
                     raise ValueError(f"a task on '{self.point}' has no '{key}'; expected a task without it")
             if "link" in KINDS[self.point] and self.link is None:

@@ -17,7 +17,7 @@ from solfer.errors import ConfigError, nearest
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _DEEPEST = 64  # levels; the grammar needs eight
-_LARGEST = 200_000  # values, aliases counted as often as they are used
+_FILE_LARGEST = 200_000  # values, aliases counted as often as they are used
 
 
 def compose(text: str, file: str, problems: Problems, later: tuple[Key, ...] | None = None) -> YamlNode:
@@ -181,9 +181,9 @@ class _Composer:
 
     def _grow(self, count: int, mark: Mark) -> None:
         self._size += count
-        if self._size > _LARGEST:
+        if self._size > _FILE_LARGEST:
             raise ConfigError(
-                f"more than {_LARGEST} values, aliases counted", where=str(mark), expected="a smaller file"
+                f"more than {_FILE_LARGEST} values, aliases counted", where=str(mark), expected="a smaller file"
             )
 
     def _mark(self, event: Any) -> Mark:

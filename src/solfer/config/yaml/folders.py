@@ -11,7 +11,7 @@ from solfer.errors import ConfigError
 EXPECTED = "a .yaml file below a folder that is allowed, or package://NAME/... of this workspace"
 
 _IN_PACKAGE = re.compile(r"package://([^/]+)/+([^/]+)/+.+", re.DOTALL)
-_LONGEST = 4096  # characters of a path
+_PACKAGE_LONGEST = 4096  # characters of a path
 
 
 class Folders:
@@ -56,7 +56,7 @@ class Folders:
         return Path(path)
 
     def _found(self, text: str) -> str | None:
-        if len(text) > _LONGEST or "\0" in text or not text.endswith((".yaml", ".yml")):
+        if len(text) > _PACKAGE_LONGEST or "\0" in text or not text.endswith((".yaml", ".yml")):
             return None
         in_package = _IN_PACKAGE.fullmatch(text)
         if in_package is None:

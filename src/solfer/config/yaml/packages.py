@@ -5,7 +5,7 @@ from pathlib import Path
 
 from solfer.errors import MissingDependency, UnknownName
 
-OWN = "solfer"
+OWN_PACKAGE = "solfer"
 """The package that holds this code."""
 
 
@@ -30,7 +30,7 @@ def package_folder(name: str, where: str = "") -> str:
         UnknownName: There is no such package.
         MissingDependency: It is not solfer, and ROS is not here.
     """
-    own = shipped_folder() if name == OWN else None
+    own = shipped_folder() if name == OWN_PACKAGE else None
     try:
         import rospkg
     except ModuleNotFoundError as error:
@@ -53,7 +53,7 @@ def package_folder(name: str, where: str = "") -> str:
 def workspace_packages() -> dict[str, str]:
     """Return the folders of all packages of the workspace that solfer belongs to; without ROS that is solfer alone."""
     own = shipped_folder()
-    alone = {} if own is None else {OWN: os.fspath(own)}
+    alone = {} if own is None else {OWN_PACKAGE: os.fspath(own)}
     try:
         import rospkg
     except ModuleNotFoundError:
@@ -61,6 +61,6 @@ def workspace_packages() -> dict[str, str]:
     for path in rospkg.get_ros_paths() or ():
         packages = rospkg.RosPack(ros_paths=[path])
         names = packages.list()
-        if OWN in names:
+        if OWN_PACKAGE in names:
             return {each: packages.get_path(each) for each in names}
     return alone

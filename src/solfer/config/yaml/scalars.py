@@ -15,7 +15,7 @@ _CONSTANTS: dict[str, Scalar] = {
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 CORE = "tag:yaml.org,2002:"
-_LONGEST = 18  # characters of an integer that always fit 64 bits; a longer one is a float, or not a number
+_NUMBER_LONGEST = 18  # characters of an integer that always fit 64 bits; a longer one is a float, or not a number
 
 _KINDS: dict[str, type | tuple[type, ...]] = {"null": type(None), "bool": bool, "int": int, "float": (int, float)}
 
@@ -24,7 +24,7 @@ def resolve(text: str) -> Scalar:
     """Return the value of a word that stands without quotes."""
     if text in _CONSTANTS:
         return _CONSTANTS[text]
-    if len(text) <= _LONGEST and _INTEGER.fullmatch(text):
+    if len(text) <= _NUMBER_LONGEST and _INTEGER.fullmatch(text):
         return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
     return float(text) if _FLOAT.fullmatch(text) else text
 

@@ -11,9 +11,9 @@ from solfer.errors import ClaimRefused, Suspended
 from solfer.transport.lower_level import node_of
 from solfer.transport.messages import JOINT_FIELDS
 
-FREE = -1
+UNCLAIMED = -1
 MODES = {field: row for row, field in enumerate(JOINT_FIELDS)}
-SHOWN = 6  # joints in an error
+CLAIM_SHOWN_COUNT = 6  # joints in an error
 BARRED = 256
 """Most senders that are barred by name; beyond that every sender without a claim is barred."""
 
@@ -56,7 +56,7 @@ class Claims:
     def __init__(self, joints: Mapping[str, Sequence[str]], lease: float):
         self._joints = dict(joints)
         self._lease = lease
-        self._owners = {name: np.full((len(MODES), len(items)), FREE) for name, items in joints.items()}
+        self._owners = {name: np.full((len(MODES), len(items)), UNCLAIMED) for name, items in joints.items()}
         self._ids: dict[str, int] = {}
         self._nodes: Counter[str] = Counter()  # how many owners each node has
         self._ages: dict[int, float] = {}
@@ -118,7 +118,7 @@ class Claims:
             mine = owners == number
             if mine.any():
                 had[controller] = mine.any(axis=0)
-                owners[mine] = FREE
+                owners[mine] = UNCLAIMED
         self._forget(owner)
         return LeaseEnded(owner, had, claimed)
 
@@ -137,7 +137,7 @@ class Claims:
 
     def clear(self, controller: str) -> None:
         """End all claims on a controller."""
-        self._owners[controller][:] = FREE
+        self._owners[controller][:] = UNCLAIMED
         for key in [key for key in self._known if key[1] == controller]:
             del self._known[key]
 
@@ -162,7 +162,7 @@ class Claims:
 
     def unclaimed(self, controller: str, mode: str, indices: np.ndarray) -> np.ndarray:
         """Select those of a controller's joints at `indices` of which nobody has claimed the field `mode`."""
-        return indices[self._owners[controller][MODES[mode], indices] == FREE]
+        return indices[self._owners[controller][MODES[mode], indices] == UNCLAIMED]
 
     def describe(self, controller: str) -> str:
         """Describe the owners of a controller, such as '/joint_states: position, effort'; empty: it is free."""
@@ -175,14 +175,14 @@ class Claims:
         return "; ".join(parts)
 
     def _grant(self, owner: str, requested: Sequence[ClaimedJoints]) -> None:
-        mine = self._ids.get(owner, FREE)
+        mine = self._ids.get(owner, UNCLAIMED)
         for item in requested:
             owners = self._owners[item.controller]
             for mode in item.modes:
                 present = owners[MODES[mode], item.indices]
-                if ((present != mine) & (present != FREE)).any():
+                if ((present != mine) & (present != UNCLAIMED)).any():
                     self._refuse(owner, mine, item)
-        if mine == FREE:
+        if mine == UNCLAIMED:
             mine = self._ids[owner] = next(self._numbers)
             self._nodes[node_of(owner)] += 1
         for item in requested:
@@ -199,11 +199,13 @@ class Claims:
     def _refuse(self, owner: str, mine: int, item: ClaimedJoints) -> None:
         rows = [MODES[mode] for mode in item.modes]
         present = self._owners[item.controller][np.ix_(np.array(rows), item.indices)]
-        taken = (present != mine) & (present != FREE)
+        taken = (present != mine) & (present != UNCLAIMED)
         names = {number: name for name, number in self._ids.items()}
         others = ", ".join(f"'{names[number]}'" for number in dict.fromkeys(present[taken].tolist()))
         joints = [self._joints[item.controller][index] for index in item.indices[taken.any(axis=0)]]
-        shown = ", ".join(joints[:SHOWN]) + (f" and {len(joints) - SHOWN} more" if len(joints) > SHOWN else "")
+        shown = ", ".join(joints[:CLAIM_SHOWN_COUNT]) + (
+            f" and {len(joints) - CLAIM_SHOWN_COUNT} more" if len(joints) > CLAIM_SHOWN_COUNT else ""
+        )
         raise ClaimRefused(
             f"'{owner}' cannot command {shown} of controller '{item.controller}': {others} does",
             expected=f"joints that are free: {others} has to end or to send nothing for {self._lease:g} s",

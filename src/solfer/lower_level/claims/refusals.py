@@ -7,7 +7,7 @@ from solfer.errors import ClaimRefused, CommandRefused, Suspended
 SENDERS = 64
 """Most senders that are counted by name."""
 
-OTHERS = "others"
+OTHER_SENDERS = "others"
 
 
 class Refusals(Counter[str]):
@@ -19,7 +19,7 @@ class Refusals(Counter[str]):
 
     def note(self, sender: str, error: CommandRefused) -> None:
         """Count a command of `sender` that was refused because of `error`."""
-        name = sender if sender in self or len(self) < SENDERS else OTHERS
+        name = sender if sender in self or len(self) < SENDERS else OTHER_SENDERS
         self[name] += 1
         self._news[name] = error
 

@@ -12,17 +12,17 @@ FULL_EFFORT = 0.05
 OWN_WEIGHT = 0.01
 """Deviation at which the spring carries the weight on the joint [rad, m]."""
 
-STUCK = 0.02
+DRIVE_STUCK_DISTANCE = 0.02
 """Deviation at which the spring overcomes the friction of the joint [rad, m]."""
 
-FASTEST = 100.0
+TOP_FREQUENCY = 100.0
 """Largest natural frequency [rad/s]: 63 steps of 1 ms in a period."""
 
 FASTEST_FREE = 500.0
 """Largest natural frequency of a joint while no other joint holds [rad/s]: the law predicts the spring's deflection at
 the end of a step from the speed at its beginning, and needs K STEP^2 well below m."""
 
-STEP = 0.001
+DRIVE_PERIOD = 0.001
 """Period of the drives [s]."""
 
 LOSS = 0.5
@@ -62,10 +62,10 @@ def default_gains(
     free = free_inertia(kinematics, posture)[dofs]
     joints = [kinematics.description.joints[kinematics.dofs[dof]] for dof in dofs]
     friction = np.array([joint.friction for joint in joints])
-    stiffness = np.maximum(np.minimum(stiffness, inertia * FASTEST**2), friction / STUCK)
+    stiffness = np.maximum(np.minimum(stiffness, inertia * TOP_FREQUENCY**2), friction / DRIVE_STUCK_DISTANCE)
     stiffness = np.minimum(stiffness, free * FASTEST_FREE**2)
-    damping = np.minimum(2.0 * np.sqrt(stiffness * inertia), LOSS * free / STEP)
-    share = free / (free + STEP * damping)
+    damping = np.minimum(2.0 * np.sqrt(stiffness * inertia), LOSS * free / DRIVE_PERIOD)
+    share = free / (free + DRIVE_PERIOD * damping)
     return stiffness / share, damping / share
 
 

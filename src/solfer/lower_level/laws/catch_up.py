@@ -4,28 +4,28 @@ import numpy as np
 
 from solfer.lower_level.gains.ramp import ALL_JOINTS
 
-JUMP = 0.01
+CATCH_UP_JUMP = 0.01
 """Distance from where its stream was heading at which a commanded position has jumped [rad, m]."""
 
-LONGEST = 0.1
+LONGEST_PAUSE = 0.1
 """Longest time between two commands of one stream [s]; a later one is expected where the stream would be by then."""
 
-PERIOD = 0.005
+CATCH_UP_PERIOD = 0.005
 """Time between commands below which JUMP shrinks in proportion: an emptied queue is not a fast stream [s]."""
 
-ACCELERATION = 50.0
+CATCH_UP_ACCELERATION = 50.0
 """Largest change of a stream's estimated speed at a jump [rad/s2, m/s2]."""
 
 FREQUENCY = 10.0
 """Frequency of the critically damped system in which a distance fades out [rad/s]: 1 % is left after 0.66 s."""
 
-SHARE = 0.2
+CATCH_UP_SPEED_SHARE = 0.2
 """Part of its speed limit that a joint uses, at most, to catch up."""
 
 WHOLE = 0.8
 """Part of its speed limit that a stream and catching up use together, at most: links on springs swing beyond that."""
 
-CLOSE = 1e-6
+CATCH_UP_CLOSENESS = 1e-6
 """Distance and speed below which a joint has caught up [rad, rad/s]."""
 
 
@@ -60,13 +60,13 @@ class CatchUp:
 
     def __init__(self, speed_limit: np.ndarray):
         size = len(speed_limit)
-        self._fastest = SHARE * speed_limit
+        self._fastest = CATCH_UP_SPEED_SHARE * speed_limit
         self._whole = WHOLE * speed_limit
         self.distance = np.zeros(size)
         self._rate = np.zeros(size)
         self._last = np.zeros(size)
         self._speed = np.zeros(size)
-        self._age = np.full(size, LONGEST)
+        self._age = np.full(size, LONGEST_PAUSE)
         self._limit = np.array(speed_limit, dtype=float)
         self._buffers = _Buffers(size)
         self._news = np.zeros(size, dtype=bool)
@@ -77,7 +77,7 @@ class CatchUp:
         self._last[joints] = position[joints]
         for values in (self.distance, self._rate, self._speed):
             values[joints] = 0.0
-        self._age[joints] = LONGEST
+        self._age[joints] = LONGEST_PAUSE
         self._news[joints] = False
 
     def renew(self, indices: np.ndarray) -> None:
@@ -101,21 +101,23 @@ class CatchUp:
         time = buffers.time
         news = self._news
         jumped = buffers.jumped
-        np.minimum(self._age, LONGEST, out=time)
+        np.minimum(self._age, LONGEST_PAUSE, out=time)
         np.subtract(position, self._last, out=moved)
         # at most the commanded part of the stream's own step: a sender that stood still goes on where it was
         np.multiply(self._speed, time, out=extra)
         np.minimum(extra, np.maximum(moved, 0.0, out=buffers.bound), out=extra)
         np.maximum(extra, np.minimum(moved, 0.0, out=buffers.bound), out=extra)
         np.subtract(moved, extra, out=extra)
-        np.multiply(np.minimum(time, PERIOD, out=buffers.change), JUMP / PERIOD, out=buffers.change)
+        np.multiply(
+            np.minimum(time, CATCH_UP_PERIOD, out=buffers.change), CATCH_UP_JUMP / CATCH_UP_PERIOD, out=buffers.change
+        )
         np.greater(np.abs(extra, out=buffers.bound), buffers.change, out=jumped)
         np.logical_and(jumped, news, out=jumped)
         if jumped.any():
             np.add(self.distance, extra, out=self.distance, where=jumped)
             self.active = True
         # the stream's speed; at a jump its change is bounded by ACCELERATION
-        np.multiply(time, ACCELERATION, out=buffers.change)
+        np.multiply(time, CATCH_UP_ACCELERATION, out=buffers.change)
         np.copyto(buffers.change, np.inf, where=np.logical_not(jumped, out=jumped))
         np.divide(moved, time, out=moved, where=news)
         np.subtract(moved, self._speed, out=moved)
@@ -141,7 +143,7 @@ class CatchUp:
         # the target moves at the speed of its stream, if that goes on, minus the rate of the distance
         speed = buffers.moved
         bound = buffers.bound
-        np.less(self._age, LONGEST, out=buffers.jumped)
+        np.less(self._age, LONGEST_PAUSE, out=buffers.jumped)
         np.multiply(self._speed, buffers.jumped, out=speed)
         np.minimum(np.add(speed, self._whole, out=bound), self._fastest, out=bound)
         np.minimum(rate, np.maximum(bound, 0.0, out=bound), out=rate)
@@ -151,7 +153,7 @@ class CatchUp:
         np.multiply(rate, dt, out=work)
         distance += work
         np.abs(distance, out=work)
-        if work.max() < CLOSE and np.abs(rate, out=work).max() < CLOSE:
+        if work.max() < CATCH_UP_CLOSENESS and np.abs(rate, out=work).max() < CATCH_UP_CLOSENESS:
             distance.fill(0.0)
             rate.fill(0.0)
             self.active = False

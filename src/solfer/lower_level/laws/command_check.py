@@ -8,11 +8,11 @@ from solfer.errors import CommandRefused, nearest
 from solfer.lower_level.laws.limits import JointLimits
 from solfer.transport.messages import JOINT_FIELDS, LARGEST_GAIN, JointMessage
 
-TOLERANCE = 1e-9  # [rad, rad/s, Nm]; a value computed to lie on a limit is within it
-LARGEST = 1e6
+VALUE_TOLERANCE = 1e-9  # [rad, rad/s, Nm]; a value computed to lie on a limit is within it
+UNLIMITED_VALUE = 1e6
 """Bound of values without a limit: far beyond every robot, and small enough that no product of two overflows."""
 
-UNITS = {"position": "rad", "velocity": "rad/s", "effort": "Nm", "stiffness": "Nm/rad", "damping": "Nms/rad"}
+VALUE_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "Nm", "stiffness": "Nm/rad", "damping": "Nms/rad"}
 
 
 class CommandCheck:
@@ -33,9 +33,9 @@ class CommandCheck:
         self._indices = np.zeros(0, dtype=np.intp)
         zero = np.zeros(len(limits.joints))
         self._bounds = {
-            "position": (np.maximum(limits.lower, -LARGEST), np.minimum(limits.upper, LARGEST)),
-            "velocity": (-np.minimum(limits.velocity, LARGEST), np.minimum(limits.velocity, LARGEST)),
-            "effort": (-np.minimum(limits.effort, LARGEST), np.minimum(limits.effort, LARGEST)),
+            "position": (np.maximum(limits.lower, -UNLIMITED_VALUE), np.minimum(limits.upper, UNLIMITED_VALUE)),
+            "velocity": (-np.minimum(limits.velocity, UNLIMITED_VALUE), np.minimum(limits.velocity, UNLIMITED_VALUE)),
+            "effort": (-np.minimum(limits.effort, UNLIMITED_VALUE), np.minimum(limits.effort, UNLIMITED_VALUE)),
             "stiffness": (zero, zero + LARGEST_GAIN),
             "damping": (zero, zero + LARGEST_GAIN),
         }
@@ -107,7 +107,7 @@ class CommandCheck:
         lower, upper = self._bounds[field]
         low = lower[indices]
         high = upper[indices]
-        inside = (numbers >= low - TOLERANCE) & (numbers <= high + TOLERANCE) & np.isfinite(numbers)
+        inside = (numbers >= low - VALUE_TOLERANCE) & (numbers <= high + VALUE_TOLERANCE) & np.isfinite(numbers)
         if not inside.all():
             wrong = inside.argmin()
             self._refuse(field, names[wrong], float(numbers[wrong]), low=float(low[wrong]), high=float(high[wrong]))
@@ -117,6 +117,6 @@ class CommandCheck:
         what = f"{field} {value:g} of joint '{joint}'"
         if not np.isfinite(value):
             raise CommandRefused(
-                f"{what} is not a finite number", expected=f"from {low:g} to {high:g} [{UNITS[field]}]"
+                f"{what} is not a finite number", expected=f"from {low:g} to {high:g} [{VALUE_UNITS[field]}]"
             )
-        raise CommandRefused(f"{what} is beyond its limit", expected=f"from {low:g} to {high:g} [{UNITS[field]}]")
+        raise CommandRefused(f"{what} is beyond its limit", expected=f"from {low:g} to {high:g} [{VALUE_UNITS[field]}]")

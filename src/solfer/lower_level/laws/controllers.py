@@ -17,11 +17,11 @@ from solfer.lower_level.laws.limits import JointLimits
 from solfer.numerics.turns import whole_turns
 from solfer.transport.messages import JOINT_FIELDS, JointMessage
 
-TIMEOUT = 0.5  # [s]
+CONTROLLER_TIMEOUT = 0.5  # [s]
 RAMP = 0.5
 """Time in which loaded gains, and feed-forward torque when it is switched, come into force [s]."""
 
-MARGIN = 0.05
+STRETCH_MARGIN = 0.05
 """Distance beyond the largest stretch of its spring at which a joint cannot be [rad, m]: a link hangs on its actuator's
 spring, 0.004 rad at CENTAURO's largest torques, and is measured 10 ms ago while it moves at 4 rad/s."""
 
@@ -47,7 +47,7 @@ class LowerLevelController(abc.ABC):
     TYPE: ClassVar[str]
     FIELDS: ClassVar[tuple[str, ...]]
 
-    def __init__(self, name: str, limits: JointLimits, timeout: float = TIMEOUT):
+    def __init__(self, name: str, limits: JointLimits, timeout: float = CONTROLLER_TIMEOUT):
         self.name = name
         self.limits = limits
         self.joints = limits.joints
@@ -162,7 +162,7 @@ class ImpedanceController(LowerLevelController):
         limits: JointLimits,
         stiffness: ArrayLike,
         damping: ArrayLike,
-        timeout: float = TIMEOUT,
+        timeout: float = CONTROLLER_TIMEOUT,
     ):
         super().__init__(name, limits, timeout)
         size = len(self.joints)
@@ -259,7 +259,7 @@ class ImpedanceController(LowerLevelController):
             away = measured.get(joint, held) - held
             away -= float(whole_turns(away, self._turns[index]))
             stretch = (limits.effort[index] + abs(self.applied_effort[index])) / self.stiffness[index]
-            if abs(away) > MARGIN + stretch:
+            if abs(away) > STRETCH_MARGIN + stretch:
                 raise Suspended(
                     f"joint '{joint}' is measured at {measured[joint]:.3f}, and controller '{self.name}' holds it at "
                     f"{held:.3f} by a spring that its motor stretches by {stretch:.3f} at most",

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from solfer.errors import ModelError
-from solfer.lower_level.gains.defaults import STEP
+from solfer.lower_level.gains.defaults import DRIVE_PERIOD
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController, VelocityController
 from solfer.lower_level.laws.impedance import ImplicitImpedance
 from solfer.lower_level.laws.springs import Springs, springs_of
@@ -48,7 +48,7 @@ class Drives:
         _check_joints(kinematics, controllers, passive)
         impedances = [item for item in controllers if isinstance(item, ImpedanceController)]
         motors = [item for item in controllers if isinstance(item, VelocityController)]
-        springs = springs_of(kinematics, actuators, posture, dt=STEP)
+        springs = springs_of(kinematics, actuators, posture, dt=DRIVE_PERIOD)
         moved = _dofs(impedances)
         held = _dofs(motors)
         swinging = held[springs.two_mass[held]] if springs else held[:0]
@@ -118,7 +118,11 @@ def _law(
     if springs is None:
         return ImplicitImpedance(kinematics, *limits)
     return TwoMassImpedance(
-        kinematics, limits, springs, posture=neutral_posture(kinematics) if posture is None else posture, dt=STEP
+        kinematics,
+        limits,
+        springs,
+        posture=neutral_posture(kinematics) if posture is None else posture,
+        dt=DRIVE_PERIOD,
     )
 
 

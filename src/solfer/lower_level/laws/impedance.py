@@ -60,7 +60,7 @@ class ImplicitImpedance:
 
         size = dynamics.size
         self._kernel = kernel
-        table = self._table = np.zeros((kernel.ROWS, size))
+        table = self._table = np.zeros((kernel.LAW_ROWS, size))
         table[kernel.UPPER] = effort_limit
         table[kernel.FASTEST] = velocity_limit
         self.position, self.velocity, self.effort = (

@@ -4,7 +4,7 @@ import numpy as np
 
 from solfer.model.kinematics import Kinematics
 
-CALM = 0.1
+OVERSPEED_CALM_TIME = 0.1
 """Time for which all joints have to be within their limits before the robot may be commanded again [s]."""
 
 
@@ -92,5 +92,5 @@ class Overspeed:
         """Clear `reason` when all joints have been within their limits for a while."""
         np.greater(self._speed, self._limit, out=self._beyond)
         self._calm = 0.0 if self._beyond.any() else self._calm + dt
-        if self._calm > CALM and not stay:
+        if self._calm > OVERSPEED_CALM_TIME and not stay:
             self.restart()

@@ -12,7 +12,7 @@ from solfer.model.kinematics import Kinematics
 logger = logging.getLogger(__name__)
 
 UPRIGHT = "a robot that stands upright: lift it, or put it into another state"
-SLOW = "a moment in which all joints are within their speed limits"
+SLOW_MOMENT = "a moment in which all joints are within their speed limits"
 
 
 class Safeguard:
@@ -35,7 +35,7 @@ class Safeguard:
     @property
     def expected(self) -> str:
         """Description of the state that ends the hold, for errors."""
-        return UPRIGHT if self._tilt.reason else SLOW
+        return UPRIGHT if self._tilt.reason else SLOW_MOMENT
 
     def restart(self, q: np.ndarray) -> None:
         """Forget the past: the robot begins again at q, shape (model size,)."""

@@ -7,7 +7,7 @@ from solfer.lower_level.lower_level import LowerLevel
 
 logger = logging.getLogger(__name__)
 
-CYCLES = 20
+MISSED_CYCLES = 20
 """Heartbeats that a process may miss in a row."""
 
 
@@ -40,7 +40,7 @@ class HeartbeatMonitor:
         losses: How often it went missing.
     """
 
-    def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = CYCLES):
+    def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = MISSED_CYCLES):
         self._lower_level = lower_level
         self._process = process
         self._cycles = cycles

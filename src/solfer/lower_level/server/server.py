@@ -15,11 +15,11 @@ from solfer.throttle import Throttle
 from solfer.transport.endpoints import Queue
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
-from solfer.transport.lower_level import ALL_OWNERS, LOWER_LEVEL, REFUSED
+from solfer.transport.lower_level import ALL_OWNERS, LOWER_LEVEL, REFUSALS_TOPIC
 from solfer.transport.messages import REFUSALS, JointMessage, RefusalMessage
 from solfer.transport.middleware import Middleware
 
-PERIOD = 0.02
+REFUSALS_PERIOD = 0.02
 """Shortest time between two messages of refused commands [s]."""
 
 
@@ -45,7 +45,7 @@ class LowerLevelServer:
         self._refused = lower_level.refused
         self._starts = lower_level.starts
         self._queues: list[tuple[str, Queue]] = []
-        self._writer = middleware.writer(REFUSED, REFUSALS)
+        self._writer = middleware.writer(REFUSALS_TOPIC, REFUSALS)
         self._published = -math.inf
         self._inbox = inbox
         self.most = 0
@@ -113,7 +113,7 @@ class LowerLevelServer:
             self._writer.write(
                 RefusalMessage((ALL_OWNERS,), (True,), ("the robot was put into another state",), stamp=now)
             )
-        if now - self._published < PERIOD:
+        if now - self._published < REFUSALS_PERIOD:
             return
         news = self._lower_level.refusals.news()
         if not news:

@@ -10,7 +10,7 @@ from solfer.lower_level.gains.file import Gains, read_gains
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
 from solfer.transport.lower_level import (
-    CLAIM,
+    CLAIM_INTERFACE,
     LOAD_GAINS,
     RELEASE,
     SWITCH_FEED_FORWARD,
@@ -72,7 +72,7 @@ def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
         return ClaimAnswer(again=again)
 
     return (
-        Service("claim", CLAIM, ClaimRequest, reply=ClaimAnswer, handler=claim),
+        Service("claim", CLAIM_INTERFACE, ClaimRequest, reply=ClaimAnswer, handler=claim),
         Service(
             "release",
             RELEASE,

@@ -16,22 +16,22 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-PERIOD = 0.005
+BRIDGE_PERIOD = 0.005
 """Period of the bridge's cycle [s]."""
 
-LOOK = 0.5
+BRIDGE_POLL_PERIOD = 0.5
 """Time between two searches for new services and topics [s]."""
 
-REPORT = 1.0
+REPORT_PERIOD = 1.0
 """Time between two health reports [s]."""
 
-HEALTH = "xbot_bridge"
+BRIDGE_HEALTH = "xbot_bridge"
 """Name of the health report."""
 
 
 @dataclass(frozen=True)
 class BridgeSearch:
-    """What a bridge finds at present inside; called every `LOOK`, with the names that are known and may be left out.
+    """What a bridge finds at present inside; called every `BRIDGE_POLL_PERIOD` with the names that may be left out.
 
     Attributes:
         offers: Returns the services that are offered.
@@ -92,17 +92,17 @@ class Bridge:
         self.publish()
 
     def receive(self) -> None:
-        """Run the first half of a cycle: topics that go in, and requests; every `LOOK` search for what is new."""
+        """Run the first half of a cycle: topics that go in, and requests; search every `BRIDGE_POLL_PERIOD`."""
         now = self._outside.now()
         if now >= self._next_look:
-            self._next_look = now + LOOK
+            self._next_look = now + BRIDGE_POLL_PERIOD
             self._look()
         for crossing in self._forwards_in:
             crossing.run()
         self.forwarding.run()
 
     def publish(self) -> None:
-        """Run the second half: topics that go out, and replies; every `REPORT` a health report."""
+        """Run the second half: topics that go out, and replies; every `REPORT_PERIOD` a health report."""
         self._beside()
         for crossing in self._forwards_out:
             crossing.run()
@@ -110,7 +110,7 @@ class Bridge:
         self.forwarding.run()
         now = self._outside.now()
         if now >= self._next_report:
-            self._next_report = now + REPORT
+            self._next_report = now + REPORT_PERIOD
             self._report()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
@@ -118,11 +118,11 @@ class Bridge:
 
         Half a period lies between the halves of a cycle: what the layer answers meanwhile goes out in the same cycle.
         """
-        loop = FixedRateLoop(self._outside, 1.0 / PERIOD)
+        loop = FixedRateLoop(self._outside, 1.0 / BRIDGE_PERIOD)
 
         def cycle(_late: float, _skipped: int) -> None:
             self.receive()
-            self._outside.sleep_until(loop.deadline + 0.5 * PERIOD)
+            self._outside.sleep_until(loop.deadline + 0.5 * BRIDGE_PERIOD)
             self.publish()
 
         loop.run(cycle, lambda: self._outside.running() and not until())
@@ -166,4 +166,4 @@ class Bridge:
                 self._reports[name] = report
                 self._outside.report(name, report.level, report.summary, report.values)
         level, summary = (Health.WARNING, f"{news} messages refused") if news else (Health.GOOD, "running")
-        self._outside.report(HEALTH, level, summary, values)
+        self._outside.report(BRIDGE_HEALTH, level, summary, values)

@@ -16,7 +16,7 @@ import rospy
 
 from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
 from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.node.waiting import STEP, wait_for
+from solfer.middleware.ros.node.waiting import WAIT_STEP, wait_for
 
 logger = logging.getLogger(__name__)
 
@@ -84,7 +84,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         failure = f"fails: {reply.exception()}"
         if time.monotonic() >= end:
             break
-        time.sleep(STEP)
+        time.sleep(WAIT_STEP)
     if failure:
         raise MiddlewareError(
             f"service {resolved} {failure} (waited {timeout:g} s)", expected="a node that offers it and runs"

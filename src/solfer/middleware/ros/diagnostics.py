@@ -11,7 +11,7 @@ from solfer.middleware.ros.node.master import require_master
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
-PERIOD = 1.0
+DIAGNOSTICS_PERIOD = 1.0
 """Shortest time between two reports of one part while its level stays the same [s]."""
 
 
@@ -49,9 +49,9 @@ class Diagnostics:
     def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """Publish one status; see `Middleware.report`."""
         now = time.monotonic()
-        last_time, last_level = self._last.get(name, (-PERIOD, level))
+        last_time, last_level = self._last.get(name, (-DIAGNOSTICS_PERIOD, level))
         # A report that comes once a period must not be left out because it is a little early.
-        if level == last_level and now - last_time < 0.9 * PERIOD:
+        if level == last_level and now - last_time < 0.9 * DIAGNOSTICS_PERIOD:
             return
         self._last[name] = (now, level)
         pairs = [KeyValue(key, _text(value)) for key, value in values.items()]

@@ -18,7 +18,7 @@ from rospy.impl.tcpros_base import TCPROSTransport
 
 from solfer.errors import MiddlewareError, PipeError
 from solfer.middleware.ros.codecs.bounded import bound_messages
-from solfer.middleware.ros.codecs.packed_message import LENGTH
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 from solfer.middleware.ros.codecs.table import Codec, codec
 from solfer.middleware.ros.node.attendance import Attendance
 from solfer.middleware.ros.topic_publisher import TopicPublisher
@@ -30,13 +30,13 @@ from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
 
-ANSWER = 0.1
+MASTER_REPLY_PERIOD = 0.1
 """Longest wait for the answer of the master in a cycle [s]."""
 
 IN_PROGRESS = 5.0
 """Longest time that an answer, a message or a connection takes in lock-step [s]."""
 
-COUNTED = 256
+WAITING_MESSAGES = 256
 """Messages without a header that may wait between two runs of rospy's receiving thread, where only the newest is read:
 they have no number, so that all are counted."""
 
@@ -146,7 +146,7 @@ class Subscription:
         if not self._has_numbers:
             return before + self._counts.get(sender, (None, 0))[1]
         packed = self._newest.get(sender)
-        return 0 if packed is None else LENGTH.unpack_from(packed)[0]
+        return 0 if packed is None else MESSAGE_LENGTH.unpack_from(packed)[0]
 
     def senders(self) -> set[str]:
         """Return the names of the nodes that are connected."""
@@ -211,7 +211,7 @@ class RosReader(Reader):
         self._lock = threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
         # of messages that are counted none may be left out
-        size = 1 if codec(message).ros_class._has_header and not kept else max(kept, COUNTED)
+        size = 1 if codec(message).ros_class._has_header and not kept else max(kept, WAITING_MESSAGES)
         self._backlog: Backlog[tuple[Arrival, RosPublisher]] | None = Backlog(kept) if kept else None
         self._waiting = deque[tuple[Arrival, RosPublisher]]()
         self.subscription = Subscription(topic, message, size, store=self._store, now=now)
@@ -222,7 +222,7 @@ class RosReader(Reader):
             self.topic,
             self.subscription.senders,
             now=now if in_lockstep else time.monotonic,
-            patience=IN_PROGRESS if in_lockstep else ANSWER,
+            patience=IN_PROGRESS if in_lockstep else MASTER_REPLY_PERIOD,
         )
 
     def _store(self, arrival: Arrival) -> None:

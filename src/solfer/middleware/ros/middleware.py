@@ -40,7 +40,7 @@ FLUSH = 0.5
 ANSWERED = 1.0
 """Longest time to wait at the end for the replies to requests [s]."""
 
-SETTLE = 0.05
+ROSPY_SETTLING_TIME = 0.05
 """Time that rospy's sending threads get for what they have already taken [s]."""
 
 OWNERS = "/parameter_owners"
@@ -255,7 +255,7 @@ class RosMiddleware(Middleware):
         end = time.monotonic() + FLUSH
         while not all(writer.flush() for writer in writers) and time.monotonic() < end:
             time.sleep(0.005)
-        time.sleep(SETTLE)
+        time.sleep(ROSPY_SETTLING_TIME)
         wait(self._requests, ANSWERED)
         parts = (*filter(None, (self._follower,)), *self._services, *self._endpoints, self._diagnostics)
         for part in () if self.loss else parts:  # without a master there is nothing to unregister from

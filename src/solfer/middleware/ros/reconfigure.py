@@ -21,13 +21,13 @@ from solfer.throttle import Throttle
 
 logger = logging.getLogger(__name__)
 
-PLACE = "parameters"
+RECONFIGURE_NAME = "parameters"
 """Where they are below the plugin, whose own `set_parameters` is another service."""
 
 FAILURES = (rospy.ROSException, rospy.ServiceException, rosgraph.MasterException, OSError)
 """What may go wrong where a service or a topic is made."""
 
-_TYPES = {"number": "double", "whole number": "int", "true or false": "bool"}
+_PARAMETERS_TYPES = {"number": "double", "whole number": "int", "true or false": "bool"}
 _RANGES: dict[str, tuple[Any, Any]] = {
     "double": (-math.inf, math.inf),
     "int": (-(2**31), 2**31 - 1),
@@ -60,7 +60,7 @@ class _Row:
     def of(cls, name: str, kind: str, minimum: str, maximum: str) -> "_Row":
         words = tuple(kind.split(" or "))
         choices = () if _WORDS.intersection(words) else words
-        type_ = _TYPES.get(kind, "str")
+        type_ = _PARAMETERS_TYPES.get(kind, "str")
         least, most = (
             limit if type_ in ("bool", "str") or not text else type(limit)(float(text.rpartition(" ")[2]))
             for text, limit in zip((minimum, maximum), _RANGES[type_], strict=True)
@@ -137,7 +137,7 @@ class ReconfigureServer:
             return
         texts = zip(found.names, found.types, found.minimums, found.maximums, strict=True)
         self._rows = {row.name: row for row in (_Row.of(*each) for each in texts)}
-        prefix = f"{self._owner}/{PLACE}"
+        prefix = f"{self._owner}/{RECONFIGURE_NAME}"
         described, self._updates = (
             rospy.Publisher(f"{prefix}/{name}", kind, latch=True, queue_size=1)
             for name, kind in (("parameter_descriptions", ConfigDescription), ("parameter_updates", Config))
@@ -162,7 +162,7 @@ class ReconfigureServer:
         texts = [self._rows[name].write(value) if name in self._rows else "" for name, value in changed.items()]
         reply = self._setting.answer(SetParametersRequest(list(changed), texts))
         if not reply.success:
-            self._throttle.warning("refused", "%s/%s: refused: %s", self._owner, PLACE, reply.message)
+            self._throttle.warning("refused", "%s/%s: refused: %s", self._owner, RECONFIGURE_NAME, reply.message)
 
     def _values(self) -> dict[str, Any]:
         found = self._getting.answer(GetParametersRequest())

@@ -15,10 +15,10 @@ from solfer.transport import Middleware
 
 logger = logging.getLogger(__name__)
 
-PERIOD = 1.0
+STATISTICS_PERIOD = 1.0
 """Time between two messages [s]."""
 
-MESSAGES = {LayerSummary: LayerStatistics, PluginSummary: PluginStatistics, StageSummary: StageTimes}
+SUMMARY_MESSAGES = {LayerSummary: LayerStatistics, PluginSummary: PluginStatistics, StageSummary: StageTimes}
 
 
 class StatisticsPublisher:
@@ -30,7 +30,9 @@ class StatisticsPublisher:
         period: Time between two messages [s].
     """
 
-    def __init__(self, look: Callable[[], LayerSummary | None], middleware: Middleware, period: float = PERIOD):
+    def __init__(
+        self, look: Callable[[], LayerSummary | None], middleware: Middleware, period: float = STATISTICS_PERIOD
+    ):
         self._look = look
         self._middleware = middleware
         self._period = period
@@ -69,7 +71,7 @@ class StatisticsPublisher:
 
 def message_of(figures: Any) -> Any:
     """Convert figures to their message, with the fields that it has."""
-    kind = MESSAGES[type(figures)]
+    kind = SUMMARY_MESSAGES[type(figures)]
     fields = {name: getattr(figures, name) for name in kind.__slots__ if hasattr(figures, name)}
     for name, value in fields.items():
         if isinstance(value, Sequence) and not isinstance(value, str):

@@ -5,14 +5,14 @@ import struct
 from tf2_msgs.msg import TFMessage
 
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMessage, stamp_of
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, MESSAGE_LENGTH, PackedMessage, stamp_of
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.transport import BodyMessage, Middleware
 
-RATE = 200.0
+TRANSFORM_RATE = 200.0
 """Transforms for each second of the sender's clock [Hz]."""
 
-POSE = struct.Struct("<7d")
+TRANSFORM_POSE = struct.Struct("<7d")
 """Translation, then quaternion (x, y, z, w)."""
 
 
@@ -44,7 +44,7 @@ class BaseTransform:
         rate: Transforms for each second of the sender's clock [Hz].
     """
 
-    def __init__(self, prefix: str = "", rate: float = RATE):
+    def __init__(self, prefix: str = "", rate: float = TRANSFORM_RATE):
         self._topic_publisher = TopicPublisher("/tf", TFMessage)
         self._prefix = prefix
         self._rate = rate
@@ -67,11 +67,11 @@ def pack(message: BodyMessage, stamp: tuple[int, int], prefix: str = "") -> byte
     child = prefixed(prefix, message.child).encode()
     return b"".join(
         (
-            LENGTH.pack(1),
-            HEADER.pack(0, *stamp, len(frame)),
+            MESSAGE_LENGTH.pack(1),
+            MESSAGE_HEADER.pack(0, *stamp, len(frame)),
             frame,
-            LENGTH.pack(len(child)),
+            MESSAGE_LENGTH.pack(len(child)),
             child,
-            POSE.pack(*message.position, *message.orientation),
+            TRANSFORM_POSE.pack(*message.position, *message.orientation),
         )
     )

@@ -17,7 +17,7 @@ from rospy.impl.tcpros_base import TCPROSTransport
 from solfer.errors import MiddlewareError
 from solfer.middleware.ros.codecs.packed_message import PackedMessage
 
-AT_ONCE = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
+SEND_FLAGS = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
 COUNT = struct.Struct("<I")
 
 
@@ -149,7 +149,7 @@ class TopicPublisher:
 def _send(connection: TCPROSTransport, data: bytes | bytearray) -> int:
     """Send at once what the operating system accepts; returns that count of bytes, all for a broken connection."""
     try:
-        sent = connection.socket.send(data, AT_ONCE)
+        sent = connection.socket.send(data, SEND_FLAGS)
     except BlockingIOError:
         return 0
     except (OSError, AttributeError):  # rospy takes the socket away from a connection that it closes

@@ -8,7 +8,7 @@ import tf2_ros
 from solfer.middleware.ros.middleware import RosMiddleware
 from solfer.middleware.ros.tf import prefixed, tf_prefix
 
-STALE = 5.0
+TRANSFORM_STALE_AGE = 5.0
 """Age from which on a transform does not count [s]; one that is static has no age."""
 
 
@@ -24,7 +24,7 @@ class TransformTree:
         self._fixed, self._prefix = fixed.lstrip("/"), tf_prefix(middleware)
         self._middleware = middleware
         self._rewinds = middleware.rewinds
-        self._buffer = tf2_ros.Buffer(rospy.Duration(STALE), debug=False)
+        self._buffer = tf2_ros.Buffer(rospy.Duration(TRANSFORM_STALE_AGE), debug=False)
         self._listener = tf2_ros.TransformListener(self._buffer, tcp_nodelay=True)
 
     def locate(self, frame: str) -> tuple[float, float, float] | str:
@@ -39,7 +39,7 @@ class TransformTree:
         except tf2_ros.TransformException:
             return missing
         stamp = found.header.stamp.to_sec()
-        if stamp and self._middleware.stamp_time() - stamp > STALE:
+        if stamp and self._middleware.stamp_time() - stamp > TRANSFORM_STALE_AGE:
             return missing
         place = found.transform.translation
         turn = found.transform.rotation

@@ -12,7 +12,7 @@ from solfer.errors import MiddlewareError
 CLOCK_MONOTONIC = 1
 TIMER_ABSTIME = 1
 
-RESOLUTION = 1e-9
+CLOCK_RESOLUTION = 1e-9
 """Times that differ by less are one time of a stepped clock: sums of periods are not exact [s]."""
 
 
@@ -83,7 +83,7 @@ class SteppedClock:
         Raises:
             MiddlewareError: A line is not a time.
         """
-        while self._now < deadline - RESOLUTION and not self.ended:
+        while self._now < deadline - CLOCK_RESOLUTION and not self.ended:
             self._send(repr(self._now))
             line = self._lines.readline()
             try:

@@ -10,15 +10,15 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.services import SERVICES, offered
+from solfer.middleware.shared_memory.topics.ears import EAR_KIND as EAR
 from solfer.middleware.shared_memory.topics.ears import EARS
-from solfer.middleware.shared_memory.topics.ears import KIND as EAR
-from solfer.middleware.shared_memory.topics.sender_segment import KIND, PIPES, sender_of
+from solfer.middleware.shared_memory.topics.sender_segment import PIPES, SENDER_KIND, sender_of
 from solfer.transport.topics import Topics
 
 Opened: TypeAlias = dict[str, dict[str, Segment]]
 """Segments by their names, for each topic."""
 
-COMMANDS = "/command"
+COMMAND_SUFFIX = "/command"
 """End of the names of topics of the lower level's controllers."""
 
 
@@ -61,9 +61,9 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
     """
     found = {}
     for topic in namespace.present(PIPES):
-        if topic.endswith(COMMANDS) or topic in known:
+        if topic.endswith(COMMAND_SUFFIX) or topic in known:
             continue
-        for message in _living(namespace, PIPES, KIND, topic=topic).values():
+        for message in _living(namespace, PIPES, SENDER_KIND, topic=topic).values():
             found[topic] = PublishedTopic(topic, message)
     return list(found.values())
 
@@ -98,7 +98,7 @@ class Survey:
         """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
         if self._bell.rung():
             self._bell.acknowledge()
-            self._published, self._received = self._open(PIPES, KIND), self._open(EARS, EAR)
+            self._published, self._received = self._open(PIPES, SENDER_KIND), self._open(EARS, EAR)
         return Topics(*(_beside(node, opened) for opened in (self._published, self._received)))
 
     def _open(self, folder: str, kind: str) -> Opened:

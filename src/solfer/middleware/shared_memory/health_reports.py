@@ -15,9 +15,9 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-KIND = "report"
+REPORT_KIND = "report"
 REPORTS = "reports"
-SIZE = 8192
+REPORT_SIZE = 8192
 """Longest report [B]; figures at its end that do not fit are left out."""
 
 
@@ -25,7 +25,7 @@ class _Page:
     """The report of one part."""
 
     def __init__(self, segment: Segment):
-        self.segment, self.slot = segment, Slot(segment.data, Text.width(SIZE))
+        self.segment, self.slot = segment, Slot(segment.data, Text.width(REPORT_SIZE))
         self.text = Text(self.slot.values)
 
 
@@ -50,9 +50,9 @@ class Reports:
         if page is None:
             return
         values = {key: value if isinstance(value, str) else float(value) for key, value in report.values.items()}
-        while len(text := json.dumps([report.level, report.summary, values]).encode()) > SIZE:
+        while len(text := json.dumps([report.level, report.summary, values]).encode()) > REPORT_SIZE:
             if not values:
-                text = json.dumps([report.level, report.summary[: SIZE // 8], {}]).encode()
+                text = json.dumps([report.level, report.summary[: REPORT_SIZE // 8], {}]).encode()
                 break
             values.popitem()
         page.text.write(text)
@@ -79,7 +79,7 @@ class Reports:
     def _open(self, name: str) -> _Page | None:
         try:
             path = self._namespace.place(REPORTS, name)
-            page = _Page(Segment.create(path, KIND, name.encode(), size=Slot.size(Text.width(SIZE))))
+            page = _Page(Segment.create(path, REPORT_KIND, name.encode(), size=Slot.size(Text.width(REPORT_SIZE))))
         except MiddlewareError as error:
             logger.warning("the health of '%s' is not reported: %s", name, error)
             return None
@@ -94,7 +94,7 @@ class Reports:
                 continue
             self._others.pop(name, None)
             try:
-                segment = Segment.attach(self._namespace.path(REPORTS, name), KIND)
+                segment = Segment.attach(self._namespace.path(REPORTS, name), REPORT_KIND)
             except MiddlewareError as error:
                 logger.debug("the health of '%s' is not read: %s", name, error)
                 continue

@@ -24,8 +24,8 @@ from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
 PARAMETERS = "provided"
-PARAMETER = "parameter"
-WAIT = 1e-3
+PARAMETER_KIND = "parameter"
+CHECK_PERIOD = 1e-3
 """Time between two checks of a condition that is waited for [s]."""
 
 
@@ -152,7 +152,7 @@ class XbotMiddleware(Middleware):
             return self._parameters[name.lstrip("/")]
         path = self.namespace.path(PARAMETERS, name)
         try:
-            segment = Segment.attach(path, PARAMETER) if path.exists() else None
+            segment = Segment.attach(path, PARAMETER_KIND) if path.exists() else None
         except MiddlewareError as error:
             raise error.at(where) from None
         if segment is None or not segment.owned():
@@ -175,7 +175,9 @@ class XbotMiddleware(Middleware):
         if key in self._provided:
             self._provided[key] = self._provided[key].recreate(content, 0)
         else:
-            self._provided[key] = Segment.create(self.namespace.place(PARAMETERS, name), PARAMETER, content, size=0)
+            self._provided[key] = Segment.create(
+                self.namespace.place(PARAMETERS, name), PARAMETER_KIND, content, size=0
+            )
 
     def reader(self, topic: str, message: str, kept: int = 0) -> XbotReader:
         """See `Middleware.reader`; of a sender no more are kept than `DEPTH`."""
@@ -214,7 +216,7 @@ class XbotMiddleware(Middleware):
         while not reader.read():
             if self.now() >= end or not self.running():
                 return topic, None
-            self.sleep_until(self.now() + WAIT)
+            self.sleep_until(self.now() + CHECK_PERIOD)
         return topic, reader.message.names
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
@@ -225,7 +227,7 @@ class XbotMiddleware(Middleware):
                 raise MiddlewareError(
                     f"the caller of service '{name}' ends", expected="a caller that runs until the answer is there"
                 )
-            self.sleep_until(self.now() + WAIT)
+            self.sleep_until(self.now() + CHECK_PERIOD)
         return answer.result()
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":

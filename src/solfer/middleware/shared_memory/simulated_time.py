@@ -4,9 +4,9 @@ from pathlib import Path
 
 from solfer.middleware.shared_memory.memory.latched import latched
 
-FILE = "simulated_time"
-KIND = "simulated time"
-LAYOUT = b'{"words": ["rewinds", "time [ns]"]}'
+SIMULATED_TIME_FILE = "simulated_time"
+SIMULATED_TIME_KIND = "simulated time"
+SIMULATED_TIME_LAYOUT = b'{"words": ["rewinds", "time [ns]"]}'
 REWINDS, TIME = range(2)
 
 
@@ -24,7 +24,7 @@ class SimulatedTime:
     """
 
     def __init__(self, folder: Path):
-        self._segment = latched(folder / FILE, KIND, LAYOUT, size=16)
+        self._segment = latched(folder / SIMULATED_TIME_FILE, SIMULATED_TIME_KIND, SIMULATED_TIME_LAYOUT, size=16)
         self.words = self._segment.data[:16].cast("q")
 
     @property

@@ -6,7 +6,7 @@ from urllib.parse import unquote, urlsplit
 from solfer.config.yaml.files import is_file, located
 from solfer.errors import MissingDependency, UnknownName
 
-PACKAGE = "package://"
+PACKAGE_SCHEME = "package://"
 
 
 def find_mesh(urdf: str | Path, name: str) -> Path | None:
@@ -27,11 +27,11 @@ def mesh_candidates(urdf: str | Path, name: str) -> list[Path]:
     file = Path(urdf).absolute()
     if name.startswith("file:"):
         return [Path(unquote(urlsplit(name).path))]
-    if not name.startswith(PACKAGE):
+    if not name.startswith(PACKAGE_SCHEME):
         return [file.parent / name]
-    path = name.removeprefix(PACKAGE).lstrip("/")
+    path = name.removeprefix(PACKAGE_SCHEME).lstrip("/")
     found = [folder / path for folder in file.parents]
     try:
-        return [*found, located(PACKAGE + path, "")]
+        return [*found, located(PACKAGE_SCHEME + path, "")]
     except (MissingDependency, UnknownName):
         return found

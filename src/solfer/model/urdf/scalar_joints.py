@@ -10,7 +10,7 @@ from solfer.model.urdf.description import Description
 BASE_DOFS = ("x", "y", "z", "rx", "ry", "rz")
 """Names of the six DoFs of a floating base, in their order."""
 
-_AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+_JOINT_AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 _UNLIMITED = "1e12"
 
 
@@ -69,7 +69,7 @@ def _add_base(robot: Element, description: Description, parent: str, child: str,
             parent = _free_name(f"base_{name}", description)
             SubElement(robot, "link", name=parent)
         SubElement(joint, "child", link=parent)
-        SubElement(joint, "axis", xyz=_AXES[name[-1]])
+        SubElement(joint, "axis", xyz=_JOINT_AXES[name[-1]])
         _set_unlimited(joint)
         if origin is not None:
             joint.append(origin)

@@ -35,13 +35,13 @@ SOLVED, INFEASIBLE, GAVE_UP, INACCURATE, NOT_FINITE = range(5)
 DEPENDENT = 1e-9
 """Share of a normal outside the span of the active ones below which it counts as dependent on them."""
 
-FLAT = 1e-13
+ACTIVE_SET_FLATNESS = 1e-13
 """Share of the largest entry of H below which a pivot of its decomposition counts as zero."""
 
-ENOUGH, PASSES = 1e-3, 3
+ACTIVE_SET_PRECISION, PASSES = 1e-3, 3
 """Share of the tolerance at which x is not refined any more, and the most times that it is."""
 
-SHIFT, ROUNDS = 1e-9, 4
+SHIFT, ACTIVE_SET_ROUNDS = 1e-9, 4
 """Share of the largest entry of H that is added to its diagonal where H is almost singular, and how often at most."""
 
 
@@ -62,7 +62,7 @@ def _factorise(hessian, gradient, shift, factor, turned, x):
                 entry -= factor[i, k] * factor[j, k]
             if i > j:
                 factor[i, j] = entry / factor[j, j]
-            elif entry > FLAT * largest:
+            elif entry > ACTIVE_SET_FLATNESS * largest:
                 factor[i, i] = math.sqrt(entry)
             else:
                 return False
@@ -256,7 +256,17 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
         name, violation = _most_violated(limits, tolerance, x, normal, is_active)
         if name < 0:
             residual, scale = refine(
-                cost, limits, turned, factor, active, names, multipliers, x, vectors, ENOUGH * tolerance, PASSES
+                cost,
+                limits,
+                turned,
+                factor,
+                active,
+                names,
+                multipliers,
+                x,
+                vectors,
+                ACTIVE_SET_PRECISION * tolerance,
+                PASSES,
             )
             which = _negative(names, multipliers, active, scale, tolerance)
             if which < 0 and _most_violated(limits, tolerance, x, normal, is_active)[0] < 0:
@@ -267,7 +277,19 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
                 is_active[names[which]] = 0
                 _drop(turned, factor, active, which, names, multipliers)
                 active -= 1
-                refine(cost, limits, turned, factor, active, names, multipliers, x, vectors, ENOUGH * tolerance, PASSES)
+                refine(
+                    cost,
+                    limits,
+                    turned,
+                    factor,
+                    active,
+                    names,
+                    multipliers,
+                    x,
+                    vectors,
+                    ACTIVE_SET_PRECISION * tolerance,
+                    PASSES,
+                )
             continue
         multiplier = 0.0
         while steps < most:
@@ -302,7 +324,7 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
 _PROBLEM = f"{_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}"
-_TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
+_ACTIVE_SET_TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
 
 
 def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
@@ -351,7 +373,7 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
             entry = max(entry, hessian[i, i])
         shift = SHIFT * entry
         before[:] = 0.0
-        for _ in range(ROUNDS):
+        for _ in range(ACTIVE_SET_ROUNDS):
             for i in range(len(x)):
                 moved[i] = gradient[i] - shift * before[i]
             outcome, more, residual = _attempt(
@@ -371,7 +393,7 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
             before[:] = x
         return INACCURATE, steps, residual
 
-    return cached(f"Tuple((int64, int64, float64))({_TYPES})", solve, REORDERED)
+    return cached(f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED)
 
 
 _compiled = _compile(digest(Path(__file__).parent.glob("*.py")))

@@ -11,7 +11,7 @@ from solfer.numerics.velocity_bounds import VelocityBounds
 SLIDING = 1e-3
 """What rates of rigid levels may be off because joints are at their bounds [m/s]."""
 
-SMALLEST = 1e-9
+VIOLATION_SMALLEST_SIZE = 1e-9
 """How far a velocity may be beyond its bound [rad/s, m/s]."""
 
 
@@ -161,7 +161,7 @@ def _slides(rows, rates, count, found, is_free):
 def _farthest(columns, lower, upper, is_free, found, scale):
     """Find the place of the velocity that is farthest beyond its bounds; -1: there is none."""
     place = -1
-    farthest = SMALLEST
+    farthest = VIOLATION_SMALLEST_SIZE
     for a in range(len(columns)):
         if is_free[a]:
             value = scale * found[a]

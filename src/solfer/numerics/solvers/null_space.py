@@ -5,7 +5,7 @@ from scipy.linalg import lapack
 
 from solfer.errors import SizeMismatch
 
-TOLERANCE = 1e-9
+RANK_TOLERANCE = 1e-9
 """Diagonal entries of R below this share of the largest one count as zero."""
 
 
@@ -54,7 +54,7 @@ class NullSpace:
         np.copyto(packed, matrix.T)
         packed, _, scales, _, _ = lapack.dgeqp3(packed, lwork=self._work_of_pivoting, overwrite_a=1)
         diagonal = np.abs(packed.diagonal())
-        self.rank = int(np.count_nonzero(diagonal > TOLERANCE * diagonal[0]))
+        self.rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
         self._reflectors = packed[:, : self.rank]
         self._scales = scales[: self.rank]
         return self.rank

@@ -7,7 +7,7 @@ from scipy.linalg import lapack
 
 from solfer.errors import NotFinite
 
-TOLERANCE = 1e-11
+EIGENVALUE_TOLERANCE = 1e-11
 """Eigenvalues below this share of the largest one count as zero."""
 
 
@@ -39,7 +39,7 @@ class SymmetricPseudoInverse:
         values, vectors, failed = lapack.dsyev(self.matrix.T, overwrite_a=1)
         if failed or not math.isfinite(values[-1]):
             raise NotFinite("a symmetric matrix has no finite eigenvalues", expected="finite numbers")
-        np.greater(values, TOLERANCE * max(values[-1], 0.0), out=self._counts)
+        np.greater(values, EIGENVALUE_TOLERANCE * max(values[-1], 0.0), out=self._counts)
         self.rank = int(np.count_nonzero(self._counts))
         self._inverses[:] = 0.0
         np.divide(1.0, values, out=self._inverses, where=self._counts)

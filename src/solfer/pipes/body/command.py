@@ -11,7 +11,7 @@ from solfer.pipes.command_pipe import CommandPipe
 from solfer.transport.endpoints import Writer
 from solfer.transport.messages import VECTOR_MESSAGES, BodyMessage, Message, VectorMessage
 
-SENT = {
+SENT_MESSAGES = {
     "nav_msgs/Odometry": ("position", "velocity"),
     "geometry_msgs/PoseStamped": ("position",),
     "geometry_msgs/QuaternionStamped": ("position",),

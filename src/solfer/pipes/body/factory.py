@@ -5,9 +5,9 @@ from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError, SolferError
 from solfer.model import Kinematics
 from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
-from solfer.pipes.body.command import SENT, BodyCommandPipe, PublishedLink
+from solfer.pipes.body.command import SENT_MESSAGES, BodyCommandPipe, PublishedLink
 from solfer.pipes.body.feedback import BodyFeedbackPipe, BodySensor
-from solfer.pipes.body.reading import MOVING, READINGS, BodyReading, turns
+from solfer.pipes.body.reading import CHART_AXES, READINGS, BodyReading, turns
 from solfer.pipes.body.sensor_mount import SensorMount
 from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import require_base, require_link
@@ -57,9 +57,9 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
             expected="a filter in the pipe that receives it",
         )
     link = require_link(record.dofs, robot)
-    message = message_of(record, SENT, "rigid body that a plugin can send")
+    message = message_of(record, SENT_MESSAGES, "rigid body that a plugin can send")
     for field in _fields(record):
-        if field not in SENT[message]:
+        if field not in SENT_MESSAGES[message]:
             raise PipeError(
                 f"{message} carries no '{field}'",
                 where=record.interface.where(field),
@@ -106,7 +106,7 @@ def _check_orientation(record: FeedbackRecord, convention: ConventionRecord, rea
             where=convention.orientation.where("type") or record.where("convention"),
             expected=f"type: {lacking}, or another message",
         )
-    if lacking == "QUATERNION" and turns(record.output_angles) != MOVING:
+    if lacking == "QUATERNION" and turns(record.output_angles) != CHART_AXES:
         raise PipeError(
             "the base of the robot turns about x, then y, then z",
             where=record.output_angles.where(),

@@ -18,10 +18,10 @@ from solfer.pipes.feedback_pipe import Reception, StateFeedbackPipe
 from solfer.transport.endpoints import Reader
 from solfer.transport.messages import Message
 
-BASE = np.arange(6)
+BASE_INDICES = np.arange(6)
 """DoFs of a floating base: x y z rx ry rz."""
 
-MEASURED = (("position", "orientation", "orientation"), ("velocity", "angular", "angular velocity"))
+SENSOR_FIELDS = (("position", "orientation", "orientation"), ("velocity", "angular", "angular velocity"))
 """Fields, what each needs of a sensor, and its name."""
 
 STEEP = math.radians(75.0)
@@ -71,9 +71,9 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         reception: Reception,
     ):
         used = slice(0 if sensor.located else 3, 6)
-        super().__init__(name, reader, state, fields=fields, dofs=BASE[used], reception=reception)
+        super().__init__(name, reader, state, fields=fields, dofs=BASE_INDICES[used], reception=reception)
         # imported here: its compiler takes a while to load
-        from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
+        from solfer.numerics.twist_transport import FROM_POSE, FROM_TWIST, GO_ON, OWN_AXES, WITH_ORIENTATION, Carried
 
         mount = sensor.mount
         reading = sensor.reading
@@ -86,8 +86,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         self._alignment = Alignment(self._carried.world) if sensor.calibrated else None
         self._measures_pose = "position" in fields
         self._known = state.position[:6]
-        self._options = (POSE if self._measures_pose else 0) | (TWIST if "velocity" in fields else 0)
-        self._oriented = ORIENTED if "orientation" in reading.carries else 0
+        self._options = (FROM_POSE if self._measures_pose else 0) | (FROM_TWIST if "velocity" in fields else 0)
+        self._oriented = WITH_ORIENTATION if "orientation" in reading.carries else 0
         is_turned = reception.measured and self._measures_pose and "orientation" in reading.carries
         self._turn_check = TurnCheck() if is_turned else None
         carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
@@ -107,7 +107,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         self._reading.read(message)
         if not self._reading.lacks:
             return
-        for field, quantity, text in MEASURED:
+        for field, quantity, text in SENSOR_FIELDS:
             if quantity in self._reading.lacks and any(each.field == field for each in self.state_fields):
                 raise PipeError(
                     f"the sensor measures no {text}", expected=f"a sensor that does, or interface: {{{field}: false}}"

@@ -17,10 +17,10 @@ from solfer.numerics.rotations import (
 )
 from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
 
-FASTEST, FASTEST_TURN = 50.0, 60.0
+BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
 """Velocities that no legged or wheeled robot has [m/s, rad/s]; gyroscopes end at 35 rad/s (2000 degrees/s)."""
 
-STRAIGHT = np.array((0.0, 0.0, 0.0, 1.0))
+NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
 """In place of an orientation that is not measured."""
 
 LACKING = {
@@ -31,7 +31,7 @@ LACKING = {
 }
 """What an inertial measurement unit lacks, by whether it measures orientation and angular velocity."""
 
-MOVING = (0, 1, 2)
+CHART_AXES = (0, 1, 2)
 """Turns of the chart of a floating base: about x, then y, then z."""
 
 
@@ -54,7 +54,7 @@ class BodyReading(abc.ABC):
 
     carries: ClassVar[frozenset[str]]
 
-    def __init__(self, body: str, convention: ConventionRecord, axes: tuple[int, int, int] = MOVING):
+    def __init__(self, body: str, convention: ConventionRecord, axes: tuple[int, int, int] = CHART_AXES):
         self._body = body
         self._axes = axes
         self._twist_frame = convention.twist.frame
@@ -86,9 +86,9 @@ class BodyReading(abc.ABC):
         if not -FASTEST_TURN < min(wx, wy, wz) <= max(wx, wy, wz) < FASTEST_TURN:
             rate = max(abs(wx), abs(wy), abs(wz))
             raise PipeError(f"an angular velocity of {rate:.3g} rad/s", expected=f"{FASTEST_TURN:g} rad/s at most")
-        if not -FASTEST < min(vx, vy, vz) <= max(vx, vy, vz) < FASTEST:
+        if not -BODY_TOP_SPEED < min(vx, vy, vz) <= max(vx, vy, vz) < BODY_TOP_SPEED:
             speed = max(abs(vx), abs(vy), abs(vz))
-            raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{FASTEST:g} m/s at most")
+            raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{BODY_TOP_SPEED:g} m/s at most")
 
     def check_body(self, message: Message) -> None:  # noqa: B027 most messages name no body
         """Check that a message describes this body.
@@ -147,7 +147,7 @@ class ImuReading(BodyReading):
         if oriented:
             self._orient(message.orientation)
         else:
-            self._quaternion[:] = STRAIGHT
+            self._quaternion[:] = NO_TURN
         self._angular[...] = message.angular if turning else 0.0
         self.lacks = LACKING[oriented, turning]
         np.copyto(self.force, message.acceleration)
@@ -210,4 +210,4 @@ READINGS: dict[str, type[BodyReading]] = {
 
 def turns(record: AnglesRecord | None) -> tuple[int, int, int]:
     """Return the order of the turns that a pipe is configured for."""
-    return MOVING if record is None else record.axes()
+    return CHART_AXES if record is None else record.axes()

@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import Contradiction
 
-LEAPS, CONTRADICTS, ASKEW, SPIKES = 1, 2, 3, 4
+LEAPS, CONTRADICTS, TURN_SKEW, SPIKES = 1, 2, 3, 4
 """Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
 
 UNMEASURED = np.zeros(3)
@@ -63,7 +63,7 @@ class TurnCheck:
                 f"the orientation turns by {angle:.3g} rad, and otherwise by the turn rates",
                 expected="one sensor, with axes and signs of REP 103",
             )
-        if result == ASKEW:
+        if result == TURN_SKEW:
             raise Contradiction(
                 f"the vertical of the orientation is {angle:.3g} rad from the mean of the accelerometer",
                 expected="one sensor, with axes and signs of REP 103",

@@ -18,10 +18,10 @@ from solfer.pipes.state_field import interface_of
 from solfer.robot.names import LOWER_LEVEL_MAPS, controller_map
 from solfer.transport.messages import ANY_INTERFACE, GAINS, JOINT_FIELDS, JOINT_MESSAGES
 
-VELOCITY = ("velocity",)
+VELOCITY_FIELDS = ("velocity",)
 """Fields that a velocity controller takes."""
 
-PATIENCE = 10.0
+JOINT_PATIENCE = 10.0
 """Longest wait for the lower level's gains [s]."""
 
 
@@ -133,7 +133,7 @@ def _state(record: FeedbackRecord | ControllerRecord, context: PipeContext, fiel
 
 def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
     """Check that a controller of the lower level takes all fields of its pipe."""
-    taken = VELOCITY if record.type == "velocity" else JOINT_FIELDS
+    taken = VELOCITY_FIELDS if record.type == "velocity" else JOINT_FIELDS
     for field in fields:
         if field not in taken:
             raise PipeError(
@@ -154,7 +154,7 @@ def _published_gains(
     carried = [gain for gain in GAINS if getattr(record.interface, gain)]
     if not carried or context.idle:
         return {}
-    published = context.middleware.controller_gains(record.leads_to, PATIENCE, record.interface.where(carried[0]))
+    published = context.middleware.controller_gains(record.leads_to, JOINT_PATIENCE, record.interface.where(carried[0]))
     calibration = None if record.calibration is None else context.calibrations[record.calibration]
     names = external_names(mapping)
     hardware = [name if calibration is None else calibration.hardware(name) for name in names]

@@ -17,7 +17,7 @@ from solfer.config import (
     Part,
     SourceRecord,
 )
-from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
+from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
 from solfer.config.records.sources import TextRecord
 from solfer.config.yaml.files import read_text
 from solfer.errors import MiddlewareError, SolferError, UnknownName
@@ -25,7 +25,7 @@ from solfer.model import Description, Kinematics, Semantics
 from solfer.model.urdf.cut import cut
 from solfer.plugins.generation.generator import Generator
 from solfer.robot.defaults import ACTUATED, ALL, MODEL_MAPS
-from solfer.robot.names import FEEDBACK, LOWER_LEVEL, controller_map
+from solfer.robot.names import FEEDBACK_MAP, LOWER_LEVEL_MAP, controller_map
 from solfer.robot.shipped import ControllerGroups, RobotFiles
 from solfer.transport import Middleware
 from solfer.transport.endpoints import MessageStatus, NullWriter, Publisher, Queue, Reader, Writer
@@ -34,7 +34,7 @@ from solfer.transport.messages import canonical
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.topics import Topics
 
-RATE = 100.0
+DRY_RUN_RATE = 100.0
 """Rate of a plugin whose own has a mistake [Hz]."""
 
 
@@ -223,7 +223,7 @@ def dry_run(part: Part, generator: type[Generator], files: RobotFiles, whole: bo
         files: The files of its robot.
         whole: Whether the configuration is free of mistakes so far; if not, what needs its missing parts is left out.
     """
-    configuration = known_without_robot(part.assumed(RATE), files, whole)
+    configuration = known_without_robot(part.assumed(DRY_RUN_RATE), files, whole)
     generation = generator(configuration, DryMiddleware(configuration, files))
     plugin = generation.attempt(whole)
     if plugin is not None:
@@ -304,10 +304,10 @@ def _maps(configuration: Configuration) -> Iterator[str]:
     """Yield the maps that the Robot of an incomplete configuration gets."""
     yield from (*MODEL_MAPS, ACTUATED, *MIDDLEWARE_MAPS, *configuration.mappings)
     if any(record.measures_joints for record in configuration.feedbacks):
-        yield FEEDBACK
+        yield FEEDBACK_MAP
     for record in configuration.controllers:
         if record.lower_level:
-            yield from (controller_map(record.leads_to), LOWER_LEVEL)
+            yield from (controller_map(record.leads_to), LOWER_LEVEL_MAP)
 
 
 def _filtered(configuration: Configuration, keeps: Callable[[Any], bool]) -> Configuration:

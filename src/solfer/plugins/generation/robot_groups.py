@@ -11,7 +11,7 @@ from solfer.config import Configuration, ControllerRecord, FeedbackRecord, TextR
 from solfer.config.kinds.contact import ContactTags
 from solfer.errors import PipeError, SolferError
 from solfer.robot.defaults import ACTUATED, MODEL_MAPS
-from solfer.robot.names import FEEDBACK, UNACTUATED
+from solfer.robot.names import FEEDBACK_MAP, UNACTUATED
 
 Number = tuple[str, str, str]
 """A number of a Robot that pipes write: State, interface, and DoF; or the wrench of a contact."""
@@ -19,7 +19,7 @@ Number = tuple[str, str, str]
 ALONE = "shared"
 """Name of the shared plugin of a process that runs no other."""
 
-_OWN = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout", "history")
+_GROUP_OWN = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout", "history")
 """Tags of a feedback that concern its plugin alone."""
 
 _EXTENT = ("dofs", "interface", "limits", "contact", "names")
@@ -83,7 +83,7 @@ def origin(record: FeedbackRecord, configuration: Configuration) -> dict[str, An
         record: The feedback.
         configuration: Its plugin's.
     """
-    own = {key: value for key, value in vars(record).items() if key not in (*_OWN, *_EXTENT)}
+    own = {key: value for key, value in vars(record).items() if key not in (*_GROUP_OWN, *_EXTENT)}
     return own | {
         "source": _plain(record.source),
         "message": record.travels_as,
@@ -188,10 +188,10 @@ def numbers_of(record: FeedbackRecord) -> Iterator[Number]:
     dofs = record.dofs
     body = record.content.body
     parts: tuple[str, ...] = (UNACTUATED,) if body else {"all": ("actuated", UNACTUATED)}.get(dofs.type, (dofs.type,))
-    if not body and dofs.mapping in (FEEDBACK, ACTUATED):  # the orders of what is measured and driven lack a base
+    if not body and dofs.mapping in (FEEDBACK_MAP, ACTUATED):  # the orders of what is measured and driven lack a base
         parts = tuple(part for part in parts if part != UNACTUATED)
     chain = "all" if body else dofs.chain
-    partial = "" if body or dofs.mapping in (*MODEL_MAPS, FEEDBACK, ACTUATED) else f" in {dofs.mapping}"
+    partial = "" if body or dofs.mapping in (*MODEL_MAPS, FEEDBACK_MAP, ACTUATED) else f" in {dofs.mapping}"
     for interface in record.interface.carried:
         for part in parts:
             yield record.function or "state", interface, f"{part} of {chain}{partial}"

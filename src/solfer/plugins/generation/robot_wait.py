@@ -7,7 +7,7 @@ from solfer.config import Configuration
 from solfer.errors import UnknownName, nearest
 from solfer.transport import Middleware
 
-LOOK, AGAIN = 0.2, 10.0
+ROBOT_POLL_PERIOD, ROBOT_REPEAT_PERIOD = 0.2, 10.0
 """Time between two looks, and between two messages about the same [s]."""
 
 MISSPELT = 0.85
@@ -32,13 +32,13 @@ def wait_for_robot(
     running: Callable[[], bool],
     pause: Callable[[], None],
 ) -> bool:
-    """Wait until the robot is there; says for what, once and every `AGAIN` [s].
+    """Wait until the robot is there; says for what, once and every `ROBOT_REPEAT_PERIOD` [s].
 
     Args:
         configurations: Those of the plugins.
         middleware: Where the robot is looked for.
         running: False as soon as the end was requested.
-        pause: Lets `LOOK` [s] pass.
+        pause: Lets `ROBOT_POLL_PERIOD` [s] pass.
 
     Returns:
         False if the end was requested.
@@ -55,7 +55,7 @@ def wait_for_robot(
             if reported:
                 logger.info("the robot is there")
             return True
-        if found != reported or looks % round(AGAIN / LOOK) == 0:
+        if found != reported or looks % round(ROBOT_REPEAT_PERIOD / ROBOT_POLL_PERIOD) == 0:
             logger.warning("waits for the robot: %s", found)
             reported = found
             looks = 0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from solfer.config import CheckReport, Configuration
 from solfer.config.loading.rt_layer import is_layer, read_layer
 from solfer.config.loading.shared import Naming
-from solfer.config.records.middlewares import DEFAULT
+from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE
 from solfer.config.yaml.files import YamlFile
 from solfer.config.yaml.nodes import Mark
 from solfer.errors import ConfigError, SolferError
@@ -128,8 +128,8 @@ def _foreign(configuration: Configuration) -> Foreign | None:
     tree = configuration.tree
     middleware = tree.get("middleware")
     layer = tree.get("modules", configuration.name, "layer")
-    if middleware is not None and middleware.value != DEFAULT:
-        return Foreign(middleware.mark, f"middleware {middleware.value}", f"`middleware: {DEFAULT}`")
+    if middleware is not None and middleware.value != DEFAULT_MIDDLEWARE:
+        return Foreign(middleware.mark, f"middleware {middleware.value}", f"`middleware: {DEFAULT_MIDDLEWARE}`")
     if layer is not None and layer.value == "RT":
         return Foreign(layer.mark, "layer RT", "`layer: NRT`")
     return None

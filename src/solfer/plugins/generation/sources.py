@@ -14,7 +14,7 @@ from solfer.robot.shipped import RobotFiles
 COMMAND_TOPIC = "/command"
 """Topic of a lower-level controller, behind its name."""
 
-ALIKE = 0.8
+TOPIC_SIMILARITY = 0.8
 """Likeness of two topics, of 1, from which one may be the other, misspelt: `upper_body` and `lower_body` have 0.7."""
 
 
@@ -42,7 +42,7 @@ def check_sources(
         source = (record.source or "").lstrip("/")
         if not source or _spelling(source) in spellings:
             continue
-        close = nearest(source, published, likeness=ALIKE)
+        close = nearest(source, published, likeness=TOPIC_SIMILARITY)
         mark = record.place("source")
         if close and mark is not None:
             what = f"neither the simulated robot nor a plugin of this file publishes '{record.source}'"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-LEVELS = 3
+SEARCHED_FOLDERS = 3
 """How many folders above a configuration are looked at: its own, its package's, and the workspace's `src/`."""
 
 
@@ -29,7 +29,7 @@ def importable_beside(file: str) -> Iterator[None]:
 
 def _folders(start: Path) -> Iterator[Path]:
     """Yield the folders that may hold a package: those of the file's own package first, then those beside it."""
-    above = (start, *start.parents)[:LEVELS]
+    above = (start, *start.parents)[:SEARCHED_FOLDERS]
     for folder in above:
         yield from (folder / "src", folder)
     for folder in above:

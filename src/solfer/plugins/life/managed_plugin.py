@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from solfer.errors import ComponentError, described, located
 from solfer.plugins.plugin import Plugin
 from solfer.transport.health import Health
-from solfer.transport.plugin_state import ACTIVE, AT_REST, FAILED, PluginState
+from solfer.transport.plugin_state import ACTIVE, FAILED_STATES, RESTING_STATES, PluginState
 
 
 class ManagedPlugin:
@@ -50,7 +50,7 @@ class ManagedPlugin:
     @property
     def at_rest(self) -> bool:
         """Whether it sends no commands."""
-        return self.state in AT_REST
+        return self.state in RESTING_STATES
 
     @property
     def explanation(self) -> str:
@@ -59,7 +59,7 @@ class ManagedPlugin:
 
     def health(self) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence."""
-        return (Health.ERROR, self.explanation) if self.state in FAILED else self.plugin.health()
+        return (Health.ERROR, self.explanation) if self.state in FAILED_STATES else self.plugin.health()
 
     def initialize(self) -> None:
         """Get ready to be started; sends nothing."""
@@ -103,7 +103,7 @@ class ManagedPlugin:
             self.failure = self.failure or error
             self._go(PluginState.FAULT, f"it cannot be closed: {located(error)}")
         else:
-            if self.state not in FAILED:
+            if self.state not in FAILED_STATES:
                 self._go(PluginState.CLOSED)
 
     def cycle(self) -> None:

@@ -14,13 +14,13 @@ from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
 from solfer.transport import Inbox
-from solfer.transport.plugin_state import FAILED, PluginState
+from solfer.transport.plugin_state import FAILED_STATES, PluginState
 
 logger = logging.getLogger(__name__)
 
 COMPONENT = Stage.COMPONENT
 
-ENDED = (PluginState.STOPPING, PluginState.STOPPED, PluginState.CLOSED, *FAILED)
+ENDED = (PluginState.STOPPING, PluginState.STOPPED, PluginState.CLOSED, *FAILED_STATES)
 """States of a plugin that others cannot rely on."""
 
 NOTHING: Mapping[str, Sequence[str]] = {}

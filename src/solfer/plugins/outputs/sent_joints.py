@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.pipes import JointCommandPipe
 
-NEAR = 0.2
+SENT_JOINTS_NEARNESS = 0.2
 """Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
 
 
@@ -66,7 +66,7 @@ class SentJoints:
     def follow(self, position: np.ndarray) -> None:
         """Write where joints are that follow what was sent last, beside where they are measured [rad, m]: there."""
         for dofs, sent in self._positions if self._are_followed else ():
-            follow = np.abs(sent - position[dofs]) <= NEAR
+            follow = np.abs(sent - position[dofs]) <= SENT_JOINTS_NEARNESS
             position[dofs[follow]] = sent[follow]
 
 

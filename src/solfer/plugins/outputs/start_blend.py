@@ -12,7 +12,7 @@ from solfer.robot import Robot
 
 logger = logging.getLogger(__name__)
 
-SHARE = 0.2
+BLEND_SPEED_SHARE = 0.2
 """Part of its speed limit at which a joint moves, at most, from the measured to the commanded position at a start."""
 
 SHORTEST = 0.5
@@ -159,7 +159,7 @@ class _Positions(_Limited):
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
         super().__init__(name, values, pipe, robot=robot, known=known)
-        speed = SHARE * robot.upper_limits.velocity[pipe.dofs]
+        speed = BLEND_SPEED_SHARE * robot.upper_limits.velocity[pipe.dofs]
         self._pace = np.divide(PEAK, speed, out=np.zeros(len(speed)), where=speed > 0.0)
 
     def begin(self, position: np.ndarray) -> None:

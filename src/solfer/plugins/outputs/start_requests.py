@@ -14,7 +14,7 @@ from solfer.transport.middleware import Flag
 
 logger = logging.getLogger(__name__)
 
-PATIENCE = 5.0
+REQUEST_PATIENCE = 5.0
 """Longest wait for an answer [s]."""
 
 LOAD = "/load_gains"
@@ -54,7 +54,7 @@ class StartRequests:
     def send(self) -> None:
         """Send them all."""
         for each in self.requests:
-            answer = self._middleware.request(each.service, each.interface, each.request, Answer, PATIENCE)
+            answer = self._middleware.request(each.service, each.interface, each.request, Answer, REQUEST_PATIENCE)
             answer.add_done_callback(partial(self._report, each))
 
     def _report(self, request: StartRequest, answer: "Future[Any]") -> None:

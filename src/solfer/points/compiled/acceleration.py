@@ -10,7 +10,7 @@ from numba import carray, njit
 from solfer.points.compiled.instruction import (
     ANGULAR,
     LINEAR,
-    SMALLEST,
+    VECTOR_SMALLEST_SIZE,
     acceleration_of,
     columns_of,
     floats,
@@ -115,7 +115,7 @@ def _touching(of_material, numbers, placement, drift, spin, linear, angular):
     down = _plus(normal, -along, axis)
     length = math.sqrt(_dot(down, down))
     # a wheel that lies flat touches the ground with its whole ring: its centre stands for it
-    scale = 1.0 / length if length > SMALLEST else 0.0
+    scale = 1.0 / length if length > VECTOR_SMALLEST_SIZE else 0.0
     down = _scaled(scale, down)
     down_1 = _scaled(-scale, _plus(_scaled(along_1, axis), along, axis_1))
     rate = _dot(down, down_1)

@@ -5,7 +5,7 @@ import math
 from numba import carray, njit
 
 from solfer.points.compiled.instruction import (
-    SMALLEST,
+    VECTOR_SMALLEST_SIZE,
     columns_of,
     floats,
     followers,
@@ -67,7 +67,7 @@ def orientation_difference(a, b, out):
     sine = math.sqrt(x * x + y * y + z * z)
     sign = -1.0 if w < 0.0 else 1.0
     # 2 asin(s) / s tends to 2; the next term is s^2 / 3
-    factor = sign * (2.0 * math.atan2(sine, sign * w) / sine if sine > SMALLEST else 2.0)
+    factor = sign * (2.0 * math.atan2(sine, sign * w) / sine if sine > VECTOR_SMALLEST_SIZE else 2.0)
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
 
 
@@ -147,7 +147,7 @@ def norm(row, program, with_jacobian):
     dofs = program.dofs
     columns = columns_of(row)
     jacobian = jacobian_of(row, program)
-    scale = 1.0 / value[0] if value[0] > SMALLEST else 0.0
+    scale = 1.0 / value[0] if value[0] > VECTOR_SMALLEST_SIZE else 0.0
     for k in columns:
         jacobian[k] = 0.0
     if row.first_jacobian == 0:

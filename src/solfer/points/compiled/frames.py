@@ -4,7 +4,14 @@ import math
 
 from numba import carray, njit
 
-from solfer.points.compiled.instruction import SMALLEST, columns_of, floats, jacobian_of, numbers_of, value_of
+from solfer.points.compiled.instruction import (
+    VECTOR_SMALLEST_SIZE,
+    columns_of,
+    floats,
+    jacobian_of,
+    numbers_of,
+    value_of,
+)
 from solfer.points.compiled.registry import kernel
 from solfer.points.compiled.rigid import quaternion
 
@@ -129,7 +136,7 @@ def level(row, program, with_jacobian):
     tz = uz - along * nz
     square = tx * tx + ty * ty + tz * tz
     # an axis along the normal has no heading: the frame keeps its last one
-    if square > SMALLEST**2:
+    if square > VECTOR_SMALLEST_SIZE**2:
         scale = 1.0 / math.sqrt(square)
         fx = tx * scale
         fy = ty * scale
@@ -143,7 +150,7 @@ def level(row, program, with_jacobian):
         return
     dofs = program.dofs
     jacobian = jacobian_of(row, program)
-    lean = along / square if square > SMALLEST**2 else 0.0
+    lean = along / square if square > VECTOR_SMALLEST_SIZE**2 else 0.0
     for k in columns_of(row):
         x, y, z = _column(row.first_jacobian, 0, k, dofs)
         drop = falls * (x * nx + y * ny + z * nz)
@@ -174,7 +181,7 @@ def sight(row, program, with_jacobian):
     dz = b[2] - a[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     # a target at the origin is in no direction
-    scale = 1.0 / length if length > SMALLEST else 0.0
+    scale = 1.0 / length if length > VECTOR_SMALLEST_SIZE else 0.0
     dx = dx * scale
     dy = dy * scale
     dz = dz * scale

@@ -58,7 +58,7 @@ PRESSING = np.dtype([(name, np.int64) for name in ("value", "jacobian", "wrench"
 LINEAR, ANGULAR = 1, 2
 """Parts of a link's motion."""
 
-SMALLEST = 1e-9
+VECTOR_SMALLEST_SIZE = 1e-9
 """Length below which a vector has no direction."""
 
 SMALLEST_FORCE = 1e-6

@@ -16,9 +16,9 @@ from solfer.points.compiled.algebra import orientation_difference
 from solfer.points.compiled.instruction import instructions, integers, jacobian_of, programs
 from solfer.points.compiled.registry import KERNELS, Kernel
 
-FILES = sorted(Path(__file__).parent.glob("*.py"))
+KERNEL_FILES = sorted(Path(__file__).parent.glob("*.py"))
 
-for _file in FILES:
+for _file in KERNEL_FILES:
     if _file != Path(__file__):
         import_module(f"{__package__}.{_file.stem}")
 
@@ -64,4 +64,4 @@ def _compile(sources: str):
     )
 
 
-run, difference = _compile(digest(FILES))
+run, difference = _compile(digest(KERNEL_FILES))

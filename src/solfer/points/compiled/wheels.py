@@ -6,7 +6,7 @@ from numba import carray, njit
 
 from solfer.numerics.pointers import booleans
 from solfer.points.compiled.instruction import (
-    SMALLEST,
+    VECTOR_SMALLEST_SIZE,
     columns_of,
     floats,
     integers,
@@ -54,7 +54,7 @@ def _update(row, program, of_material, with_jacobian):
     dz = nz - along * az
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     # a wheel that lies flat touches the ground with its whole ring: its centre stands for it
-    scale = 1.0 / length if length > SMALLEST else 0.0
+    scale = 1.0 / length if length > VECTOR_SMALLEST_SIZE else 0.0
     dx = dx * scale
     dy = dy * scale
     dz = dz * scale
@@ -101,7 +101,7 @@ def camber(row, program, with_jacobian):
     x, y, z = turned(placement, numbers[0], numbers[1], numbers[2])
     value_of(row)[index] = -math.asin(min(max(z, -1.0), 1.0))
     if with_jacobian:
-        length = max(math.hypot(x, y), SMALLEST)
+        length = max(math.hypot(x, y), VECTOR_SMALLEST_SIZE)
         _write_turn(row, program, index, -y / length, x / length)
 
 
@@ -122,7 +122,7 @@ def caster(row, program, with_jacobian):
     value_of(row)[index] = math.atan2(wz, uz)
     if with_jacobian:
         # w x z and u x z, weighed by the parts of z along u and w
-        scale = 1.0 / max(uz * uz + wz * wz, SMALLEST**2)
+        scale = 1.0 / max(uz * uz + wz * wz, VECTOR_SMALLEST_SIZE**2)
         _write_turn(row, program, index, scale * (uz * wy - wz * uy), scale * (wz * ux - uz * wx))
 
 
@@ -174,7 +174,7 @@ def rolling_offset(row, program, with_jacobian):
     sin = math.sin(base[0])
     bx, by = (base[1], base[2]) if late else (pose[0], pose[1])
     x, y, _ = turned(placements_of(program)[row.joint], axle[0], axle[1], axle[2])
-    length = max(math.hypot(x, y), SMALLEST)
+    length = max(math.hypot(x, y), VECTOR_SMALLEST_SIZE)
     fx = y / length
     fy = -x / length
     gx = cos * reference[0] - sin * reference[1]

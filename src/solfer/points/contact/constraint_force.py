@@ -24,7 +24,7 @@ from solfer.points.space import vector
 
 __all__ = ["ConstraintForce", "Force", "Torque", "Wrench"]
 
-CALLS = {BIAS: 2, INERTIA_INVERSE: 1}
+DYNAMICS_CALLS = {BIAS: 2, INERTIA_INVERSE: 1}
 """Elements of the dynamics that one update uses, with the number of calls."""
 
 
@@ -65,8 +65,8 @@ class ConstraintForce(DynamicPoint):
         cols = self.accelerations.cols
         super().__init__(vector(rows if size is None else size), robot)
         self._dynamics = robot.dynamics
-        self._dynamics.subscribe(CALLS)
-        weakref.finalize(self, self._dynamics.unsubscribe, CALLS).atexit = False
+        self._dynamics.subscribe(DYNAMICS_CALLS)
+        weakref.finalize(self, self._dynamics.unsubscribe, DYNAMICS_CALLS).atexit = False
         self._demanded, self._held, self._needed = np.zeros((3, rows))
         self._effort = np.zeros(cols)
         self._response, self._inertia = np.zeros((rows, cols)), SymmetricPseudoInverse(rows)

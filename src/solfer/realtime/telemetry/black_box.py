@@ -8,18 +8,18 @@ import numpy as np
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.plugin_log import NANOSECOND, PluginLog
-from solfer.realtime.telemetry.recorder import SECONDS, Recorder
-from solfer.recording.kinds import NAMED, UNITS
+from solfer.realtime.telemetry.recorder import RECORDER_DURATION, Recorder
+from solfer.recording.kinds import CHANNEL_UNITS, NAMED
 from solfer.recording.log import Logger, with_units
 from solfer.recording.model import Event
 from solfer.recording.versions import versions
 from solfer.transport.endpoints import NEW, Reader
 from solfer.transport.plugin_state import PluginState
 
-LOOP = "loop"
+LOOP_PREFIX = "loop"
 """Begin of the names of the channels that belong to no plugin."""
 
-KINDS = {
+BLACK_BOX_KINDS = {
     PluginState.STARTING: "start",
     PluginState.RUNNING: "run",
     PluginState.STOPPING: "stop",
@@ -30,7 +30,7 @@ KINDS = {
 }
 """Kinds of events, by the state that a plugin enters."""
 
-TRUTH = "nav_msgs/Odometry"
+TRUTH_MESSAGE = "nav_msgs/Odometry"
 """Message of the true state of a simulated base."""
 
 HOLD = "hold"
@@ -64,14 +64,14 @@ class BlackBox:
         self,
         folder: Path,
         plugins: Sequence[Plugin],
-        seconds: float = SECONDS,
+        seconds: float = RECORDER_DURATION,
         ros_time: Callable[[], float] | None = None,
         truth: Reader | None = None,
     ):
         for plugin in plugins:
             plugin.requests.enabled = True
         logs = tuple(PluginLog(plugin) for plugin in plugins)
-        loop = Logger(LOOP)
+        loop = Logger(LOOP_PREFIX)
         # methods and lists as they are: the cycle looks nothing up
         self._takes = tuple(log.take for log in logs)
         self._notes = tuple((plugin.name, plugin.requests.notes) for plugin in plugins)
@@ -84,12 +84,12 @@ class BlackBox:
         for plugin in plugins if ros_time is not None else ():  # with each, since it may be recorded alone
             Logger(plugin.name, loop.sources).add("ros_time", words[-1:], ("time",), "s", factor=NANOSECOND)
         self._truth = truth
-        self._true = np.full(len(NAMED[TRUTH]), np.nan)
+        self._true = np.full(len(NAMED[TRUTH_MESSAGE]), np.nan)
         for plugin in plugins if truth is not None else ():
             link = plugin.robot.kinematics.base_link or ""
-            units = with_units(NAMED[TRUTH], UNITS)
+            units = with_units(NAMED[TRUTH_MESSAGE], CHANNEL_UNITS)
             Logger(plugin.name, loop.sources).add(
-                "truth", self._true, NAMED[TRUTH], unit=units, frame="world", kind=TRUTH, child=link
+                "truth", self._true, NAMED[TRUTH_MESSAGE], unit=units, frame="world", kind=TRUTH_MESSAGE, child=link
             )
         sources = [*loop.sources, *(source for log in logs for source in log.sources)]
         files: dict[str, str] = {}
@@ -126,7 +126,7 @@ class BlackBox:
         state = managed.state
         ran = self._words[3 + index] == PluginState.RUNNING
         self._words[3 + index] = state
-        kind = HOLD if ran and state is PluginState.STARTING else KINDS.get(state, state.name.lower())
+        kind = HOLD if ran and state is PluginState.STARTING else BLACK_BOX_KINDS.get(state, state.name.lower())
         self._recorder.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))
 
     def _note_requests(self, name: str, notes: list[tuple[str, str]], now: float) -> None:

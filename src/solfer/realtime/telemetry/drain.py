@@ -9,7 +9,7 @@ import numpy as np
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.realtime.telemetry.recorder import FILE, KIND, events_of
+from solfer.realtime.telemetry.recorder import RECORDER_FILE, RECORDER_KIND, events_of
 from solfer.recording.model import Event
 from solfer.recording.rows import RowLayout
 from solfer.recording.writer import RecordingWriter
@@ -36,11 +36,11 @@ class RecordDrain:
 
     def __init__(self, folder: Path):
         try:
-            self._segment = Segment.attach(folder / FILE, KIND)
+            self._segment = Segment.attach(folder / RECORDER_FILE, RECORDER_KIND)
         except MiddlewareError as error:
             raise MiddlewareError(
                 f"there is no recording: {error.what}",
-                where=str(folder / FILE),
+                where=str(folder / RECORDER_FILE),
                 expected="an RT layer in this namespace, with `record` above 0",
             ) from error
         described = json.loads(self._segment.layout)

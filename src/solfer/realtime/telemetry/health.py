@@ -6,9 +6,9 @@ from solfer.realtime.telemetry.statistics_memory import EXECUTOR
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
-from solfer.transport.plugin_state import FAILED
+from solfer.transport.plugin_state import FAILED_STATES
 
-FAILED_NAMES = frozenset(state.name for state in FAILED)
+FAILED_NAMES = frozenset(state.name for state in FAILED_STATES)
 
 
 def reports_of(now: LayerSummary | None, before: LayerSummary | None) -> dict[str, HealthReport]:

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-UNIT = 6  # resolution of the shortest times, as a power of two [ns]
+HISTOGRAM_UNIT = 6  # resolution of the shortest times, as a power of two [ns]
 FINE = 4  # buckets in each doubling of the time, as a power of two
 BUCKETS = 400
 """Buckets of a histogram: up to 4 s, each at most 1/16 wide; longer times count in the last one."""
 
-WIDTH = BUCKETS + 2
+HISTOGRAM_WORDS = BUCKETS + 2
 """Words of a histogram: the number of times, the longest one [ns], then the buckets."""
 
 
 def bucket_of(nanoseconds: int) -> int:
     """Compute the index of the bucket of a time [ns]."""
-    units = max(nanoseconds >> UNIT, 0)
+    units = max(nanoseconds >> HISTOGRAM_UNIT, 0)
     octave = 0
     while units >> octave >= 2 << FINE:
         octave += 1
@@ -24,7 +24,7 @@ def upper_edge(bucket: int) -> int:
     """Compute the upper edge of a bucket [ns]."""
     following = bucket + 1
     octave = max((following >> FINE) - 1, 0)
-    return (following - (octave << FINE)) << (octave + UNIT)
+    return (following - (octave << FINE)) << (octave + HISTOGRAM_UNIT)
 
 
 class Histograms:
@@ -38,7 +38,7 @@ class Histograms:
     """
 
     def __init__(self, memory: np.ndarray):
-        self.rows = memory.reshape(-1, WIDTH)
+        self.rows = memory.reshape(-1, HISTOGRAM_WORDS)
 
     def snapshot(self) -> np.ndarray:
         """Copy all counts so far, int64, shape (rows, WIDTH)."""

@@ -14,12 +14,12 @@ from solfer.recording.log import LogSource
 from solfer.recording.model import Event
 from solfer.recording.rows import RowLayout
 
-FILE = "recording"
-KIND = "recording"
-SECONDS = 10.0
+RECORDER_FILE = "recording"
+RECORDER_KIND = "recording"
+RECORDER_DURATION = 10.0
 """Duration that the memory holds [s]: a reader may hang that long, and after a crash that much is left."""
 
-EVENTS, EVENT_WIDTH = 256, 64
+RECORDER_EVENTS, EVENT_WIDTH = 256, 64
 """Events that the memory holds, and their size in words of eight bytes; a longer text is cut."""
 
 
@@ -47,16 +47,16 @@ class Recorder:
         folder: Path,
         sources: Sequence[LogSource],
         rate: float,
-        seconds: float = SECONDS,
+        seconds: float = RECORDER_DURATION,
         attachments: Mapping[str, str] | None = None,
         metadata: Mapping[str, str] | None = None,
     ):
         layout, arrays = RowLayout.of(sources, attachments or {}, metadata or {})
         count = max(3, round(rate * seconds))
         own = Ring.size(layout.width, count)
-        self.size = own + Ring.size(EVENT_WIDTH, EVENTS)
+        self.size = own + Ring.size(EVENT_WIDTH, RECORDER_EVENTS)
         text = json.dumps({"rows": layout.text(), "count": count, "rate": rate}).encode()
-        self._segment = Segment.create(folder / FILE, KIND, text, size=self.size)
+        self._segment = Segment.create(folder / RECORDER_FILE, RECORDER_KIND, text, size=self.size)
         # touch each page now: else the first round of the ring would do so in the loop
         np.frombuffer(self._segment.data, dtype=np.uint8)[:: mmap.PAGESIZE] = 0
         self._rows, self._events = RowRing(self._segment.data, arrays, count), events_of(self._segment.data, own)
@@ -79,4 +79,4 @@ class Recorder:
 
 def events_of(memory: memoryview, rows: int) -> Ring:
     """Return the ring of events in a segment, behind that of the rows, which takes so many bytes."""
-    return Ring(memory[rows:], EVENT_WIDTH, EVENTS)
+    return Ring(memory[rows:], EVENT_WIDTH, RECORDER_EVENTS)

@@ -18,15 +18,15 @@ from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.lock import locked
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
 from solfer.realtime.telemetry.drain import RecordDrain
-from solfer.realtime.telemetry.recorder import FILE
+from solfer.realtime.telemetry.recorder import RECORDER_FILE
 from solfer.recording.writer import RecordingWriter
 
 logger = logging.getLogger(__name__)
 
-KEPT = "SOLFER_RECORDINGS"
+RECORDINGS_VARIABLE = "SOLFER_RECORDINGS"
 """Environment variable: a folder in which nodes keep their last seconds when they end."""
 
-BESIDE = "recordings"
+SHARED_FOLDER = "recordings"
 """Folder of a namespace for processes that have no namespace of their own, such as the nodes of a ROS master."""
 
 
@@ -51,7 +51,7 @@ def place_beside(namespace: str, node: str) -> Path:
         MiddlewareError: It cannot be made.
     """
     sweep(namespace)
-    return Namespace(namespace).place(BESIDE, node, FILE).parent
+    return Namespace(namespace).place(SHARED_FOLDER, node, RECORDER_FILE).parent
 
 
 def sweep(own: str, root: Path = SHARED_MEMORY) -> None:
@@ -70,7 +70,7 @@ def _is_left(folder: Path) -> bool:
         return False
     files = [each for each in folder.rglob("*") if each.is_file()]
     lives = any(locked(each.with_suffix("")) for each in files if each.suffix == ".lock")
-    return not lives and all(_age(each) > CRASHED for each in files if each.name == FILE)
+    return not lives and all(_age(each) > CRASHED for each in files if each.name == RECORDER_FILE)
 
 
 def _age(path: Path) -> float:
@@ -92,14 +92,16 @@ def recordings(root: Path = SHARED_MEMORY) -> Iterator[tuple[str, RecordDrain]]:
 def _places(folder: Path) -> list[Path]:
     """List the folders of a namespace that have a recording; none where they are another user's."""
     try:
-        return [each for each in (folder, *sorted((folder / BESIDE).glob("*/"))) if (each / FILE).exists()]
+        return [
+            each for each in (folder, *sorted((folder / SHARED_FOLDER).glob("*/"))) if (each / RECORDER_FILE).exists()
+        ]
     except PermissionError:
         return []
 
 
 def kept_folder() -> Path | None:
     """Return the folder of the environment variable `SOLFER_RECORDINGS`, where nodes leave what they have in memory."""
-    folder = os.environ.get(KEPT)
+    folder = os.environ.get(RECORDINGS_VARIABLE)
     return Path(folder) if folder else None
 
 
@@ -112,7 +114,7 @@ def keep(folder: Path, target: Path) -> None:
     """
     try:
         target.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(folder / FILE, target / FILE)
+        shutil.copyfile(folder / RECORDER_FILE, target / RECORDER_FILE)
     except OSError as error:
         logger.warning("the last cycles are not kept in %s: %s", target, error.strerror)
 
@@ -124,7 +126,7 @@ def write_kept(folder: Path, target: Path) -> list[Path]:
         RecordingError: A file cannot be written.
     """
     files = []
-    for place in sorted(path.parent for path in folder.rglob(FILE)):
+    for place in sorted(path.parent for path in folder.rglob(RECORDER_FILE)):
         drain = RecordDrain(place)
         attached = {name: text.encode() for name, text in drain.layout.attachments.items()}
         target.mkdir(parents=True, exist_ok=True)

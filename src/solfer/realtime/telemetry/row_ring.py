@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.header import LINE
+from solfer.middleware.shared_memory.memory.header import HEADER_LINE
 from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.slot import NEWEST, STAMP, STATE
+from solfer.middleware.shared_memory.memory.slot import NEWEST, SLOT_STAMP, SLOT_STATE
 from solfer.numerics.compilation import cached
 from solfer.numerics.pointers import Memory, indices_at, record_at, release_fence
 
@@ -31,18 +31,18 @@ def _append(address, stamp):
     arrays = indices_at(ring.arrays, ring.pieces)
     sizes = indices_at(ring.sizes, ring.pieces)
     number = ring.number + 1
-    slot = LINE // 8 + (number % ring.count) * ring.stride
-    words[slot + STATE] = 2 * number - 1
-    words[slot + STAMP] = stamp
+    slot = HEADER_LINE // 8 + (number % ring.count) * ring.stride
+    words[slot + SLOT_STATE] = 2 * number - 1
+    words[slot + SLOT_STAMP] = stamp
     release_fence()
-    place = slot + LINE // 8
+    place = slot + HEADER_LINE // 8
     for piece in range(ring.pieces):
         array = indices_at(arrays[piece], sizes[piece])
         for index in range(sizes[piece]):
             words[place + index] = array[index]
         place += sizes[piece]
     release_fence()
-    words[slot + STATE] = 2 * number
+    words[slot + SLOT_STATE] = 2 * number
     release_fence()
     words[NEWEST] = number
     ring.number = number
@@ -76,7 +76,7 @@ class RowRing:
             words=words,
             size=words.size,
             count=count,
-            stride=(Ring.size(width, count) - LINE) // (8 * count),
+            stride=(Ring.size(width, count) - HEADER_LINE) // (8 * count),
             number=0,
         )
         self._address = self._memory.address

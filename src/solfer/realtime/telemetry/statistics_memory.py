@@ -11,7 +11,7 @@ from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.namespaces import STATISTICS
-from solfer.realtime.telemetry.histograms import WIDTH, Histograms
+from solfer.realtime.telemetry.histograms import HISTOGRAM_WORDS, Histograms
 from solfer.transport.plugin_state import PluginState
 
 EXECUTOR = "xbotcore"
@@ -52,13 +52,13 @@ class PluginCount(enum.IntEnum):
 COMPUTED = ("kinematics", "center_of_mass", "contacts", "center_of_pressure", BIAS, INERTIA, INERTIA_INVERSE)
 """What a Robot computes, as `Robot.computations` names it: further words of a plugin."""
 
-WORDS = len(PluginCount) + len(COMPUTED)
+STATISTICS_WORDS = len(PluginCount) + len(COMPUTED)
 """Words of a plugin."""
 
-LOOP = tuple(each.name.lower() for each in LoopTime)
+LOOP_HISTOGRAMS = tuple(each.name.lower() for each in LoopTime)
 """Names of the histograms of the loop."""
 
-TEXT = 256
+TEXT_BYTES = 256
 """Bytes of a text: first that of the loop, then the reason of each plugin."""
 
 
@@ -81,15 +81,17 @@ class RuntimeStatistics:
         self.rate = rate
         self.plugins = tuple(plugins)
         self.stages = tuple(stages)
-        words = len(LoopCount) + WORDS * len(self.plugins)
-        rows = len(LOOP) + len(self.stages) * len(self.plugins)
-        self.size = 8 * words + 8 * rows * (WIDTH + 1) + TEXT * (1 + len(self.plugins))
+        words = len(LoopCount) + STATISTICS_WORDS * len(self.plugins)
+        rows = len(LOOP_HISTOGRAMS) + len(self.stages) * len(self.plugins)
+        self.size = 8 * words + 8 * rows * (HISTOGRAM_WORDS + 1) + TEXT_BYTES * (1 + len(self.plugins))
         data = memory if memory is not None else memoryview(bytearray(self.size))
         self.counts = data[: 8 * len(LoopCount)].cast("q")
         self._lives = data[8 * len(LoopCount) : 8 * words].cast("q")
-        self.histograms = Histograms(np.frombuffer(data[8 * words : 8 * (words + rows * WIDTH)], dtype=np.int64))
-        self.skips = data[8 * (words + rows * WIDTH) : 8 * (words + rows * (WIDTH + 1))].cast("q")
-        self._texts = data[8 * (words + rows * (WIDTH + 1)) : self.size]
+        self.histograms = Histograms(
+            np.frombuffer(data[8 * words : 8 * (words + rows * HISTOGRAM_WORDS)], dtype=np.int64)
+        )
+        self.skips = data[8 * (words + rows * HISTOGRAM_WORDS) : 8 * (words + rows * (HISTOGRAM_WORDS + 1))].cast("q")
+        self._texts = data[8 * (words + rows * (HISTOGRAM_WORDS + 1)) : self.size]
         self._segment: Segment | None = None
 
     @classmethod
@@ -146,11 +148,11 @@ class RuntimeStatistics:
 
     def row(self, plugin: int, stage: int) -> int:
         """Return the row of a stage of a plugin, by their indices."""
-        return len(LOOP) + plugin * len(self.stages) + stage
+        return len(LOOP_HISTOGRAMS) + plugin * len(self.stages) + stage
 
     def life(self, plugin: int, word: PluginCount) -> int:
         """Return a word of a plugin."""
-        return self._lives[plugin * WORDS + word]
+        return self._lives[plugin * STATISTICS_WORDS + word]
 
     def state(self, plugin: int) -> PluginState:
         """Return the state of a plugin's life."""
@@ -158,30 +160,32 @@ class RuntimeStatistics:
 
     def put_life(self, plugin: int, state: PluginState, starts: int, aborts: int, over_budget: int) -> None:
         """Set the words of a plugin."""
-        first = plugin * WORDS
+        first = plugin * STATISTICS_WORDS
         for word, value in zip(PluginCount, (state, starts, aborts, over_budget), strict=True):
             self._lives[first + word] = value
 
     def computed(self, plugin: int) -> dict[str, int]:
         """Return how often each of COMPUTED was computed for a plugin's Robot."""
-        first = plugin * WORDS + len(PluginCount)
+        first = plugin * STATISTICS_WORDS + len(PluginCount)
         return dict(zip(COMPUTED, self._lives[first : first + len(COMPUTED)], strict=True))
 
     def put_computed(self, plugin: int, counts: Mapping[str, int]) -> None:
         """Set how often each of COMPUTED was computed for a plugin's Robot; what is not among `counts` stays."""
-        first = plugin * WORDS + len(PluginCount)
+        first = plugin * STATISTICS_WORDS + len(PluginCount)
         for place, name in enumerate(COMPUTED, first):
             self._lives[place] = counts.get(name, self._lives[place])
 
     def text(self, plugin: int | None = None) -> str:
         """Return the reason of a plugin's state; None: the text of the loop, its scheduling."""
         place = 0 if plugin is None else 1 + plugin
-        return bytes(self._texts[place * TEXT : (place + 1) * TEXT]).rstrip(b"\0").decode(errors="replace")
+        return bytes(self._texts[place * TEXT_BYTES : (place + 1) * TEXT_BYTES]).rstrip(b"\0").decode(errors="replace")
 
     def put_text(self, text: str, plugin: int | None = None) -> None:
         """Set a text; it is cut off at TEXT bytes."""
         place = 0 if plugin is None else 1 + plugin
-        self._texts[place * TEXT : (place + 1) * TEXT] = text.encode(errors="replace")[:TEXT].ljust(TEXT, b"\0")
+        self._texts[place * TEXT_BYTES : (place + 1) * TEXT_BYTES] = text.encode(errors="replace")[:TEXT_BYTES].ljust(
+            TEXT_BYTES, b"\0"
+        )
 
     def close(self) -> None:
         """Release the memory."""

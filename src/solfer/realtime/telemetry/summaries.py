@@ -8,9 +8,9 @@ import numpy as np
 from solfer.errors import MiddlewareError
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.telemetry.histograms import Histograms
-from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, PluginCount, RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
 
-COUNTED = (LoopCount.CYCLES, LoopCount.SKIPPED, LoopCount.OVERRUNS, LoopCount.UNFORGIVEN)
+LOOP_COUNTS = (LoopCount.CYCLES, LoopCount.SKIPPED, LoopCount.OVERRUNS, LoopCount.UNFORGIVEN)
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ class StatisticsReader:
             self._earlier = np.zeros_like(now)
         recent = Histograms(now).since(self._earlier)
         self._earlier = now
-        cycles, skipped, overruns, unforgiven = (statistics.counts[word] for word in COUNTED)
-        loop = tuple(_stage(statistics, recent, row, name=name) for row, name in enumerate(LOOP))
+        cycles, skipped, overruns, unforgiven = (statistics.counts[word] for word in LOOP_COUNTS)
+        loop = tuple(_stage(statistics, recent, row, name=name) for row, name in enumerate(LOOP_HISTOGRAMS))
         plugins = tuple(_plugin(statistics, recent, index) for index in range(len(statistics.plugins)))
         return LayerSummary(
             statistics.pid,

@@ -9,12 +9,12 @@ from scipy.interpolate import CubicSpline
 from solfer.errors import RecordingError
 from solfer.numerics.turns import whole_turns
 from solfer.recording.comparison.alignment import shift_of
-from solfer.recording.comparison.fit import BLOCK, DELAY, GAIN, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
+from solfer.recording.comparison.fit import BLOCK, DELAY_INDEX, GAIN_INDEX, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
 from solfer.recording.comparison.motion import JointMotion, Samples, measured_joints, sampled
 from solfer.recording.comparison.verdict import SHAPE, Difference, JointVerdict, excess, judged, thresholds
 from solfer.recording.model import Recording
 
-MOVES, OVER_NOISE = 0.02, 20.0
+COMPARED_MOTION_RANGE, OVER_NOISE = 0.02, 20.0
 """Range of a joint that moves: so much [rad, m], and so many standard deviations of what smoothing leaves of noise."""
 
 CERTAIN = 8.0  # standard deviations of the noise, for the largest of thousands of samples
@@ -23,8 +23,8 @@ FEWEST_BLOCKS = 8
 FEWEST_DELAYS = 3
 """Least number of joints that move for one of them to be late: what all have in common is the clocks."""
 
-FASTEST = 0.001
-SLOWEST = 0.025  # limits of the step [s]
+STEP_MINIMUM = 0.001
+STEP_MAXIMUM = 0.025  # limits of the step [s]
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class _Pair:
 
     def __init__(self, one: Sequence[JointMotion], two: Sequence[JointMotion], names: tuple[str, str]):
         periods = [np.median([motion.period for motion in motions]) for motions in (one, two)]
-        step = float(np.clip(max(periods), FASTEST, SLOWEST))
+        step = float(np.clip(max(periods), STEP_MINIMUM, STEP_MAXIMUM))
         a = sampled(one, step)
         b = sampled(two, step)
         self._names = names
@@ -112,7 +112,7 @@ class _Pair:
         if not self._both.size:
             raise RecordingError(
                 "no joint moves in both recordings, so that they cannot be aligned", where=" ".join(names),
-                expected=f"a motion of {MOVES:g} rad or more",
+                expected=f"a motion of {COMPARED_MOTION_RANGE:g} rad or more",
             )  # fmt: skip
         self._curves = [CubicSpline(a.times, row) for row in a.positions]
         self._others = CubicSpline(b.times, b.positions, axis=1)
@@ -121,7 +121,7 @@ class _Pair:
 
     def _look(self, first: np.ndarray, second: np.ndarray) -> None:
         """Find the joints that move in both, and those that move in one of them alone: clearly, not just a bit more."""
-        least = np.maximum(MOVES, OVER_NOISE * self.noise)
+        least = np.maximum(COMPARED_MOTION_RANGE, OVER_NOISE * self.noise)
         one = np.ptp(first, axis=1)
         two = np.ptp(second, axis=1)
         self._both = np.flatnonzero((one > least) & (two > least))
@@ -139,8 +139,8 @@ class _Pair:
         """Find the shift, coarsely by correlation, then as the median of the delays of all joints that move."""
         self.shift = shift_of(a, b, self._both)
         self._overlap(a, b)
-        laws = [self._fit(joint, joint, (GAIN, OFFSET, DELAY)) for joint in self._both.tolist()]
-        self.shift += float(np.median([law.values[DELAY] for law in laws]))
+        laws = [self._fit(joint, joint, (GAIN_INDEX, OFFSET, DELAY_INDEX)) for joint in self._both.tolist()]
+        self.shift += float(np.median([law.values[DELAY_INDEX] for law in laws]))
         self._overlap(a, b)
 
     def _overlap(self, a: Samples, b: Samples) -> None:
@@ -166,7 +166,7 @@ class _Pair:
         """Fit the law with as few parameters as are needed, and with all that can be judged."""
         free: tuple[int, ...] = (OFFSET,)
         if joint in self._both:
-            free = (GAIN, OFFSET, DELAY) if len(self._both) >= FEWEST_DELAYS else (GAIN, OFFSET)
+            free = (GAIN_INDEX, OFFSET, DELAY_INDEX) if len(self._both) >= FEWEST_DELAYS else (GAIN_INDEX, OFFSET)
         whole = law = self._fit(joint, joint, free)
         if excess(law, free).max() < 0.5 and _size(self.apart[joint]) < 2.0 * self.noise[joint]:
             free = ()

@@ -8,14 +8,14 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 from scipy.stats import t as student
 
-GAIN, OFFSET, DELAY = 0, 1, 2
+GAIN_INDEX, OFFSET, DELAY_INDEX = 0, 1, 2
 """Indices of the parameters: none, [rad, m], [s]."""
 
 NEUTRAL = np.array([1.0, 0.0, 0.0])
 """The law of a joint that does the same."""
 
-ROUNDS = 12
-ENOUGH = 1e-5
+FIT_ROUNDS = 12
+FIT_PRECISION = 1e-5
 HUBER = 1.345  # residuals beyond so many standard deviations count less (Huber 1964): 95 % efficient for Gaussian ones
 BLOCK = 0.15
 """Least duration of a block [s]: longer than what the smoothing ties together."""
@@ -26,7 +26,7 @@ BLOCKS = 40
 CHANCE = 1e-6
 """Probability that noise alone makes a parameter significant."""
 
-NORMAL = float(norm.isf(0.5 * CHANCE))
+NORMAL_QUANTILE = float(norm.isf(0.5 * CHANCE))
 
 LONGEST_DELAY = 0.1
 """Largest delay of a single joint [s]."""
@@ -73,22 +73,22 @@ def fit(
     chosen = list(free)
     scale = noise
     slope = curve.derivative()
-    if GAIN in free:
-        values[GAIN] = _first_gain(curve(times), second)
-    for _ in range(ROUNDS):
+    if GAIN_INDEX in free:
+        values[GAIN_INDEX] = _first_gain(curve(times), second)
+    for _ in range(FIT_ROUNDS):
         rows, residual = _linear(curve, slope, times, second=second, values=values)
         scale = max(noise, 1.4826 * float(np.median(np.abs(residual))))
         weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
         bread = np.linalg.inv((rows[chosen] * weights) @ rows[chosen].T)
         step = bread @ (rows[chosen] @ (weights * residual))
         values[chosen] += step
-        values[DELAY] = np.clip(values[DELAY], -LONGEST_DELAY, LONGEST_DELAY)
-        if np.all(np.abs(step) < ENOUGH):
+        values[DELAY_INDEX] = np.clip(values[DELAY_INDEX], -LONGEST_DELAY, LONGEST_DELAY)
+        if np.all(np.abs(step) < FIT_PRECISION):
             break
     rows, residual = _linear(curve, slope, times, second=second, values=values)
     weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
     limits = np.full(3, np.inf)
-    least = NORMAL * density * np.sqrt(np.diag(bread))
+    least = NORMAL_QUANTILE * density * np.sqrt(np.diag(bread))
     limits[chosen] = np.maximum(least, _errors(rows[chosen], weights, residual, bread=bread, times=times))
     return Law(values, limits, residual)
 
@@ -104,10 +104,10 @@ def _linear(
     curve: CubicSpline, slope: CubicSpline, times: np.ndarray, second: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives of the law by its parameters, shape (3, T), and what it does not explain, shape (T,)."""
-    moments = times - values[DELAY]
+    moments = times - values[DELAY_INDEX]
     first = curve(moments)
-    rows = np.array([first, np.ones_like(first), -values[GAIN] * slope(moments)])
-    return rows, second - values[GAIN] * first - values[OFFSET]
+    rows = np.array([first, np.ones_like(first), -values[GAIN_INDEX] * slope(moments)])
+    return rows, second - values[GAIN_INDEX] * first - values[OFFSET]
 
 
 @lru_cache

@@ -10,17 +10,17 @@ from scipy.ndimage import median_filter
 from scipy.signal import savgol_coeffs
 
 from solfer.errors import RecordingError, UnknownName
-from solfer.recording.model import JOINTS, Channel, Recording
+from solfer.recording.model import JOINTS_KIND, Channel, Recording
 
-FEEDBACK, POSITION, AGE = "/feedback/", "/position", "/age"
+FEEDBACK_CHANNEL, POSITION_CHANNEL, AGE_CHANNEL = "/feedback/", "/position", "/age"
 """Parts of the names of channels."""
 
-WINDOW = 0.05
+CHANNEL_WINDOW = 0.05
 """Time over which positions are smoothed [s]: short against the motion of a robot, long against its sampling."""
 
 OUTLIER = 8.0  # standard deviations of the noise
 DEGREE = 3  # of the polynomial in this window
-RESOLUTION = 1e-5
+LEAST_STD = 1e-5
 """Least standard deviation of a measurement [rad, m]: a simulation without noise still rounds and interpolates."""
 
 
@@ -54,7 +54,7 @@ class JointMotion:
     def noise(self) -> float:
         """Standard deviation of the measurement, from its third differences, which a motion hardly has [rad, m]."""
         third = np.abs(np.diff(self.positions, 3))
-        return max(RESOLUTION, float(1.4826 * np.median(third) / np.sqrt(20.0)))
+        return max(LEAST_STD, float(1.4826 * np.median(third) / np.sqrt(20.0)))
 
 
 def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = ()) -> dict[str, JointMotion]:
@@ -77,8 +77,13 @@ def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = (
             raise UnknownName("plugin", name, recording.plugins, where=where)
     found: dict[str, JointMotion] = {}
     for channel in recording.channels.values():
-        plugin, feedback, _ = channel.name.partition(FEEDBACK)
-        if feedback and channel.kind == JOINTS and channel.name.endswith(POSITION) and plugin in (plugins or (plugin,)):
+        plugin, feedback, _ = channel.name.partition(FEEDBACK_CHANNEL)
+        if (
+            feedback
+            and channel.kind == JOINTS_KIND
+            and channel.name.endswith(POSITION_CHANNEL)
+            and plugin in (plugins or (plugin,))
+        ):
             for joint, motion in _motions(recording, channel).items():
                 found.setdefault(joint, motion)
     if not found:
@@ -91,7 +96,7 @@ def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = (
 def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
     """Return the motion of each joint of a channel; one without measurements is left out."""
     times = channel.times
-    age = recording.channels.get(channel.name.removesuffix(POSITION) + AGE)
+    age = recording.channels.get(channel.name.removesuffix(POSITION_CHANNEL) + AGE_CHANNEL)
     if age is not None and np.array_equal(age.times, times):
         times = times - age.values[:, 0]
     keep = np.isfinite(times)
@@ -155,7 +160,7 @@ def sampled(motions: Sequence[JointMotion], step: float) -> Samples:
     start = max(each.times[0] for each in motions)
     end = min(each.times[-1] for each in motions)
     times = start + step * np.arange(max(0, int((end - start) / step) + 1))
-    half = max(2, round(0.5 * WINDOW / step))
+    half = max(2, round(0.5 * CHANNEL_WINDOW / step))
     weights = savgol_coeffs(2 * half + 1, DEGREE)
     raw = np.array([np.interp(times, each.times, each.cleaned) for each in motions])
     padded = np.pad(raw, ((0, 0), (half, half)), mode="edge")

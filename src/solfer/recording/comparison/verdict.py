@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.recording.comparison.fit import DELAY, GAIN, NEUTRAL, OFFSET, Law
+from solfer.recording.comparison.fit import DELAY_INDEX, GAIN_INDEX, NEUTRAL, OFFSET, Law
 
 
 class Difference(enum.Enum):
@@ -68,16 +68,16 @@ def judged(law: Law, limits: np.ndarray) -> tuple[tuple[Difference, ...], str]:
     if gain < 0.0:
         kinds.append(Difference.SIGN)
         texts.append(f"wrong sign (gain {gain:+.3f})")
-    if abs(abs(gain) - 1.0) > limits[GAIN]:
+    if abs(abs(gain) - 1.0) > limits[GAIN_INDEX]:
         kinds.append(Difference.GAIN)
-        texts.append(f"gain {abs(gain):.3f} +- {law.limits[GAIN]:.3f}")
+        texts.append(f"gain {abs(gain):.3f} +- {law.limits[GAIN_INDEX]:.3f}")
     if abs(offset) > limits[OFFSET]:
         kinds.append(Difference.OFFSET)
         texts.append(f"offset {offset:+.4f} +- {law.limits[OFFSET]:.4f}")
-    if abs(delay) > limits[DELAY]:
+    if abs(delay) > limits[DELAY_INDEX]:
         kinds.append(Difference.DELAY)
         word = "late" if delay > 0.0 else "early"
-        texts.append(f"{word} by {1e3 * abs(delay):.1f} +- {1e3 * law.limits[DELAY]:.1f} ms")
+        texts.append(f"{word} by {1e3 * abs(delay):.1f} +- {1e3 * law.limits[DELAY_INDEX]:.1f} ms")
     return tuple(kinds), ", ".join(texts)
 
 

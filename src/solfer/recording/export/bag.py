@@ -8,13 +8,13 @@ import numpy as np
 
 from solfer.errors import MissingDependency, RecordingError
 from solfer.recording.block import RecordedTopic, topics_of
-from solfer.recording.kinds import JOINT_PARTS, JOINTS, NAMED, part_of
+from solfer.recording.kinds import JOINT_PARTS, JOINTS_KIND, NAMED, part_of
 from solfer.recording.model import Channel, Recording
 
-OTHERS = "std_msgs/msg/Float64MultiArray"
+COLUMNS_MESSAGE = "std_msgs/msg/Float64MultiArray"
 """Message of columns that no message of ROS has: its only dimension is labelled with their names."""
 
-FIRST = 1
+EARLIEST_TIME = 1
 """Earliest time in a bag [ns]: `rosbag play` leaves out messages at time 0, which stands for no time."""
 
 GEOMETRY = ("Point", "Vector3", "Quaternion", "Pose", "Twist")
@@ -67,25 +67,25 @@ def save_bag(recording: Recording, path: Path) -> Iterator[None]:
 def _places(bag: Any, store: Any, topic: RecordedTopic) -> tuple[RecordedTopic, Any]:
     """Announce a topic in the bag; returns it with its connection."""
     kind = topic.channels[0].kind
-    message = kind.replace("/", "/msg/") if kind == JOINTS or kind in NAMED else OTHERS
+    message = kind.replace("/", "/msg/") if kind == JOINTS_KIND or kind in NAMED else COLUMNS_MESSAGE
     return topic, bag.add_connection(f"/{topic.name.replace(' ', '_')}", message, typestore=store)
 
 
 def _moments(places: Sequence[tuple[RecordedTopic, Any]]) -> Iterator[tuple[int, int, int]]:
     """Yield time [ns], place and row of each message."""
     for place, (topic, _) in enumerate(places):
-        times = np.maximum(np.rint(1e9 * topic.channels[0].times).astype(np.int64), FIRST)
+        times = np.maximum(np.rint(1e9 * topic.channels[0].times).astype(np.int64), EARLIEST_TIME)
         yield from ((time, place, row) for row, time in enumerate(times.tolist()))
 
 
 def _message(store: Any, kind: str, channels: Sequence[Channel], row: int, time: int) -> Any:
     types = store.types
     first = channels[0]
-    if kind == OTHERS:
+    if kind == COLUMNS_MESSAGE:
         return _labelled(types, first, row)
     stamp = types["builtin_interfaces/msg/Time"](*divmod(time, 1_000_000_000))
     header = types["std_msgs/msg/Header"](row, stamp, first.frame)
-    if first.kind == JOINTS:
+    if first.kind == JOINTS_KIND:
         fields = {part_of(channel.name): channel.values[row] for channel in channels}
         return types[kind](header, list(first.columns), *(fields.get(part, np.zeros(0)) for part in JOINT_PARTS))
     return _of_kind(types, first, header, numbers=first.values[row].tolist())
@@ -94,7 +94,7 @@ def _message(store: Any, kind: str, channels: Sequence[Channel], row: int, time:
 def _labelled(types: Any, channel: Channel, row: int) -> Any:
     size = len(channel.columns)
     dimension = types["std_msgs/msg/MultiArrayDimension"](",".join(channel.columns), size, size)
-    return types[OTHERS](types["std_msgs/msg/MultiArrayLayout"]([dimension], 0), channel.values[row])
+    return types[COLUMNS_MESSAGE](types["std_msgs/msg/MultiArrayLayout"]([dimension], 0), channel.values[row])
 
 
 def _of_kind(types: Any, channel: Channel, header: Any, numbers: list[float]) -> Any:

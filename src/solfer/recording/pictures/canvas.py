@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".pdf", ".png")
-MOST = 2000  # points of a line; more are neither seen nor quickly drawn
-FONT = 8.0
-FIRST, SECOND, DESIRED, WRONG = "#1f77b4", "#d95f02", "#fdb863", "#b2182b"
+LINE_POINTS = 2000  # points of a line; more are neither seen nor quickly drawn
+CANVAS_FONT = 8.0
+FIRST_COLOR, SECOND_COLOR, DESIRED_LINE_COLOR, WRONG = "#1f77b4", "#d95f02", "#fdb863", "#b2182b"
 """Colours that people with a weakness for red and green distinguish."""
 
 
@@ -46,11 +46,11 @@ def draw(axes: "Axes", times: np.ndarray, values: np.ndarray, **style: Any) -> N
 
 
 def outline(values: np.ndarray) -> np.ndarray:
-    """Return indices of at most about `MOST` points that look like all of them, ascending."""
+    """Return indices of at most about `LINE_POINTS` points that look like all of them, ascending."""
     count = len(values)
-    if count <= MOST:
+    if count <= LINE_POINTS:
         return np.arange(count)
-    stretch = -(-2 * count // MOST)
+    stretch = -(-2 * count // LINE_POINTS)
     whole = count // stretch * stretch
     rows = values[:whole].reshape(-1, stretch)
     filled = np.where(np.isfinite(rows), rows, 0.0)
@@ -60,9 +60,9 @@ def outline(values: np.ndarray) -> np.ndarray:
 
 def dress(axes: "Axes", title: str, label: str = "") -> None:
     """Give axes a title on the left, a label of y, small ticks and a grid."""
-    axes.set_title(title, fontsize=FONT + 1, loc="left")
-    axes.set_ylabel(label, fontsize=FONT)
-    axes.tick_params(labelsize=FONT - 1)
+    axes.set_title(title, fontsize=CANVAS_FONT + 1, loc="left")
+    axes.set_ylabel(label, fontsize=CANVAS_FONT)
+    axes.tick_params(labelsize=CANVAS_FONT - 1)
     axes.grid(alpha=0.3, linewidth=0.5)
     axes.margins(x=0.0)
 

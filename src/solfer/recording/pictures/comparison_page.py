@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.recording.comparison import Comparison, JointVerdict
-from solfer.recording.pictures.canvas import FIRST, FONT, SECOND, WRONG, draw, dress, new_figure
+from solfer.recording.pictures.canvas import CANVAS_FONT, FIRST_COLOR, SECOND_COLOR, WRONG, draw, dress, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROWS = 8
+COMPARISON_ROWS = 8
 """Most joints on a page."""
 
 
@@ -23,7 +23,7 @@ def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
         names: Names of the two recordings.
     """
     place = {joint: row for row, joint in enumerate(comparison.joints)}
-    shown = [verdict for verdict in comparison.different if verdict.joint in place][:ROWS]
+    shown = [verdict for verdict in comparison.different if verdict.joint in place][:COMPARISON_ROWS]
     if not shown:
         known = (verdict for verdict in comparison.verdicts if verdict.joint in place)
         shown = sorted(known, key=lambda verdict: -verdict.largest)[:4]
@@ -32,8 +32,8 @@ def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
     for (left, right), verdict in zip(grid, shown, strict=True):
         _joint(left, right, verdict, comparison=comparison, row=place[verdict.joint], names=names)
     for axes in grid[-1]:
-        axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT)
-    figure.suptitle(_title(comparison, names), fontsize=FONT + 3)
+        axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=CANVAS_FONT)
+    figure.suptitle(_title(comparison, names), fontsize=CANVAS_FONT + 3)
     return figure
 
 
@@ -49,17 +49,18 @@ def _joint(
     times = comparison.times
     first = comparison.first[row]
     second = comparison.second[row]
-    draw(left, times, first, color=FIRST, lw=1.2, label=names[0])
-    draw(left, times, second, color=SECOND, lw=1.2, ls="--", label=names[1])
+    draw(left, times, first, color=FIRST_COLOR, lw=1.2, label=names[0])
+    draw(left, times, second, color=SECOND_COLOR, lw=1.2, ls="--", label=names[1])
     draw(right, times, 1e3 * (second - first), color="black", lw=0.9)
     right.axhline(0.0, color="grey", lw=0.5)
     dress(left, verdict.joint, "position [rad, m]")
     dress(right, verdict.text or "no difference", "difference\n[mrad, mm]")
-    left.legend(fontsize=FONT - 1, loc="best", ncols=2, framealpha=0.8)
+    left.legend(fontsize=CANVAS_FONT - 1, loc="best", ncols=2, framealpha=0.8)
     if not np.isnan(verdict.since):
         for axes in (left, right):
             axes.axvline(verdict.since, color=WRONG, lw=0.9)
         right.annotate(
             f" {verdict.since:.3f} s", (verdict.since, 1.0), xycoords=("data", "axes fraction"), color=WRONG,
-            fontsize=FONT - 1, va="top", bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
+            fontsize=CANVAS_FONT - 1, va="top",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
         )  # fmt: skip

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.recording.model import Channel, Recording
-from solfer.recording.pictures.canvas import DESIRED, FIRST, FONT, WRONG, draw, dress, new_figure
+from solfer.recording.pictures.canvas import (
+    CANVAS_FONT,
+    DESIRED_LINE_COLOR,
+    FIRST_COLOR,
+    WRONG,
+    draw,
+    dress,
+    new_figure,
+)
 from solfer.recording.pictures.tracks import Track, tracks_of
 from solfer.recording.requests import EventGroup, grouped
 
@@ -14,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-WIDTH = 15.0  # [inch]
-COLUMNS = 6  # of small plots
-MOVES = 2e-3
+PAGE_WIDTH = 15.0  # [inch]
+PLOT_COLUMNS = 6  # of small plots
+PAGE_MOTION_RANGE = 2e-3
 """Least range of a joint that is drawn [rad, m, rad/s, m/s]; the others are listed."""
 
 LEAST_SPAN = 0.02  # that an axis shows, so that noise does not look like motion
@@ -37,17 +45,17 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
         limits: Limits of the joints' positions.
     """
     tracks = tracks_of(recording, plugin)
-    moving = [track for track in tracks if track.span > MOVES]
+    moving = [track for track in tracks if track.span > PAGE_MOTION_RANGE]
     start = min((channel.times[0] for channel in recording.channels.values() if len(channel.times)), default=0.0)
     extras = _extras(recording, plugin)
-    rows = -(-len(moving) // COLUMNS)
+    rows = -(-len(moving) // PLOT_COLUMNS)
     errors = [track for track in moving if track.desired is not None]
     heights = [0.5 + 1.35 * rows, 1.2 + 0.17 * len(errors), 0.4 + 2.3 * -(-len(extras) // 2)]
     used = [height if part else 0.0 for height, part in zip(heights, (moving, errors, extras), strict=True)]
-    figure = new_figure(WIDTH, 0.9 + sum(used))
+    figure = new_figure(PAGE_WIDTH, 0.9 + sum(used))
     groups = grouped(event for event in recording.events if event.plugin in ("", plugin))
     often = [group.counted(start) for group in groups if group.count > 1]
-    figure.suptitle("\n".join((_title(plugin, tracks, moving), *often)), fontsize=FONT + 4)
+    figure.suptitle("\n".join((_title(plugin, tracks, moving), *often)), fontsize=CANVAS_FONT + 4)
     parts = [part for part in used if part]
     if not parts:
         return figure
@@ -69,17 +77,26 @@ def _title(plugin: str, tracks: list[Track], moving: list[Track]) -> str:
 
 def _joints(place: "SubFigure", tracks: list[Track], limits: Limits, start: float) -> None:
     """Draw one small plot for each joint, all with the same times."""
-    rows = -(-len(tracks) // COLUMNS)
-    grid = place.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+    rows = -(-len(tracks) // PLOT_COLUMNS)
+    grid = place.subplots(rows, PLOT_COLUMNS, sharex=True, squeeze=False).ravel()
     for axes in grid[len(tracks) :]:
         axes.set_visible(False)
     for index, (axes, track) in enumerate(zip(grid, tracks, strict=False)):
         _joint(axes, track, limits, start=start)
-        axes.tick_params(labelbottom=index + COLUMNS >= len(tracks))
-    place.supxlabel("time [s]", fontsize=FONT)
-    handles = [_line(color=FIRST, lw=1.0), _line(color=DESIRED, lw=2.8), _line(color=WRONG, lw=1.3, ls=":")]
+        axes.tick_params(labelbottom=index + PLOT_COLUMNS >= len(tracks))
+    place.supxlabel("time [s]", fontsize=CANVAS_FONT)
+    handles = [
+        _line(color=FIRST_COLOR, lw=1.0),
+        _line(color=DESIRED_LINE_COLOR, lw=2.8),
+        _line(color=WRONG, lw=1.3, ls=":"),
+    ]
     place.legend(
-        handles, ["measured", "desired", "limit"], loc="outside upper right", ncols=3, fontsize=FONT, frameon=False
+        handles,
+        ["measured", "desired", "limit"],
+        loc="outside upper right",
+        ncols=3,
+        fontsize=CANVAS_FONT,
+        frameon=False,
     )
 
 
@@ -91,8 +108,8 @@ def _line(**style: Any) -> Any:
 
 def _joint(axes: "Axes", track: Track, limits: Limits, start: float) -> None:
     if track.desired is not None:  # below and wider: both are seen where they are one
-        draw(axes, track.desired.times - start, track.desired.values, color=DESIRED, lw=2.8)
-    draw(axes, track.measured.times - start, track.measured.values, color=FIRST, lw=0.9)
+        draw(axes, track.desired.times - start, track.desired.values, color=DESIRED_LINE_COLOR, lw=2.8)
+    draw(axes, track.measured.times - start, track.measured.values, color=FIRST_COLOR, lw=0.9)
     dress(axes, f"{track.joint}  [{track.unit or '-'}]")
     low, high = axes.get_ylim()
     missing = max(0.0, LEAST_SPAN - (high - low))
@@ -125,12 +142,12 @@ def _errors(place: "SubFigure", tracks: list[Track], start: float) -> None:
     title = (
         "desired minus measured, the largest of each moment; behind each joint its largest [mrad, mm; of wheels mrad/s]"
     )
-    axes.set_title(title, loc="left", fontsize=FONT + 1)
-    axes.set_xlabel("time [s]", fontsize=FONT)
-    axes.tick_params(labelsize=FONT - 1)
+    axes.set_title(title, loc="left", fontsize=CANVAS_FONT + 1)
+    axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
+    axes.tick_params(labelsize=CANVAS_FONT - 1)
     bar = place.colorbar(image, ax=axes, pad=0.01, extend="both")
-    bar.set_label("part of the largest of this unit", fontsize=FONT)
-    bar.ax.tick_params(labelsize=FONT - 1)
+    bar.set_label("part of the largest of this unit", fontsize=CANVAS_FONT)
+    bar.ax.tick_params(labelsize=CANVAS_FONT - 1)
 
 
 def _scale(errors: np.ndarray) -> float:
@@ -175,7 +192,7 @@ def _draw_extras(
             _timing(axes, channels[0], start)
         else:
             lines(axes, title, channels, start=start)
-        axes.set_xlabel("time [s]", fontsize=FONT)
+        axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
         for group in groups:
             for time in {group.first.time, group.last}:
                 axes.axvline(time - start, color="grey", lw=0.6, ls=":")
@@ -227,4 +244,4 @@ def _short(name: str) -> str:
 
 
 def _legend(axes: "Axes") -> None:
-    axes.legend(fontsize=FONT - 1, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.legend(fontsize=CANVAS_FONT - 1, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from solfer.numerics.turns import whole_turns
 from solfer.recording.comparison.motion import continuous_joints
-from solfer.recording.model import JOINTS, Channel, Recording
+from solfer.recording.model import JOINTS_KIND, Channel, Recording
 
 
 @dataclass(frozen=True)
@@ -97,5 +97,5 @@ def _columns(recording: Recording, plugin: str, parts: tuple[str, ...], field: s
 def _channels(recording: Recording, prefix: str, field: str) -> Iterator[Channel]:
     for name, channel in recording.channels.items():
         ours = name.startswith(prefix) and name.endswith(f"/{field}")
-        if ours and channel.kind == JOINTS and len(channel.times):
+        if ours and channel.kind == JOINTS_KIND and len(channel.times):
             yield channel

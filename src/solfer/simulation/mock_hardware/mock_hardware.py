@@ -23,7 +23,7 @@ from solfer.transport.middleware import Middleware
 MOCK = "package://solfer/config/robots/centauro/hardware/mock.yaml"
 """The mock that is shipped, of CENTAURO."""
 
-HEALTH = "hardware"
+MOCK_HEALTH = "hardware"
 """Name of the health report."""
 
 
@@ -65,7 +65,7 @@ class MockHardware:
         truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
         self._wiring = Wiring(middleware, encoders, owners, measurement=measurement, command=command, truth=truth)
         outside = cast(Middleware, self._wiring)
-        self._server = SimulationServer(simulation, outside, factor=factor, name=HEALTH, followers=followers)
+        self._server = SimulationServer(simulation, outside, factor=factor, name=MOCK_HEALTH, followers=followers)
 
     @classmethod
     def from_file(

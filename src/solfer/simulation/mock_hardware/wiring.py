@@ -11,7 +11,7 @@ from solfer.simulation.delay_line import DelayLine
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Queue, Writer
-from solfer.transport.lower_level import CLAIM
+from solfer.transport.lower_level import CLAIM_INTERFACE
 from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message, copied
 from solfer.transport.middleware import CONTROLLER_GAINS, JOINT_NAMES, Middleware, Submit
 
@@ -84,7 +84,7 @@ class Wiring:
         encoders = self._encoders
 
         def handler(request: Any) -> Any:
-            if service.interface == CLAIM and request.positions:
+            if service.interface == CLAIM_INTERFACE and request.positions:
                 request = dataclasses.replace(request, positions=encoders.positions(request.joints, request.positions))
             reply = service.handler(_renamed(request, ("joints",), encoders.joint))
             if service.interface == JOINT_NAMES:

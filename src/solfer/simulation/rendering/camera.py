@@ -22,7 +22,7 @@ from solfer.simulation.world.records import WorldRecord
 from solfer.simulation.world.world import Pose
 
 NICENESS = 10  # the simulation goes before its pictures
-PATIENCE = 5.0  # [s] until a drawing process that was asked to end is killed
+CAMERA_PATIENCE = 5.0  # [s] until a drawing process that was asked to end is killed
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Camera:
         with contextlib.suppress(OSError):
             process.stdin.close()
         try:
-            process.wait(PATIENCE)
+            process.wait(CAMERA_PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

@@ -9,13 +9,13 @@ from typing import BinaryIO
 
 from solfer.errors import ConfigError, SimulationError
 
-NAME = re.compile(r"\w[\w. -]{0,99}\.png", re.ASCII)
-MOST = 1000
+PICTURE_NAME = re.compile(r"\w[\w. -]{0,99}\.png", re.ASCII)
+MAX_PICTURES = 1000
 """Pictures in the folder; beyond them only those that are there are replaced."""
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-_OTHERS = 0o022  # the group and all users may write
+_PICTURE_OTHERS = 0o022  # the group and all users may write
 
 
 class Pictures:
@@ -48,7 +48,7 @@ class Pictures:
             SimulationError: It does not lie in the folder, or is not a name of a picture.
         """
         folder, name = os.path.split(text)
-        if folder not in ("", str(self.folder)) or not NAME.fullmatch(name):
+        if folder not in ("", str(self.folder)) or not PICTURE_NAME.fullmatch(name):
             raise SimulationError(
                 f"'{text[:200]}' cannot become a picture",
                 expected="the name of a picture in the simulator's folder of pictures, such as robot.png",
@@ -82,14 +82,14 @@ def write_picture(path: Path, draw: Callable[[BinaryIO], None]) -> None:
 
 def _check(folder: int, name: str) -> None:
     status = os.fstat(folder)
-    if status.st_uid != os.geteuid() or status.st_mode & _OTHERS:
+    if status.st_uid != os.geteuid() or status.st_mode & _PICTURE_OTHERS:
         raise SimulationError(
             "the folder of pictures is not the user's own",
             expected="a folder of the simulator's user, which no other user may write",
         )
     names = os.listdir(folder)
-    if len(names) >= MOST and name not in names:
-        raise SimulationError("the folder of pictures is full", expected=f"{MOST} pictures at most")
+    if len(names) >= MAX_PICTURES and name not in names:
+        raise SimulationError("the folder of pictures is full", expected=f"{MAX_PICTURES} pictures at most")
 
 
 def _write(folder: int, name: str, draw: Callable[[BinaryIO], None]) -> None:

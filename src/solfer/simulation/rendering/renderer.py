@@ -14,11 +14,11 @@ from solfer.simulation.robot_body.body import Body
 from solfer.simulation.simulation import Simulation
 from solfer.simulation.world.engine import Engine
 from solfer.simulation.world.records import Friction, WorldRecord
-from solfer.simulation.world.world import FLAT, Pose, World
+from solfer.simulation.world.world import FLAT_WORLD, Pose, World
 
-FIELD_OF_VIEW = 40.0  # [deg], vertical
-MARGIN = 1.6  # what is seen, over the extent of the robot
-SAMPLES = 2  # rays along each side of a pixel
+RENDERER_FIELD_OF_VIEW = 40.0  # [deg], vertical
+RENDERER_MARGIN = 1.6  # what is seen, over the extent of the robot
+RENDERER_SAMPLES = 2  # rays along each side of a pixel
 FLOOR_TILE = 0.5  # [m]
 FLOOR_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
 SKY = np.array([[250.0, 251.0, 253.0], [206.0, 216.0, 228.0]])  # RGB at the lower and at the upper edge
@@ -48,7 +48,7 @@ class Renderer:
         height: int = 720,
         yaw: float = 130.0,
         pitch: float = -20.0,
-        world: WorldRecord = FLAT,
+        world: WorldRecord = FLAT_WORLD,
     ):
         self._size = (width, height)
         self._angles = (yaw, pitch)
@@ -70,12 +70,12 @@ class Renderer:
         self._body.place(q[self._first :], *pose)
         bullet = self._engine.bullet
         client = self._engine.client
-        width, height = (SAMPLES * side for side in self._size)
+        width, height = (RENDERER_SAMPLES * side for side in self._size)
         yaw, pitch = self._angles
         centre, size = self._extent()
-        distance = MARGIN * size / 2.0 / math.tan(math.radians(FIELD_OF_VIEW / 2.0))
+        distance = RENDERER_MARGIN * size / 2.0 / math.tan(math.radians(RENDERER_FIELD_OF_VIEW / 2.0))
         view = bullet.computeViewMatrixFromYawPitchRoll(centre, distance, yaw, pitch, 0.0, 2)
-        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, width / height, 0.05, 50.0)
+        lens = bullet.computeProjectionMatrixFOV(RENDERER_FIELD_OF_VIEW, width / height, 0.05, 50.0)
         picture = bullet.getCameraImage(
             width,
             height,
@@ -96,7 +96,9 @@ class Renderer:
         share = np.linspace(1.0, 0.0, height)[:, None, None]
         sky = (share * SKY[1] + (1.0 - share) * SKY[0]).astype(np.uint8)
         fine = np.where(nothing[:, :, None], sky, colours)
-        blocks = fine.reshape(height // SAMPLES, SAMPLES, width // SAMPLES, SAMPLES, 3)
+        blocks = fine.reshape(
+            height // RENDERER_SAMPLES, RENDERER_SAMPLES, width // RENDERER_SAMPLES, RENDERER_SAMPLES, 3
+        )
         return blocks.mean(axis=(1, 3)).astype(np.uint8)
 
     def save(self, q: np.ndarray, path: str | Path, boxes: Sequence[Pose] = ()) -> None:

@@ -33,11 +33,11 @@ class FloatingBase:
         self.orientation[3] = 1.0
         if chart is not None:
             # imported here: its compiler takes a while to load
-            from solfer.numerics.twist_transport import ORIENTED, POSE, TWIST, Carried
+            from solfer.numerics.twist_transport import FROM_POSE, FROM_TWIST, WITH_ORIENTATION, Carried
 
             at_base = np.concatenate((np.eye(3).ravel(), np.zeros(9)))
             self._in_chart = Carried(chart, motion, at_base)
-            self._whole = ORIENTED | POSE | TWIST
+            self._whole = WITH_ORIENTATION | FROM_POSE | FROM_TWIST
         self._to_com = tuple(self._bullet.getDynamicsInfo(body, -1, self._client)[3:5])
         # not by PyBullet's own functions of transforms, which compute with single precision
         x, y, z, w = self._to_com[1]

@@ -15,12 +15,12 @@ from solfer.simulation.robot_body.base import FloatingBase
 from solfer.simulation.robot_body.body_urdf import body_urdf
 from solfer.simulation.robot_body.differences import warn_of_differences
 from solfer.simulation.robot_body.motors import LARGEST_EFFORT, BodyMotors
-from solfer.simulation.world.engine import STDERR, STDOUT, Engine, decimal_points, redirected
+from solfer.simulation.world.engine import STDERR_DESCRIPTOR, STDOUT, Engine, decimal_points, redirected
 from solfer.simulation.world.records import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
 MOST_JOINTS = 127  # of which PyBullet measures the state
-REACH = 100.0  # [m], how far away other bodies are searched for
+SEARCH_DISTANCE = 100.0  # [m], how far away other bodies are searched for
 
 
 class Body:
@@ -126,7 +126,10 @@ class Body:
 
     def distance(self, others: Sequence[int]) -> float:
         """Compute the distance to the nearest of other bodies [m]; negative in an overlap, infinity without any."""
-        found = (self._bullet.getClosestPoints(self.id, other, REACH, physicsClientId=self._client) for other in others)
+        found = (
+            self._bullet.getClosestPoints(self.id, other, SEARCH_DISTANCE, physicsClientId=self._client)
+            for other in others
+        )
         return min((point[8] for points in found for point in points), default=math.inf)
 
     def near(self, other: int, reach: float) -> np.ndarray:
@@ -220,7 +223,7 @@ class Body:
         flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
         path.write_text(text, encoding="utf-8")
         try:
-            with redirected((STDOUT,), STDERR), decimal_points():
+            with redirected((STDOUT,), STDERR_DESCRIPTOR), decimal_points():
                 return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags, physicsClientId=self._client)
         except bullet.error as error:
             raise SimulationError(

@@ -9,13 +9,13 @@ from xml.etree.ElementTree import Element
 
 from solfer.simulation.world.engine import Engine
 
-TOLERANCE = 1e-4
+DIFFERENCES_TOLERANCE = 1e-4
 """Relative error that counts as none: PyBullet keeps some numbers with single precision."""
 
-SHOWN = 8
+DIFFERENCES_SHOWN_COUNT = 8
 """Number of differences that a warning lists."""
 
-SIZES = {"box": "size", "sphere": "radius", "cylinder": "length radius", "capsule": "length radius"}
+DIFFERENCES_SIZES = {"box": "size", "sphere": "radius", "cylinder": "length radius", "capsule": "length radius"}
 """Attributes of shapes, in PyBullet's order."""
 
 logger = logging.getLogger(__name__)
@@ -32,8 +32,10 @@ def warn_of_differences(engine: Engine, body: int, text: str, where: str) -> Non
     """
     found = list(differences(engine, body, text))
     if found:
-        more = f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        logger.warning("%s: the simulation differs from it: %s%s", where, "; ".join(found[:SHOWN]), more)
+        more = f"; and {len(found) - DIFFERENCES_SHOWN_COUNT} more" if len(found) > DIFFERENCES_SHOWN_COUNT else ""
+        logger.warning(
+            "%s: the simulation differs from it: %s%s", where, "; ".join(found[:DIFFERENCES_SHOWN_COUNT]), more
+        )
 
 
 def differences(engine: Engine, body: int, text: str) -> Iterator[str]:
@@ -67,8 +69,8 @@ def _shapes(name: str, link: Element, made: tuple[Any, ...]) -> Iterator[str]:
         yield f"link '{name}': {len(made)} of {len(shapes)} collision shapes{meshes}"
         return
     for shape, one in zip(shapes, made, strict=True):
-        if shape is not None and shape.tag in SIZES:
-            sizes = [float(word) for key in SIZES[shape.tag].split() for word in shape.get(key, "").split()]
+        if shape is not None and shape.tag in DIFFERENCES_SIZES:
+            sizes = [float(word) for key in DIFFERENCES_SIZES[shape.tag].split() for word in shape.get(key, "").split()]
             if not all(map(_equal, sizes, one[3])):
                 yield f"link '{name}': {shape.tag} of the size {_listed(one[3])} instead of {_listed(sizes)}"
 
@@ -85,7 +87,7 @@ def _joint(joint: Element, infos: dict[str, tuple[Any, ...]]) -> Iterator[str]:
 
 
 def _equal(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=1e-9)
+    return math.isclose(one, other, rel_tol=DIFFERENCES_TOLERANCE, abs_tol=1e-9)
 
 
 def _listed(values: Any) -> str:

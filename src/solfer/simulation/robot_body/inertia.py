@@ -7,27 +7,27 @@ import numpy as np
 
 from solfer.errors import SimulationError
 
-ROUNDING = 1e-6
+INERTIA_ROUNDING = 1e-6
 """Share of the largest principal inertia that counts as rounding: it is worth no warning."""
 
-MARGIN = 1e-5
+INERTIA_MARGIN = 1e-5
 """Least second moment of mass, as a share of their sum: Bullet, in single precision, drops inertias without it."""
 
-SMALLEST = 1e-6
+INERTIA_SMALLEST_SIZE = 1e-6
 """Radius of gyration below which an inertia stands for none at all [m]."""
 
-DENSITY = 7800.0
+INERTIA_DENSITY = 7800.0
 """Density of steel, of which a link without inertia is made [kg/m^3]."""
 
 REPAIRED = 0.1
 """Largest repair, as a share of the inertia (norms of Frobenius): more is no inaccuracy but another body."""
 
-SHOWN = 4
+INERTIA_SHOWN_COUNT = 4
 """Number of links that a warning names."""
 
 logger = logging.getLogger(__name__)
 _MOMENTS = np.ones((3, 3)) - np.eye(3)  # principal inertias of a body from its second moments of mass, none negative
-_SECOND = np.linalg.inv(_MOMENTS)
+_INERTIA_SECOND = np.linalg.inv(_MOMENTS)
 
 
 class Inertias:
@@ -58,24 +58,28 @@ class Inertias:
             SimulationError: It is far from the inertia of any body.
         """
         principal, axes = np.linalg.eigh(inertia)
-        if abs(principal).max() < mass * SMALLEST**2:
+        if abs(principal).max() < mass * INERTIA_SMALLEST_SIZE**2:
             ball = _ball(mass)
             self._note(link, principal, ball)
             return np.diag(ball)
-        moments = _SECOND @ principal
-        if moments.min() >= MARGIN * moments.sum() > 0.0:
+        moments = _INERTIA_SECOND @ principal
+        if moments.min() >= INERTIA_MARGIN * moments.sum() > 0.0:
             return inertia
         nearest = _nearest(principal)
         small, middle, large = principal
-        if small < -ROUNDING * large or large > (small + middle) * (1.0 + ROUNDING):
+        if small < -INERTIA_ROUNDING * large or large > (small + middle) * (1.0 + INERTIA_ROUNDING):
             self._repair(link, principal, nearest)
         return (axes * nearest) @ axes.T
 
     def warn(self) -> None:
         """Log what was repaired."""
         if self._repaired:
-            more = f"; and {len(self._repaired) - SHOWN} more" if len(self._repaired) > SHOWN else ""
-            listed = "; ".join(self._repaired[:SHOWN])
+            more = (
+                f"; and {len(self._repaired) - INERTIA_SHOWN_COUNT} more"
+                if len(self._repaired) > INERTIA_SHOWN_COUNT
+                else ""
+            )
+            listed = "; ".join(self._repaired[:INERTIA_SHOWN_COUNT])
             logger.warning(
                 "%s: principal inertias that no body has are replaced by the nearest: %s%s", self._where, listed, more
             )
@@ -103,13 +107,13 @@ def _nearest(principal: np.ndarray) -> np.ndarray:
     """Compute the nearest principal inertias of a body, whose second moments all have the margin, shape (3,)."""
     from scipy.optimize import nnls  # heavy, and needed by few robots
 
-    least = MARGIN * abs(principal).sum()
+    least = INERTIA_MARGIN * abs(principal).sum()
     return _MOMENTS @ (nnls(_MOMENTS, principal - _MOMENTS @ np.full(3, least))[0] + least)
 
 
 def _ball(mass: float) -> np.ndarray:
     """Compute the principal inertias of a ball of steel, 2/5 m r^2, shape (3,) [kg m^2]."""
-    radius = (3.0 * mass / (4.0 * math.pi * DENSITY)) ** (1.0 / 3.0)
+    radius = (3.0 * mass / (4.0 * math.pi * INERTIA_DENSITY)) ** (1.0 / 3.0)
     return np.full(3, 0.4 * mass * radius**2)
 
 

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from solfer.errors import SimulationError
-from solfer.model.urdf.mesh_files import PACKAGE, find_mesh, mesh_candidates
+from solfer.model.urdf.mesh_files import PACKAGE_SCHEME, find_mesh, mesh_candidates
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle of a binary STL."""
@@ -93,9 +93,9 @@ class Meshes:
         return written
 
     def _expected(self, name: str) -> str:
-        if not name.startswith(PACKAGE):
+        if not name.startswith(PACKAGE_SCHEME):
             return f"the file '{mesh_candidates(self._urdf, name)[0]}'"
-        package = name.removeprefix(PACKAGE).lstrip("/").split("/")[0]
+        package = name.removeprefix(PACKAGE_SCHEME).lstrip("/").split("/")[0]
         return f"the URDF inside of a folder '{package}', or a ROS package of that name"
 
 

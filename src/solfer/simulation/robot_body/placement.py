@@ -14,7 +14,7 @@ from solfer.simulation.robot_body.resting import resting_orientation, rests
 from solfer.simulation.world.world import World
 
 OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
-TOUCH = 2e-7  # [m], distance at which the approach to the ground ends; PyBullet measures in single precision
+TOUCH_DISTANCE = 2e-7  # [m], distance at which the approach to the ground ends; PyBullet measures in single precision
 APPROACHES = 2000
 BOUNDS = {
     "x": (-1000.0, 1000.0, "m"),
@@ -52,8 +52,8 @@ class StartPlacement:
                 raise SimulationError(f"'{name}' is {value:g}", expected=f"from {low:g} to {high:g} [{unit}]")
 
 
-ORIGIN = StartPlacement()
-DEEP = 1e-3  # [m], from which on an overlap is no matter of rounding
+START_ORIGIN = StartPlacement()
+PLACEMENT_DEPTH_LIMIT = 1e-3  # [m], from which on an overlap is no matter of rounding
 logger = logging.getLogger(__name__)
 
 
@@ -106,7 +106,7 @@ def _put_down(
                 "nothing carries the robot: its base floats, and it has no collision shapes",
                 expected="<collision> elements in its URDF, or `floating_base: false`",
             )
-        if abs(distance) < TOUCH:
+        if abs(distance) < TOUCH_DISTANCE:
             break
         height -= distance
     else:
@@ -123,7 +123,7 @@ def fix(body: Body, world: World, joints: Sequence[float] | np.ndarray) -> None:
     body.place(joints)
     obstacles, _ = world.under(*body.extent())
     depth, link = body.overlap(obstacles)
-    if depth > DEEP:
+    if depth > PLACEMENT_DEPTH_LIMIT:
         logger.warning(
             "link '%s' begins %.3f m inside of the world, which pushes it out: the base is fixed at z = 0; "
             "a link below the root of the URDF raises it",

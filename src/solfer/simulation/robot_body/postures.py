@@ -10,7 +10,7 @@ from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 
-ROUNDING = 1e-9
+POSTURE_ROUNDING = 1e-9
 
 
 class Postures:
@@ -51,7 +51,7 @@ class Postures:
                     posture[place[joint]] = value
         self._followers.follow(posture)
         for joint, value, low, high in zip(self._joints, posture, self._lower, self._upper, strict=True):
-            if not low - ROUNDING <= value <= high + ROUNDING or not math.isfinite(value):
+            if not low - POSTURE_ROUNDING <= value <= high + POSTURE_ROUNDING or not math.isfinite(value):
                 raise ModelError(
                     f"state '{state or self._start}' has joint '{joint}' at {value:g}",
                     expected=f"from {low:g} to {high:g} [rad]",

@@ -11,11 +11,11 @@ from solfer.simulation.world.engine import STEP, Engine
 
 Vector = Sequence[float] | np.ndarray
 
-LARGEST = {"force": (1e4, "N"), "torque": (1e4, "Nm")}
+PUSH_MAXIMUM = {"force": (1e4, "N"), "torque": (1e4, "Nm")}
 """Largest magnitude of each component of a push, and its unit."""
 
-LONGEST = 60.0  # [s]
-MOST = 64
+LONGEST_PUSH = 60.0  # [s]
+MAX_PUSHES = 64
 """Pushes that act at the same time."""
 
 
@@ -53,16 +53,18 @@ class Pushes:
         if not body.floating and body.owner[link] == body.base_link:
             raise SimulationError(f"link '{link}' is fixed to the world", expected="a link that moves")
         for what, numbers in (("force", force), ("torque", torque)):
-            largest, unit = LARGEST[what]
+            largest, unit = PUSH_MAXIMUM[what]
             if len(numbers) != 3 or not all(abs(number) <= largest for number in numbers):  # true for NaN as well
                 raise SimulationError(
                     f"the {what} of a push on '{link}' is {_shown(numbers)}",
                     expected=f"three numbers from {-largest:g} to {largest:g} [{unit}]",
                 )
-        if not 0.0 < duration <= LONGEST:
-            raise SimulationError(f"the duration of a push is {duration:g}", expected=f"above 0, to {LONGEST:g} [s]")
-        if len(self._acting) >= MOST:
-            raise SimulationError(f"{MOST} pushes act already", expected="a push after they have ended")
+        if not 0.0 < duration <= LONGEST_PUSH:
+            raise SimulationError(
+                f"the duration of a push is {duration:g}", expected=f"above 0, to {LONGEST_PUSH:g} [s]"
+            )
+        if len(self._acting) >= MAX_PUSHES:
+            raise SimulationError(f"{MAX_PUSHES} pushes act already", expected="a push after they have ended")
         steps = max(1, round(duration / STEP))
         self._acting.append((link, [float(value) for value in force], [float(value) for value in torque], steps))
 

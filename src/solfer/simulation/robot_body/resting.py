@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
-from solfer.simulation.robot_body.body import REACH, Body
+from solfer.simulation.robot_body.body import SEARCH_DISTANCE, Body
 
 LEAST_TILT = math.radians(0.3)
 """Least tilt that is worth it: from less a robot comes to rest by itself [rad]."""
@@ -14,7 +14,7 @@ LEAST_TILT = math.radians(0.3)
 LARGEST_TILT = math.radians(10.0)
 """Largest tilt at which a robot still counts as put down upright [rad]."""
 
-DIRECTIONS, STEPS = 16, 10
+TILT_DIRECTIONS, TILT_STEPS = 16, 10
 """Directions in which a robot is tilted to find its lowest points, and steps to the largest tilt."""
 
 GENTLE = 2e-4
@@ -63,7 +63,7 @@ def resting_orientation(
     heights = soles @ start.T @ normal
     if _carried(soles[heights < heights.min() + TOUCHING] @ start.T, start @ center):
         return None
-    steps = np.linspace(0.0, LARGEST_TILT, STEPS + 1)
+    steps = np.linspace(0.0, LARGEST_TILT, TILT_STEPS + 1)
     nearest = LARGEST_TILT
     found = None
     for corners, outward in _faces(_vertices(body, joints, start, ground=ground, tilts=_tilts(start, steps)), center):
@@ -77,7 +77,7 @@ def resting_orientation(
 
 def _lowest(body: Body, ground: int, normal: np.ndarray) -> np.ndarray:
     """Find the lowest points of the robot above a plane with this normal, shape (n, 3) [m]."""
-    points = body.near(ground, REACH)
+    points = body.near(ground, SEARCH_DISTANCE)
     heights = points @ normal
     return points[heights < heights.min() + TOUCHING]
 
@@ -106,7 +106,7 @@ def _vertices(
 def _tilts(start: np.ndarray, angles: Iterable[float]) -> Iterator[np.ndarray]:
     """Iterate over rotation vectors of these lengths in all directions of the plane, shape (3,) [rad]."""
     for angle in angles:
-        for direction in np.arange(DIRECTIONS) * (2.0 * math.pi / DIRECTIONS):
+        for direction in np.arange(TILT_DIRECTIONS) * (2.0 * math.pi / TILT_DIRECTIONS):
             yield angle * (math.cos(direction) * start[:, 0] + math.sin(direction) * start[:, 1])
 
 

@@ -27,13 +27,13 @@ def _kinds() -> tuple[type[Sensor], ...]:
     )
 
 
-KINDS = _kinds()
+SENSOR_KINDS = _kinds()
 """All kinds of sensors, in alphabetical order of their modules."""
 
 _RATES: dict[str, Any] = {
-    kind.name: (float, Field(default=kind.rate, **PUBLICATION, description=kind.what)) for kind in KINDS
+    kind.name: (float, Field(default=kind.rate, **PUBLICATION, description=kind.what)) for kind in SENSOR_KINDS
 }
-_TAGS: dict[str, Any] = {name: field for kind in KINDS for name, field in kind.tags.items()}
+_TAGS: dict[str, Any] = {name: field for kind in SENSOR_KINDS for name, field in kind.tags.items()}
 _RatesOfKinds: Any = create_model("_RatesOfKinds", __base__=Record, **_RATES)
 _TagsOfKinds: Any = create_model("_TagsOfKinds", __base__=Record, **_TAGS)
 

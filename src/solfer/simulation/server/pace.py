@@ -4,7 +4,7 @@ from solfer.simulation.world.engine import STEP
 from solfer.transport.fixed_rate import Clock, FixedRateLoop
 
 CATCH_UP = 0.02  # [s]
-WINDOW = 1.0  # [s]
+PACE_WINDOW = 1.0  # [s]
 
 
 class Pace:
@@ -53,6 +53,6 @@ class Pace:
 
     def _measure(self, now: float, time: float) -> None:
         begin, simulated = self._window
-        if now - begin >= WINDOW:
+        if now - begin >= PACE_WINDOW:
             self.measured = (time - simulated) / (now - begin)
             self._window = (now, time)

@@ -6,7 +6,7 @@ from solfer.simulation.world.engine import STEP
 
 HOW = "NAME=HZ, several with commas between, such as joints=500,contacts=200"
 
-SLOWEST = 1e-6
+LONGEST_PERIOD = 1e-6
 """Highest rate that makes sense [Hz]."""
 
 
@@ -16,7 +16,7 @@ def every(rate: float, where: str = "") -> int:
     Raises:
         SimulationError: That is not a whole number of steps; `where` is the place of the rate.
     """
-    steps = round(1.0 / (rate * STEP)) if rate > SLOWEST else 0
+    steps = round(1.0 / (rate * STEP)) if rate > LONGEST_PERIOD else 0
     if steps < 1 or abs(steps * rate * STEP - 1.0) > 1e-9:
         raise SimulationError(
             f"{rate:g} Hz is not a rate of publication",

@@ -13,7 +13,7 @@ from solfer.simulation.simulation import Simulation
 from solfer.transport import Inbox
 
 STANDSTILL = 2.0  # [s] without a cycle until a picture fails
-WAITING = 4  # pictures that may wait to be drawn
+SCREENSHOTS_WAITING = 4  # pictures that may wait to be drawn
 
 
 class Screenshots:
@@ -38,11 +38,13 @@ class Screenshots:
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":
         """Pass a call to the thread that draws, unless too many wait there."""
         self._drawings = [drawing for drawing in self._drawings if not drawing.done()]
-        if len(self._drawings) < WAITING:
+        if len(self._drawings) < SCREENSHOTS_WAITING:
             self._drawings.append(self._thread.submit(call))
             return self._drawings[-1]
         refused: Future[Any] = Future()
-        refused.set_exception(SimulationError(f"{WAITING} pictures wait to be drawn", expected="a request later on"))
+        refused.set_exception(
+            SimulationError(f"{SCREENSHOTS_WAITING} pictures wait to be drawn", expected="a request later on")
+        )
         return refused
 
     def take(self, name: str) -> Path:

@@ -15,7 +15,7 @@ from solfer.simulation.server.pace import Pace
 from solfer.simulation.server.publications import publications
 from solfer.simulation.server.rates import every
 from solfer.simulation.server.screenshots import Screenshots
-from solfer.simulation.server.services import SIMULATOR, screenshot_service, simulator_services
+from solfer.simulation.server.services import SERVICES_OWNER, screenshot_service, simulator_services
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
 from solfer.simulation.world.engine import STEP
@@ -25,13 +25,13 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-HEALTH = "simulation"
+SIMULATION_HEALTH = "simulation"
 """Name of the health report."""
 
 HEALTH_RATE = 1.0  # [Hz] of simulated time
-AGAIN = 1.0  # [s] of simulated time; a simulation that diverges twice within it has no good state
-REST = 1.0  # [s] of simulated time in which a robot without commands comes to rest
-AT_REST = 0.05  # [rad/s] largest speed of a joint of a robot at rest
+SIMULATION_REPEAT_PERIOD = 1.0  # [s] of simulated time; a simulation that diverges twice within it has no good state
+COAST_TIME = 1.0  # [s] of simulated time in which a robot without commands comes to rest
+REST_SPEED_OF_JOINTS = 0.05  # [rad/s] largest speed of a joint of a robot at rest
 IDLE = 0.02  # [s] between two checks for requests and commands while paused
 
 
@@ -104,7 +104,7 @@ class SimulationServer:
         middleware: Middleware,
         rates: Rates | None = None,
         factor: float = 1.0,
-        name: str = HEALTH,
+        name: str = SIMULATION_HEALTH,
         followers: StepHook | None = None,
         pictures: Pictures | None = None,
     ):
@@ -123,9 +123,9 @@ class SimulationServer:
         self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
-        middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
+        middleware.serve(SERVICES_OWNER, simulator_services(self), self.inbox.submit)
         self._screenshots = Screenshots(simulation, self.inbox, pictures or Pictures())
-        middleware.serve(SIMULATOR, (screenshot_service(self),), self._screenshots.submit)
+        middleware.serve(SERVICES_OWNER, (screenshot_service(self),), self._screenshots.submit)
 
     def cycle(self) -> None:
         """Receive commands and service calls, make one step unless time stands still, publish what is due.
@@ -216,14 +216,14 @@ class SimulationServer:
             return
         owners = self.simulation.lower_level.release_all(loss)
         logger.warning("the robot holds%s: %s", f", which {', '.join(owners)} commanded" if owners else "", loss)
-        for _ in range(round(REST / STEP)):
+        for _ in range(round(COAST_TIME / STEP)):
             (cycle or self.cycle)()
 
     def _linger(self, cycle: Callable[[], None]) -> str:
         """Go on as long as the robot moves; return why that is to end, empty: it rests."""
         begin = 6 if self.simulation.floating else 0
-        left = round(REST / STEP) if isinstance(self._followers, StepHook) and not self.paused else 0
-        while left and np.abs(self.simulation.v[begin:]).max(initial=0.0) > AT_REST:
+        left = round(COAST_TIME / STEP) if isinstance(self._followers, StepHook) and not self.paused else 0
+        while left and np.abs(self.simulation.v[begin:]).max(initial=0.0) > REST_SPEED_OF_JOINTS:
             cycle()
             self.wait()
             left -= 1
@@ -234,7 +234,7 @@ class SimulationServer:
     def _recover(self, error: SimulationError) -> None:
         """Put the robot into its start, as a reset does; raises `error` if that was done less than AGAIN ago."""
         time = self.simulation.time
-        if time - self._diverged < AGAIN:
+        if time - self._diverged < SIMULATION_REPEAT_PERIOD:
             raise error
         logger.error("%s: the robot is put into its start", error)
         self._diverged = time

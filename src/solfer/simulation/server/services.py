@@ -14,7 +14,7 @@ from solfer.transport.middleware import Flag
 if TYPE_CHECKING:
     from solfer.simulation.server.server import SimulationServer
 
-SIMULATOR = "simulator"
+SERVICES_OWNER = "simulator"
 """Owner of these services."""
 
 LARGEST_COUNT = 1000

@@ -14,8 +14,8 @@ STEP = 0.001  # [s]
 GRAVITY = 9.81  # [m/s^2], along -z
 SOLVER_ITERATIONS = 50
 STDOUT = 1
-STDERR = 2  # file descriptors
-VIEW = (2.5, 50.0, -20.0)
+STDERR_DESCRIPTOR = 2  # file descriptors
+WINDOW_VIEW = (2.5, 50.0, -20.0)
 """Distance [m], yaw and pitch [deg] of the window's camera at first."""
 
 
@@ -59,7 +59,7 @@ def load_pybullet() -> ModuleType:
     Raises:
         MissingDependency: It is not installed.
     """
-    with redirected((STDOUT, STDERR)):
+    with redirected((STDOUT, STDERR_DESCRIPTOR)):
         try:
             import pybullet
         except ModuleNotFoundError as error:
@@ -111,7 +111,7 @@ class Engine:
     def show(self, target: Iterable[float]) -> None:
         """Begin to draw, with the camera on the point `target` [m]; no effect without a window."""
         if self._window:
-            self.bullet.resetDebugVisualizerCamera(*VIEW, [float(value) for value in target], self.client)
+            self.bullet.resetDebugVisualizerCamera(*WINDOW_VIEW, [float(value) for value in target], self.client)
             self.bullet.configureDebugVisualizer(self.bullet.COV_ENABLE_RENDERING, 1, physicsClientId=self.client)
 
     def step(self) -> None:

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 from solfer.config import Record
 from solfer.config.records.bounds import COORDINATE, LENGTH, Bounds
 
-DEFAULT = 0.3
-GROUND = 1.0
+DEFAULT_FRICTION = 0.3
+GROUND_FRICTION = 1.0
 
 FRICTION: Bounds = {"ge": 0.0, "le": 10.0}
 """Bounds of a coefficient."""
@@ -26,9 +26,9 @@ class Friction:
         ground: Coefficient of the ground; None: there is no ground.
     """
 
-    default: float = DEFAULT
+    default: float = DEFAULT_FRICTION
     links: Mapping[str, float] = field(default_factory=dict)
-    ground: float | None = GROUND
+    ground: float | None = GROUND_FRICTION
 
 
 GROUND_NAME = "ground"
@@ -59,7 +59,7 @@ class BoxRecord(Record):
         default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]"
     )
     mass: float | None = Field(default=None, ge=1e-3, le=1e5, description="mass [kg]; default: the box is fixed")
-    friction: float = Field(default=GROUND, **FRICTION, description="coefficient")
+    friction: float = Field(default=GROUND_FRICTION, **FRICTION, description="coefficient")
 
 
 class StairsRecord(Record):
@@ -71,7 +71,7 @@ class StairsRecord(Record):
     rise: float = Field(**STEP_LENGTH, description="height of a step [m]")
     tread: float = Field(**STEP_LENGTH, description="depth of a step [m]")
     width: float = Field(**LENGTH, description="length of the edges [m]")
-    friction: float = Field(default=GROUND, **FRICTION, description="coefficient")
+    friction: float = Field(default=GROUND_FRICTION, **FRICTION, description="coefficient")
 
 
 class WorldRecord(Record):

@@ -14,9 +14,9 @@ from solfer.simulation.world.engine import Engine
 from solfer.simulation.world.records import GROUND_NAME, BoxRecord, StairsRecord, WorldRecord
 
 WORLDS = "package://solfer/config/worlds"
-FAR = 1e3  # [m]
+FAR_AWAY = 1e3  # [m]
 COLOUR = (0.58, 0.55, 0.50, 1.0)
-FLAT = WorldRecord()
+FLAT_WORLD = WorldRecord()
 
 Pose = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
 
@@ -57,7 +57,7 @@ class World:
         record: What it was made of.
     """
 
-    def __init__(self, engine: Engine, record: WorldRecord = FLAT, ground_friction: float | None = None):
+    def __init__(self, engine: Engine, record: WorldRecord = FLAT_WORLD, ground_friction: float | None = None):
         self._bullet = engine.bullet
         self._client = engine.client
         self.record = record
@@ -97,7 +97,9 @@ class World:
     def scatter(self) -> None:
         """Put everything that can move far away from everything else."""
         for index, (body, (_, orientation)) in enumerate(self._movable):
-            self._bullet.resetBasePositionAndOrientation(body, [0.0, 0.0, FAR * (index + 1)], orientation, self._client)
+            self._bullet.resetBasePositionAndOrientation(
+                body, [0.0, 0.0, FAR_AWAY * (index + 1)], orientation, self._client
+            )
 
     def poses(self) -> list[Pose]:
         """Read positions [m] and quaternions (x, y, z, w) of the boxes that can move, in the order of the record."""

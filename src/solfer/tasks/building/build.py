@@ -18,7 +18,7 @@ from solfer.tasks.hierarchy import Hierarchy
 from solfer.tasks.qp_hierarchy import QpHierarchy
 from solfer.tasks.task import Task
 
-_ROWS = {3: ("x", "y", "z"), 6: ("x", "y", "z", "rx", "ry", "rz")}
+_TASK_ROWS = {3: ("x", "y", "z"), 6: ("x", "y", "z", "rx", "ry", "rz")}
 _TURNS = ("rx", "ry", "rz")
 
 
@@ -352,7 +352,7 @@ def _rows(record: TaskRecord, point: Point) -> list[int] | None:
     if record.rows is None:
         return [5] if record.point == "steering" else None
     turns = record.point in ("orientation", "angular_momentum")
-    names = _TURNS if turns else _ROWS.get(point.rows, ()) if not isinstance(point, Posture) else ()
+    names = _TURNS if turns else _TASK_ROWS.get(point.rows, ()) if not isinstance(point, Posture) else ()
     found = []
     for index, row in enumerate(record.rows):
         if isinstance(row, str) and row not in names:

@@ -15,10 +15,10 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-BEAT = 0.2
+STATUS_PERIOD = 0.2
 """Time between two messages of status without news [s]; clients take a silent one for dead after some of them."""
 
-REMEMBERED = 20
+ACTION_MEMORY = 20
 """Goals that have ended, or were cancelled before they came, that are still in the status and known if they come."""
 
 
@@ -161,7 +161,7 @@ class ActionServer:
         """Let a goal that is not under way be in the status, as the newest one; the oldest is forgotten."""
         self._past.pop(entry.goal_id.id, None)
         self._past[entry.goal_id.id] = entry
-        if len(self._past) > REMEMBERED:
+        if len(self._past) > ACTION_MEMORY:
             del self._past[next(iter(self._past))]
 
     def _end(self, name: GoalName, state: GoalStatus, text: str, result: Any = None) -> None:
@@ -175,6 +175,6 @@ class ActionServer:
 
     def _publish_status(self) -> None:
         """Publish the states of the goals."""
-        self._next_status = self._now() + BEAT
+        self._next_status = self._now() + STATUS_PERIOD
         in_progress = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
         self._topics.publish_status((*self._past.values(), *in_progress))

@@ -11,11 +11,11 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-AGAIN = 0.05
+STREAM_REPEAT_PERIOD = 0.05
 """Time between two messages of rest [s]: one may be lost."""
 
 
-SILENCE = 0.5
+STREAM_SILENCE = 0.5
 """Time without a message after which another sender of a stream counts [s]."""
 
 
@@ -28,7 +28,7 @@ class SoleSender:
 
     def admits(self, sender: str, now: float) -> bool:
         """Decide whether a message that is received `now` [s] counts."""
-        if sender != self.name and now - self._newest <= SILENCE:
+        if sender != self.name and now - self._newest <= STREAM_SILENCE:
             return False
         self.name = sender
         self._newest = now
@@ -125,5 +125,5 @@ class DeclaredOut:
     def rest(self, refusal: str) -> None:
         """Publish now and then, while a component that has worked does not (a `refusal`), what is declared for that."""
         if refusal and self._has_worked and self._now() >= self._next:
-            self._next = self._now() + AGAIN
+            self._next = self._now() + STREAM_REPEAT_PERIOD
             self._writer.write(message_of(self._topic.interface, self._topic.rest))

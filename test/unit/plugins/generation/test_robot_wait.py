@@ -7,7 +7,7 @@ import pytest
 from solfer.config import TextRecord
 from solfer.errors import UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins.generation.robot_wait import AGAIN, LOOK, missing, wait_for_robot
+from solfer.plugins.generation.robot_wait import ROBOT_POLL_PERIOD, ROBOT_REPEAT_PERIOD, missing, wait_for_robot
 
 KIND = "sensor_msgs/JointState"
 
@@ -47,10 +47,10 @@ def test_a_plugin_waits_until_its_robot_comes(bus, node, caplog):
 
     def pause():
         passed = bus.time - begun
-        node.sleep_until(bus.time + LOOK)
-        if passed > 2.5 * AGAIN:
+        node.sleep_until(bus.time + ROBOT_POLL_PERIOD)
+        if passed > 2.5 * ROBOT_REPEAT_PERIOD:
             describe(bus)
-        if passed > 3.2 * AGAIN:
+        if passed > 3.2 * ROBOT_REPEAT_PERIOD:
             publish(bus)
 
     assert wait_for_robot([configuration()], node, node.running, pause)

@@ -4,7 +4,7 @@ import math
 
 from solfer.numerics.compilation import part
 
-PERIOD = math.pi
+ORIGINAL_HALF_TURN = math.pi
 """Steering, camber and caster are the same for a wheel that has turned by half a turn."""
 
 ROUNDED, QUARTER = 3.14159265, 1.57079632
@@ -13,16 +13,16 @@ ROUNDED, QUARTER = 3.14159265, 1.57079632
 ROUNDED_TURN = 6.28318531
 """A whole turn there [rad]."""
 
-REACH = math.pi / 2.0 + math.radians(10.0)
+OPPOSITE_ANGLE = math.pi / 2.0 + math.radians(10.0)
 """Angle from where a wheel points beyond which a direction is replaced by the opposite one, in the original [rad]."""
 
-SLOW, GAIN = 0.1, 1000.0
-"""Below this speed [m/s] errors count by `GAIN` times the speed."""
+ORIGINAL_SLOW_SPEED, ORIGINAL_GAIN = 0.1, 1000.0
+"""Below this speed [m/s] errors count by `ORIGINAL_GAIN` times the speed."""
 
-RESTING = 2e-3
+ORIGINAL_REST_ERROR = 2e-3
 """Errors of vertices that no wheel steers for, where no motion is desired [m]."""
 
-NEAR = 2e-4
+ORIGINAL_NEARNESS = 2e-4
 """Errors count whole where their way in one cycle is larger than this [m]."""
 
 
@@ -32,7 +32,7 @@ def nearest(angle, other):
 
     Of two that are equally near, it is the larger one.
     """
-    return angle - PERIOD * math.ceil((angle - other) / PERIOD - 0.5)
+    return angle - ORIGINAL_HALF_TURN * math.ceil((angle - other) / ORIGINAL_HALF_TURN - 0.5)
 
 
 @part
@@ -45,7 +45,7 @@ def _branch(angle, other, reach):
     angle += turns * ROUNDED
     if abs(angle - other) > reach:
         side = math.copysign(1.0, angle - other)
-        angle -= side * PERIOD
+        angle -= side * ORIGINAL_HALF_TURN
         turns -= side
     return angle, -1.0 if turns % 2.0 else 1.0
 
@@ -56,11 +56,11 @@ def _follow(before, speed_before, last, angle, speed, margin):
 
     `last` is the last direction of the wheel; see `Steering`.
     """
-    angle, sign = _branch(angle, before, PERIOD / 2.0)
+    angle, sign = _branch(angle, before, ORIGINAL_HALF_TURN / 2.0)
     share = math.tanh(speed / margin)
     angle = before + share * (angle - before)
     speed = speed_before + share * (sign * speed - speed_before)
-    angle, sign = _branch(angle, last, REACH)
+    angle, sign = _branch(angle, last, OPPOSITE_ANGLE)
     return angle, sign * speed
 
 
@@ -69,7 +69,7 @@ def merge(wheel, law, wx, wy, ex, ey, speed):
     """Steer as the original program does; see `Steering`."""
     is_still = wx == 0.0 and wy == 0.0
     distance = math.hypot(ex, ey)
-    if law.rests != 0.0 and is_still and distance < RESTING:
+    if law.rests != 0.0 and is_still and distance < ORIGINAL_REST_ERROR:
         return
     wheel.aim = math.atan2(wy, wx)
     wheel.motion, wheel.motion_speed = _follow(
@@ -79,11 +79,11 @@ def merge(wheel, law, wx, wy, ex, ey, speed):
         wheel.error, wheel.error_speed, wheel.angle, math.atan2(ey, ex), law.tracking * distance, law.error_margin
     )
     scale = 1.0
-    if speed < SLOW and abs(wheel.error_speed * law.period) < NEAR:
-        scale = GAIN * speed + abs(wheel.error_speed)
+    if speed < ORIGINAL_SLOW_SPEED and abs(wheel.error_speed * law.period) < ORIGINAL_NEARNESS:
+        scale = ORIGINAL_GAIN * speed + abs(wheel.error_speed)
     trust = 1.0
-    if scale < 1.0 and abs(wheel.motion_speed) < SLOW:
-        trust = scale + GAIN * abs(wheel.motion_speed)
+    if scale < 1.0 and abs(wheel.motion_speed) < ORIGINAL_SLOW_SPEED:
+        trust = scale + ORIGINAL_GAIN * abs(wheel.motion_speed)
     a = law.icm * wheel.motion_speed
     b = law.sp * wheel.error_speed
     size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel.motion - wheel.error), 0.0))

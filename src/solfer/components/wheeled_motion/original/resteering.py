@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-BEYOND, CYCLES = 0.005, 20
+BEYOND, RESTEERING_CYCLES = 0.005, 20
 """How far a command has to be beyond a limit [rad], and for how many cycles in a row, before the wheel turns back."""
 
-STEP, LARGEST = math.radians(5.0), 2.8
+RESTEERING_STEP, RESTEERING_MAXIMUM = math.radians(5.0), 2.8
 """How far it turns in each cycle, and altogether at least [rad]."""
 
 
@@ -35,12 +35,12 @@ class Resteering:
     def update(self, measured: np.ndarray, commanded: np.ndarray) -> None:
         """Write what joints are to do that turn back; both have shape (m,) [rad]."""
         for index, (state, command) in enumerate(zip(measured.tolist(), commanded.tolist(), strict=True)):
-            if self.sides[index] and abs(state - self._starts[index]) >= LARGEST:
+            if self.sides[index] and abs(state - self._starts[index]) >= RESTEERING_MAXIMUM:
                 self.sides[index] = 0.0
             if not self.sides[index]:
                 self._watch(index, state, command)
             if self.sides[index]:
-                commanded[index] = state + self.sides[index] * STEP
+                commanded[index] = state + self.sides[index] * RESTEERING_STEP
 
     def _watch(self, index: int, state: float, command: float) -> None:
         lower = self._lower[index]
@@ -48,7 +48,7 @@ class Resteering:
         is_low = command < lower - BEYOND and state < lower + BEYOND
         is_high = command > upper + BEYOND and state > upper - BEYOND
         self._counts[index] = self._counts[index] + 1 if is_low or is_high else 0
-        if self._counts[index] >= CYCLES:
+        if self._counts[index] >= RESTEERING_CYCLES:
             self.sides[index] = 1.0 if is_low else -1.0
             self._starts[index] = state
             self._counts[index] = 0

@@ -10,19 +10,19 @@ from solfer.numerics.pointers import matrix_at, record_at, vector_at
 SIDEWAYS = 4e-3
 """Speed across a wheel with which its vertex may leave its way [m/s]."""
 
-SLOWER, FASTER = 8.0, 1.0
+PACE_DECAY_RATE, PACE_RECOVERY_RATE = 8.0, 1.0
 """How fast the pace falls and rises where joints are at their bounds [1/s]."""
 
-RISING, BRAKING, STARTING = 2.0, 4.0, 3.0
+RISING, BRAKING_FACTOR, STARTING_FACTOR = 2.0, 4.0, 3.0
 """By how much more than `acceleration` vertices go on and brake by the pace, and start where more is desired."""
 
-SLOWEST, ARRIVED = 4e-3, 1e-9
+PACE_LOWEST_SPEED, PACE_ARRIVAL_DISTANCE = 4e-3, 1e-9
 """Speed with which the rest of a way to a place is gone [m/s, rad/s], and the distance that is none [m, rad]."""
 
 PACE, LIMITS, HEADING = range(3)
 """Numbers of the references."""
 
-AIMS, SPEEDS, MEASURED = 1, 2, 3
+AIMS, SPEEDS_ROW, MEASURED_ROW = 1, 2, 3
 """Rows of what is known of steered wheels."""
 
 VALUE, MOST, HELD, SHARE, SPEED = range(5)
@@ -70,17 +70,17 @@ def _update(memory, state, is_held, most, passed):
     fastest = 0.0
     across = SIDEWAYS
     for index in range(memory.count):
-        speed = steered[SPEEDS, index]
+        speed = steered[SPEEDS_ROW, index]
         fastest = max(fastest, speed)
-        across = max(across, speed * abs(math.sin(steered[AIMS, index] - steered[MEASURED, index] + heading)))
-    change = (-SLOWER if is_held else FASTER) * passed
-    state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - SLOWER * passed))
+        across = max(across, speed * abs(math.sin(steered[AIMS, index] - steered[MEASURED_ROW, index] + heading)))
+    change = (-PACE_DECAY_RATE if is_held else PACE_RECOVERY_RATE) * passed
+    state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - PACE_DECAY_RATE * passed))
     share = min(SIDEWAYS / across, state[HELD])
     if fastest > 0.0:
         before = state[SHARE]
         step = memory.acceleration * passed / fastest
-        least = min(before, state[SPEED] / fastest) - BRAKING * step
-        share = min(max(share, least), before + RISING * step, state[SPEED] / fastest + STARTING * step)
+        least = min(before, state[SPEED] / fastest) - BRAKING_FACTOR * step
+        share = min(max(share, least), before + RISING * step, state[SPEED] / fastest + STARTING_FACTOR * step)
     state[SHARE], state[SPEED] = share, share * fastest
     state[VALUE] = share * state[MOST]
 
@@ -193,7 +193,7 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
 @part
 def _gain(distance, lead, passed):
     """Return the velocity for each metre of an error: its last two millimetres take half a second."""
-    return 0.0 if distance < ARRIVED else min(max(1.0 / lead, SLOWEST / distance), 1.0 / passed)
+    return 0.0 if distance < PACE_ARRIVAL_DISTANCE else min(max(1.0 / lead, PACE_LOWEST_SPEED / distance), 1.0 / passed)
 
 
 def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead, passed):

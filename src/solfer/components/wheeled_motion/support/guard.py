@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 LEAN = 0.5
 """How far camber and caster may be away from what is desired of them [rad]: steering fails where wheels lean more."""
 
-AWAY = 0.02
+GUARD_DISTANCE = 0.02
 """How far vertices may be away from their references along the ways of their wheels [m]: legs do not reach farther."""
 
 
@@ -79,7 +79,11 @@ class MotionGuard:
         self.is_held = False
         self._throttle = Throttle(log)
         self._names = tuple(legs)
-        kinds = ((CAMBER, "camber", "rad", LEAN), (CASTER, "caster", "rad", LEAN), (VERTICES, "vertex", "m", AWAY))
+        kinds = (
+            (CAMBER, "camber", "rad", LEAN),
+            (CASTER, "caster", "rad", LEAN),
+            (VERTICES, "vertex", "m", GUARD_DISTANCE),
+        )
         watched = [
             (f"{what} of '{wheel}'", unit, most, rows[task].start + index)
             for task, what, unit, most in kinds

@@ -10,16 +10,16 @@ from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at,
 HORIZON = 0.25
 """Time in which a motion may use up what is left of the margin [s]."""
 
-FASTEST = 0.4
+GUARD_TOP_SPEED = 0.4
 """Speed that no motion has [m/s]: edges that are far enough for it do not count."""
 
 LACK = 1e-3
 """What velocities may lack of what is desired, where joints are at their bounds [m/s, rad/s]."""
 
-SWIFT, STRAIGHT = 0.5, 25.0
+SWIFT, STRAIGHT_SPEED = 0.5, 25.0
 """Speed of a leg's joint [rad/s], and by the speed of the motion [rad/m], beyond which a leg is nearly straight."""
 
-STEERING = 0.25
+STEERING_SPEED_SHARE = 0.25
 """The same by the speed of a joint that steers: wheels that lean and turn move their legs."""
 
 RETRY = 1.0
@@ -28,7 +28,7 @@ RETRY = 1.0
 ASIDE = 0.5
 """Cosine of the angle to the way that is held, below which another way is free."""
 
-WORSE = 1.1
+GUARD_WORSENING = 1.1
 """Share of what held one way that holds another one, too."""
 
 FIRST, SECOND, INSIDE, NORMAL_X, NORMAL_Y, EDGE_SIZE = range(6)
@@ -151,7 +151,7 @@ def _keep_margin(memory, state, velocity):
         edge = edges[index]
         margin = min(margin, edge[INSIDE])
         left = edge[INSIDE] - memory.least
-        if left > HORIZON * FASTEST:
+        if left > HORIZON * GUARD_TOP_SPEED:
             continue
         rate = _rate(memory, points, edge, velocity)
         if left + HORIZON * share * rate < 0.0:
@@ -204,7 +204,7 @@ def _reason(memory, is_short, margin, speed, velocity):
     turning = indices_at(memory.turning, memory.turning_count)
     for index in range(memory.turning_count):
         steering = max(steering, abs(velocity[turning[index]]))
-    if fastest > max(SWIFT, STRAIGHT * speed, STEERING * steering):
+    if fastest > max(SWIFT, STRAIGHT_SPEED * speed, STEERING_SPEED_SHARE * steering):
         return FIRST_ROW + memory.watched_count + place, fastest, 1.0
     return NOTHING, 0.0, 0.0
 
@@ -223,7 +223,7 @@ def _guard(memory, state, is_short, forward, pace, velocity, passed):
         return False
     is_other = along < ASIDE * size
     why, amount, worst = _reason(memory, is_short, state[MARGIN], pace * size, velocity)
-    if why != NOTHING and worst > (WORSE * state[WORST] if state[WHY] != NOTHING and is_other else 0.0):
+    if why != NOTHING and worst > (GUARD_WORSENING * state[WORST] if state[WHY] != NOTHING and is_other else 0.0):
         state[WHY] = why
         state[AMOUNT] = amount
         state[WORST] = worst

@@ -18,28 +18,28 @@ from solfer.points.contact.contacts import Contact
 CARRYING = 3
 """Fewest wheels that stay on the ground."""
 
-SPEED = 0.06
+LIFTING_SPEED = 0.06
 """Speed of wheels that are put down [m/s]."""
 
-TOUCH = 0.02
+TOUCH_SPEED = 0.02
 """Speed of a wheel near the ground [m/s]."""
 
-NEAR = 0.02
+LIFTING_NEARNESS = 0.02
 """How far above the ground a wheel is near it [m]."""
 
-DEEP = 0.03
+LIFTING_DEPTH_LIMIT = 0.03
 """How far below where the ground was a wheel looks for it, where forces are measured [m]."""
 
 PUSH = 0.15
 """Share of the weight of one wheel with which the ground is felt, of the mean of all."""
 
-WORSE = 0.01
+LIFTING_WORSENING = 0.01
 """How much less than it was to be the margin may be when a wheel is lifted [m]."""
 
-PATIENCE, ROUNDS = 1.0, 4
+LIFTING_PATIENCE, LIFTING_ROUNDS = 1.0, 4
 """Time in which the robot settles with its weight shifted [s], and how often the weight is shifted at most."""
 
-TIMEOUT = 120.0
+LIFTING_TIMEOUT = 120.0
 """Longest time until a wheel is lifted, or carries again [s]."""
 
 
@@ -193,7 +193,7 @@ class Lifting:
 
     def _settle(self) -> None:
         """Lift the wheels as soon as the others carry the robot."""
-        x, y = self._lacking(self.margin - WORSE)
+        x, y = self._lacking(self.margin - LIFTING_WORSENING)
         if math.hypot(x, y) < 1e-3:
             for index in self._requested:
                 self._ground[index] = self._wheels.offsets.states[index, 2] - self._plane(index)
@@ -201,10 +201,10 @@ class Lifting:
             self._end("")
             return
         self._waited += self._period
-        if self._waited < PATIENCE:
+        if self._waited < LIFTING_PATIENCE:
             return
         self._rounds += 1
-        if self._rounds < ROUNDS:
+        if self._rounds < LIFTING_ROUNDS:
             self._begin_shift()
         else:
             names = ", ".join(self._wheels.contacts[index].name for index in self._requested)
@@ -221,8 +221,8 @@ class Lifting:
             force = float(forces[index]) * len(forces)
             if (force > PUSH * float(forces.sum())) if feels else height < 1e-4:
                 self._release(index, False)
-            elif height > -DEEP:
-                speed = SPEED if height > NEAR else TOUCH
+            elif height > -LIFTING_DEPTH_LIMIT:
+                speed = LIFTING_SPEED if height > LIFTING_NEARNESS else TOUCH_SPEED
                 references.vertex_velocity[index, 2] = -speed if feels else -min(speed, height / self._period)
                 continue
             else:

@@ -8,7 +8,7 @@ from solfer.components.wheeled_motion.support.kernel import EDGE_SIZE, INSIDE, N
 from solfer.numerics.pointers import address
 from solfer.points import CenterOfMass, SupportVertex
 
-NEAR = 1e-4
+POLYGON_NEARNESS = 1e-4
 """How far a centre of mass may be from where it is carried [m]."""
 
 
@@ -50,7 +50,7 @@ class SupportPolygon:
         for _ in range(32):  # projections on half-planes, in turn, meet in their common part
             lacks = least - (edges[:, INSIDE] + normals @ shift)
             shortest = int(lacks.argmax())
-            if lacks[shortest] < NEAR:
+            if lacks[shortest] < POLYGON_NEARNESS:
                 break
             shift += lacks[shortest] * normals[shortest]
         return float(shift[0]), float(shift[1])

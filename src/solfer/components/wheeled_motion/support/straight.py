@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from
 
-SMALL = 1e-6
+STRAIGHT_SMALLNESS = 1e-6
 """Velocities that are left out without a warning [m/s, rad/s]."""
 
 
@@ -49,7 +49,7 @@ class StraightAhead:
                 (turn, f"turns of {turn:.3g} rad/s"),
                 (footprint, f"footprints that change by {footprint:.3g} m/s to the side"),
             )
-            if size > SMALL
+            if size > STRAIGHT_SMALLNESS
         ]
         return f"nothing steers {self._wheels}: no {' and no '.join(left)}" if left else ""
 

@@ -11,7 +11,7 @@ from sensor_msgs.msg import Imu
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
-from solfer.middleware.ros.codecs.packed_message import LENGTH, PackedMessage
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH, PackedMessage
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.transport.messages import (
     BODY_MESSAGES,
@@ -25,7 +25,7 @@ from solfer.transport.messages import (
 UNIT_TOLERANCE = 1e-3
 """How far the norm of a quaternion may be from one."""
 
-UNKNOWN = -1.0
+NOT_MEASURED = -1.0
 """First number of the covariance of a quantity that an inertial measurement unit does not measure."""
 
 COVARIANCES = ("orientation_covariance", "angular_velocity_covariance", "linear_acceleration_covariance")
@@ -45,7 +45,7 @@ class NumbersBuffer:
     def view(self, frame: str, child: str | None = None) -> np.ndarray:
         """Return the numbers of a message with these names, a live view; zero where nothing was ever written to."""
         if (frame, child) != self._names:
-            name = b"" if child is None else LENGTH.pack(len(child.encode())) + child.encode()
+            name = b"" if child is None else MESSAGE_LENGTH.pack(len(child.encode())) + child.encode()
             self._names, self._frame = (frame, child), PackedMessage(name + bytes(8 * self._count), frame)
             self._numbers = self._frame.numbers(len(name), self._count)
         return self._numbers
@@ -118,14 +118,14 @@ class ImuCodec(Codec):
         for begin, end in ((0, 4), (13, 16), (25, 28)):
             if np.isnan(numbers[begin:end]).all():
                 numbers[begin:end] = 0.0
-                numbers[end] = UNKNOWN
+                numbers[end] = NOT_MEASURED
         return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
         """See `Codec.decode`."""
         imu = unpack(Imu, packed)
         covariances = [getattr(imu, name) for name in COVARIANCES]
-        lacks_orientation, lacks_angular, lacks_force = (covariance[0] == UNKNOWN for covariance in covariances)
+        lacks_orientation, lacks_angular, lacks_force = (covariance[0] == NOT_MEASURED for covariance in covariances)
         deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
         return ImuMessage(
             imu.header.frame_id,

@@ -12,17 +12,17 @@ from typing import Any
 from rospy.exceptions import TransportTerminated
 from rospy.impl.tcpros_base import TCPROSTransportProtocol
 
-from solfer.middleware.ros.codecs.packed_message import LENGTH
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 
 CHUNK = 65536  # bytes that are thrown away at once
 BUFFER = 4096  # bytes of the smallest buffer of a connection
 HOPELESS = 2**26
 """Announced size from which on a connection is closed instead of being read to the message's end."""
 
-TURN, REST = 16, 200e-6
+READ_MESSAGES, READ_PAUSE = 16, 200e-6
 """Messages that one read may return; if it returns more, a rest for each of them [s]."""
 
-PATIENCE = 1.0
+READ_PATIENCE = 1.0
 """Longest time that a request waits for its turn [s]."""
 
 Instead = Callable[[int], Any]
@@ -43,7 +43,7 @@ class Rate:
         self._next = 0.0
         self._lock = threading.Lock()
 
-    def wait(self, patience: float = PATIENCE) -> bool:
+    def wait(self, patience: float = READ_PATIENCE) -> bool:
         """Wait for the caller's turn; returns False, at once, if that takes longer than `patience` [s]."""
         with self._lock:
             now = time.monotonic()
@@ -62,8 +62,8 @@ def bound_messages(protocol: TCPROSTransportProtocol, largest: int, instead: Ins
 
     def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
         read(buffer, queue, sock)
-        if len(queue) > TURN:
-            time.sleep(REST * len(queue))
+        if len(queue) > READ_MESSAGES:
+            time.sleep(READ_PAUSE * len(queue))
 
     protocol.read_messages = read_messages
 
@@ -82,7 +82,7 @@ def bound_requests(protocol: TCPROSTransportProtocol, largest: int, rate: Rate, 
 
     def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
         size = _announced(buffer)
-        if size <= largest and buffer.tell() >= LENGTH.size + size and not rate.wait():
+        if size <= largest and buffer.tell() >= MESSAGE_LENGTH.size + size and not rate.wait():
             _skip(buffer, sock, size)
             queue.append(busy)
             return
@@ -93,7 +93,7 @@ def bound_requests(protocol: TCPROSTransportProtocol, largest: int, rate: Rate, 
 
 def _bounded(protocol: TCPROSTransportProtocol, largest: int, instead: Instead) -> Callable[..., None]:
     read = protocol.read_messages
-    protocol.buff_size = max(BUFFER, min(protocol.buff_size, LENGTH.size + largest))
+    protocol.buff_size = max(BUFFER, min(protocol.buff_size, MESSAGE_LENGTH.size + largest))
 
     def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
         size = _announced(buffer)
@@ -113,12 +113,12 @@ def _bounded(protocol: TCPROSTransportProtocol, largest: int, instead: Instead) 
 def _announced(buffer: BytesIO) -> int:
     """Read the size of the message that begins in a buffer, which holds 4 bytes or more [bytes]."""
     with buffer.getbuffer() as view:
-        return LENGTH.unpack_from(view)[0]
+        return MESSAGE_LENGTH.unpack_from(view)[0]
 
 
 def _skip(buffer: BytesIO, sock: Any, size: int) -> None:
     """Skip a message, as far as it is there and as far as it is still to come."""
-    whole = LENGTH.size + size
+    whole = MESSAGE_LENGTH.size + size
     rest = buffer.getvalue()[whole : buffer.tell()]
     left = whole - buffer.tell()
     buffer.seek(0)

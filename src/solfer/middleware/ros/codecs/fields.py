@@ -12,7 +12,7 @@ import rospy
 from solfer.errors import ComponentError, PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.interfaces import message_class
-from solfer.middleware.ros.codecs.packed_message import HEADER, PackedMessage
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, PackedMessage
 from solfer.transport.messages import FieldsMessage
 
 _TIMES = {"time": genpy.Time, "duration": genpy.Duration}
@@ -58,7 +58,7 @@ class FieldsCodec(Codec):
         if not self._type._has_header:
             return PackedMessage(packed, None)
         frame = sent.header.frame_id
-        stamped = PackedMessage(packed[HEADER.size + len(frame.encode()) :], frame)
+        stamped = PackedMessage(packed[MESSAGE_HEADER.size + len(frame.encode()) :], frame)
         stamped.stamp()
         return stamped
 

@@ -12,12 +12,12 @@ import numpy as np
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class
 from solfer.middleware.ros.codecs.interfaces import message_class
-from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMessage
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, MESSAGE_LENGTH, PackedMessage
 from solfer.transport.messages import ANY_INTERFACE, JOINT_MESSAGES, JointMessage
 
-NOTHING = np.zeros(0)
+NO_VALUES = np.zeros(0)
 
-NUMBER = np.dtype("<f8")
+FLOAT64 = np.dtype("<f8")
 
 LAYOUTS = 4
 """Number of layouts that a decoder remembers: publishers of a topic may have different joints."""
@@ -43,10 +43,10 @@ class JointLayout:
         self.component = message.component
         self.rows = tuple(places)
         offsets = tuple(places.values())
-        size = NUMBER.itemsize * len(message.names)
+        size = FLOAT64.itemsize * len(message.names)
         self._shape = (len(offsets), len(message.names))
         self._first = offsets[0]
-        self._strides = (offsets[1] - offsets[0] if len(offsets) > 1 else size, NUMBER.itemsize)
+        self._strides = (offsets[1] - offsets[0] if len(offsets) > 1 else size, FLOAT64.itemsize)
         begins = (start, *(offset + size for offset in offsets))
         ends = (*offsets, len(packed))
         self._constants = [(packed[begin:end], begin) for begin, end in zip(begins, ends, strict=True)]
@@ -67,7 +67,7 @@ class JointLayout:
         for constant, begin in self._constants:
             if not packed.startswith(constant, begin):
                 return None
-        return np.ndarray(self._shape, NUMBER, packed, self._first, self._strides).copy()
+        return np.ndarray(self._shape, FLOAT64, packed, self._first, self._strides).copy()
 
 
 class JointCodec(Codec):
@@ -120,7 +120,7 @@ class JointCodec(Codec):
         for index, count in enumerate(counts):
             if index == len(self._fields):
                 body += _pack_names(interfaces)
-            body += LENGTH.pack(count)
+            body += MESSAGE_LENGTH.pack(count)
             offsets.append(len(body))
             body += bytes(8 * count)
         if self._open:
@@ -191,8 +191,8 @@ class JointCodec(Codec):
     def _unpack_component(self, packed: bytes, offset: int, message: JointMessage) -> int:
         """Unpack the name of the component, the last part of a message; return the offset behind it."""
         if not packed.startswith(self._component[1], offset):
-            (length,) = LENGTH.unpack_from(packed, offset)
-            text = packed[offset + LENGTH.size :]
+            (length,) = MESSAGE_LENGTH.unpack_from(packed, offset)
+            text = packed[offset + MESSAGE_LENGTH.size :]
             if len(text) != length:
                 raise ValueError(offset)
             self._component = text.decode(), packed[offset:]
@@ -202,11 +202,11 @@ class JointCodec(Codec):
 
 def _pack_text(text: str) -> bytes:
     encoded = text.encode()
-    return LENGTH.pack(len(encoded)) + encoded
+    return MESSAGE_LENGTH.pack(len(encoded)) + encoded
 
 
 def _pack_names(names: tuple[str, ...]) -> bytes:
-    return LENGTH.pack(len(names)) + b"".join(map(_pack_text, names))
+    return MESSAGE_LENGTH.pack(len(names)) + b"".join(map(_pack_text, names))
 
 
 def _unpack_names(
@@ -215,26 +215,26 @@ def _unpack_names(
     """Unpack names with their bytes, which are `known` if they are those of the last message; and what is behind."""
     if packed.startswith(known[1], offset):
         return known, offset + len(known[1])
-    (count,) = LENGTH.unpack_from(packed, offset)
+    (count,) = MESSAGE_LENGTH.unpack_from(packed, offset)
     start = offset
-    offset = offset + LENGTH.size
+    offset = offset + MESSAGE_LENGTH.size
     found = []
     for _ in range(count):
-        (length,) = LENGTH.unpack_from(packed, offset)
-        offset += LENGTH.size + length
+        (length,) = MESSAGE_LENGTH.unpack_from(packed, offset)
+        offset += MESSAGE_LENGTH.size + length
         found.append(packed[offset - length : offset].decode())
     return (tuple(found), packed[start:offset]), offset
 
 
 def _unpack_header(packed: bytes) -> tuple[float, int]:
     """Unpack the stamp [s] and the offset of what follows the header."""
-    _, seconds, nanoseconds, length = HEADER.unpack_from(packed)
-    return seconds + 1e-9 * nanoseconds, HEADER.size + length
+    _, seconds, nanoseconds, length = MESSAGE_HEADER.unpack_from(packed)
+    return seconds + 1e-9 * nanoseconds, MESSAGE_HEADER.size + length
 
 
 def _unpack_array(packed: bytes, offset: int) -> tuple[np.ndarray, int]:
-    (count,) = LENGTH.unpack_from(packed, offset)
-    offset += LENGTH.size
+    (count,) = MESSAGE_LENGTH.unpack_from(packed, offset)
+    offset += MESSAGE_LENGTH.size
     if not count:
-        return NOTHING, offset
+        return NO_VALUES, offset
     return np.frombuffer(packed, "<f8", count, offset).copy(), offset + 8 * count

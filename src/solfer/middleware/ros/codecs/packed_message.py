@@ -6,13 +6,13 @@ import time
 import numpy as np
 from rospy.rostime import get_rostime, is_wallclock
 
-LENGTH = struct.Struct("<I")
-HEADER = struct.Struct("<IIII")
+MESSAGE_LENGTH = struct.Struct("<I")
+MESSAGE_HEADER = struct.Struct("<IIII")
 """Sequence number, seconds, nanoseconds, and length of the frame's name that follows."""
-NUMBER, STAMP = LENGTH.size, LENGTH.size + 4
+SEQUENCE_OFFSET, STAMP_OFFSET = MESSAGE_LENGTH.size, MESSAGE_LENGTH.size + 4
 """Where the sequence number and the stamp stand, behind the length of the whole message."""
 TIME = struct.Struct("<II")
-SECOND = 1_000_000_000
+NANOSECONDS = 1_000_000_000
 """Nanoseconds of a second."""
 
 
@@ -28,14 +28,14 @@ def set_epoch(epoch: float | None) -> None:
 def present() -> tuple[int, int]:
     """Return ROS time [s, ns]; of the wall clock without the objects of rospy, which cost as much as the packing."""
     if is_wallclock():
-        return divmod(time.time_ns(), SECOND)
+        return divmod(time.time_ns(), NANOSECONDS)
     now = get_rostime()
     return now.secs, now.nsecs
 
 
 def stamp_of(measured: float) -> tuple[int, int]:
     """Return the stamp [s, ns] of what was measured at a time of this process [s], or the present if it is unknown."""
-    return present() if _epoch is None or measured <= 0.0 else divmod(round(1e9 * (_epoch + measured)), SECOND)
+    return present() if _epoch is None or measured <= 0.0 else divmod(round(1e9 * (_epoch + measured)), NANOSECONDS)
 
 
 class PackedMessage:
@@ -54,18 +54,18 @@ class PackedMessage:
         header = b""
         if name is not None:
             encoded = name.encode()
-            header = HEADER.pack(0, 0, 0, len(encoded)) + encoded
-        self.bytes = bytearray(LENGTH.pack(len(header) + len(body)) + header + body)
-        self._begin = LENGTH.size + len(header)
+            header = MESSAGE_HEADER.pack(0, 0, 0, len(encoded)) + encoded
+        self.bytes = bytearray(MESSAGE_LENGTH.pack(len(header) + len(body)) + header + body)
+        self._begin = MESSAGE_LENGTH.size + len(header)
 
     def number(self, number: int) -> None:
         """Set the sequence number of the header."""
         if self._stamped:
-            LENGTH.pack_into(self.bytes, NUMBER, number & 0xFFFFFFFF)
+            MESSAGE_LENGTH.pack_into(self.bytes, SEQUENCE_OFFSET, number & 0xFFFFFFFF)
 
     def stamp(self, measured: float = 0.0) -> None:
         """Set the stamp of the header to when its numbers were measured [s], if that is known, else to the present."""
-        TIME.pack_into(self.bytes, STAMP, *stamp_of(measured))
+        TIME.pack_into(self.bytes, STAMP_OFFSET, *stamp_of(measured))
 
     def numbers(self, offset: int, count: int) -> np.ndarray:
         """Return the `count` floats at `offset` of the body, a live view, shape (count,)."""

@@ -4,7 +4,7 @@ import io
 
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.interfaces import message_class
-from solfer.middleware.ros.codecs.packed_message import HEADER, PackedMessage
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, PackedMessage
 from solfer.transport.messages import REFUSALS, RefusalMessage
 
 
@@ -22,7 +22,7 @@ class RefusalCodec(Codec):
         buffer = io.BytesIO()
         published = self._type(owners=message.owners, claims=message.claims, reasons=message.reasons)
         published.serialize(buffer)
-        frame = PackedMessage(buffer.getvalue()[HEADER.size :])
+        frame = PackedMessage(buffer.getvalue()[MESSAGE_HEADER.size :])
         frame.stamp()
         return frame
 

@@ -9,8 +9,8 @@ from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.body import NumbersBuffer
 from solfer.middleware.ros.codecs.interfaces import message_class
-from solfer.middleware.ros.codecs.packed_message import HEADER, PackedMessage
-from solfer.transport.messages import POINTS, VECTOR_MESSAGES, PointsMessage, VectorMessage
+from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, PackedMessage
+from solfer.transport.messages import ROBOT_POINTS, VECTOR_MESSAGES, PointsMessage, VectorMessage
 
 
 class VectorCodec(Codec):
@@ -40,9 +40,9 @@ class VectorCodec(Codec):
     def decode(self, packed: bytes, sender: str) -> VectorMessage:
         """See `Codec.decode`."""
         try:
-            _, seconds, nanoseconds, length = HEADER.unpack_from(packed)
-            begin = HEADER.size + length
-            frame = packed[HEADER.size : begin].decode()
+            _, seconds, nanoseconds, length = MESSAGE_HEADER.unpack_from(packed)
+            begin = MESSAGE_HEADER.size + length
+            frame = packed[MESSAGE_HEADER.size : begin].decode()
             if len(packed) != begin + 8 * self._count:
                 raise ValueError(begin)
         except (struct.error, ValueError) as error:
@@ -57,10 +57,10 @@ class VectorCodec(Codec):
 class PointsCodec(Codec):
     """solfer/RobotPoints: several Robot Points of one kind."""
 
-    messages = (POINTS,)
+    messages = (ROBOT_POINTS,)
 
     def __init__(self) -> None:
-        self._type = message_class(POINTS)
+        self._type = message_class(ROBOT_POINTS)
         self.ros_class = packed_class(self._type)
 
     def encode(self, message: PointsMessage) -> PackedMessage:
@@ -69,7 +69,7 @@ class PointsCodec(Codec):
         values = message.values.ravel().tolist()
         buffer = io.BytesIO()
         self._type(name=message.names, count=count, value=values).serialize(buffer)
-        frame = PackedMessage(buffer.getvalue()[HEADER.size :], message.frame)
+        frame = PackedMessage(buffer.getvalue()[MESSAGE_HEADER.size :], message.frame)
         frame.stamp()
         return frame
 

@@ -20,7 +20,7 @@ from solfer.middleware.ros.node.waiting import ShutdownRequested, wait_for
 
 logger = logging.getLogger(__name__)
 
-PARAMETER = "/lockstep"
+FOLLOWERS_PARAMETER = "/lockstep"
 """Parameter that names the nodes that follow, in the order of their cycles: 'upper_body, lower_body'."""
 
 TICK, SERVICE = "solfer/Tick", "lockstep/tick"
@@ -39,12 +39,16 @@ def followers() -> tuple[str, ...]:
     Raises:
         ConfigError: The parameter is not a list of names, or names a node twice.
     """
-    value = rospy.get_param(PARAMETER, "")
+    value = rospy.get_param(FOLLOWERS_PARAMETER, "")
     if not isinstance(value, str):
-        raise ConfigError(f"not a list of nodes: '{value}'", where=f"parameter {PARAMETER}", expected="NAME, NAME, ...")
+        raise ConfigError(
+            f"not a list of nodes: '{value}'", where=f"parameter {FOLLOWERS_PARAMETER}", expected="NAME, NAME, ..."
+        )
     names = tuple(rosgraph.names.resolve_name(name.strip(), "/") for name in value.split(",") if name.strip())
     if len(set(names)) < len(names):
-        raise ConfigError(f"a node twice in '{value}'", where=f"parameter {PARAMETER}", expected="each node once")
+        raise ConfigError(
+            f"a node twice in '{value}'", where=f"parameter {FOLLOWERS_PARAMETER}", expected="each node once"
+        )
     return names
 
 

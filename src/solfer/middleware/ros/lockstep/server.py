@@ -19,15 +19,15 @@ from solfer.middleware.ros.lockstep.client import (
     wait_for_connections,
     wait_for_messages,
 )
-from solfer.middleware.ros.lockstep.step_clock import CLOSE
+from solfer.middleware.ros.lockstep.step_clock import CLOCK_CLOSENESS
 from solfer.throttle import Throttle
 
 logger = logging.getLogger(__name__)
 
-ANSWER = 1e-3
+FOLLOWER_REPLY_PERIOD = 1e-3
 """Time between two checks for other requests while a follower makes its cycle [s]."""
 
-SLOW = 2.0
+FOLLOWER_SLOWNESS = 2.0
 """Time of a cycle from which on the log names the follower [s]."""
 
 
@@ -87,11 +87,11 @@ class LockstepMember:
             [self.before.get(key, 0) for key in received],
         )
         answer = self._thread.submit(self._proxy, request)
-        slow = time.monotonic() + SLOW
-        while not wait((answer,), ANSWER).done and running():
+        slow = time.monotonic() + FOLLOWER_SLOWNESS
+        while not wait((answer,), FOLLOWER_REPLY_PERIOD).done and running():
             meanwhile()
             if time.monotonic() > slow:
-                slow += SLOW
+                slow += FOLLOWER_SLOWNESS
                 logger.warning("lock-step: time stands still until %s has made its cycle", self.name)
         if not answer.done():
             return {}
@@ -147,7 +147,7 @@ class LockstepServer:
 
     def follow(self, now: float, meanwhile: Callable[[], None]) -> None:
         """Return when the nodes have made the cycles that are due at `now` [s], and what they sent has arrived here."""
-        due = [member for member in self._members if member.there and now >= member.due - CLOSE]
+        due = [member for member in self._members if member.there and now >= member.due - CLOCK_CLOSENESS]
         for member in due:
             published = member.tick(now, self._newest(), meanwhile, self._running)
             if not member.there:

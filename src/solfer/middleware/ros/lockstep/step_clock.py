@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 from rospy.rostime import _set_rostime as set_ros_time
 
-from solfer.middleware.ros.node.clock import LOOK, RosClock, ros_time
+from solfer.middleware.ros.node.clock import CLOCK_POLL_PERIOD, RosClock, ros_time
 from solfer.middleware.ros.node.waiting import ShutdownRequested
 
-CLOSE = 1e-9
+CLOCK_CLOSENESS = 1e-9
 """Times that are as near as this are the same [s]."""
 
 
@@ -42,7 +42,7 @@ class StepClock(RosClock):
             self._deadline = deadline
             self._moved.notify_all()
             while not self._granted and self._running():
-                self._moved.wait(LOOK)
+                self._moved.wait(CLOCK_POLL_PERIOD)
             self._granted = False
             self._deadline = None
 
@@ -58,11 +58,11 @@ class StepClock(RosClock):
         """
         with self._moved:
             deadline = self._sleeping()
-            if time < self._published - CLOSE:
+            if time < self._published - CLOCK_CLOSENESS:
                 self.rewinds += 1
                 self._ahead += self._published - time
             self._published = time
-            if time + self._ahead >= deadline - CLOSE:
+            if time + self._ahead >= deadline - CLOCK_CLOSENESS:
                 set_ros_time(ros_time(time))
                 self._time = time + self._ahead
                 prepare()
@@ -77,5 +77,5 @@ class StepClock(RosClock):
         while self._deadline is None:
             if not self._running():
                 raise ShutdownRequested("ended in lock-step")
-            self._moved.wait(LOOK)
+            self._moved.wait(CLOCK_POLL_PERIOD)
         return self._deadline

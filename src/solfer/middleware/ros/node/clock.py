@@ -19,13 +19,13 @@ from solfer.middleware.ros.node.master import refuse_second
 from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 
-PATIENCE = 20.0
+CLOCK_PATIENCE = 20.0
 """Longest wait for the first time on /clock [s]: a simulator that starts beside this node needs up to 10 s."""
 
-LOOK = 0.1
+CLOCK_POLL_PERIOD = 0.1
 """Time between two checks for a requested end, while simulated time stands still [s]."""
 
-RATE = 500.0
+CLOCK_RATE = 500.0
 """Times published for each simulated second [Hz]."""
 
 
@@ -81,7 +81,7 @@ class PublishingClock(RosClock):
 
     def publish(self, simulated: float) -> None:
         """Publish the simulated time [s]: RATE times in a simulated second, and when it goes back."""
-        if simulated < self._published or simulated - self._published >= 1.0 / RATE - 1e-9:
+        if simulated < self._published or simulated - self._published >= 1.0 / CLOCK_RATE - 1e-9:
             self._send(simulated)
         else:
             set_ros_time(ros_time(simulated))
@@ -108,7 +108,7 @@ class SubscribingClock(RosClock):
         self._moved = threading.Condition()
         set_ros_time(genpy.Time())
         rospy.Subscriber("/clock", ClockMessage, self._receive, queue_size=1, tcp_nodelay=True)
-        if not wait_for(lambda: self._newest is not None, PATIENCE, running):
+        if not wait_for(lambda: self._newest is not None, CLOCK_PATIENCE, running):
             raise MiddlewareError(
                 "use_sim_time is true but nothing publishes /clock",
                 expected="a simulator that runs, or rosparam set /use_sim_time false",
@@ -122,7 +122,7 @@ class SubscribingClock(RosClock):
         """See `Middleware.sleep_until`; returns as well when the end was requested."""
         with self._moved:
             while self._passed < deadline - 1e-9 and self._running():
-                self._moved.wait(LOOK)
+                self._moved.wait(CLOCK_POLL_PERIOD)
 
     def _receive(self, message: ClockMessage) -> None:
         published = message.clock

@@ -11,7 +11,7 @@ import rosgraph
 
 from solfer.errors import MiddlewareError
 
-TIMEOUT = 2.0
+CALL_TIMEOUT = 2.0
 """Longest time for an answer of the master or of a node [s]."""
 
 CALLER = "/solfer"
@@ -41,7 +41,7 @@ class _Bounded(xmlrpc.client.Transport):
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         connection = super().make_connection(host)
-        connection.timeout = TIMEOUT
+        connection.timeout = CALL_TIMEOUT
         return connection
 
 

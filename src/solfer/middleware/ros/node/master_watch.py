@@ -12,13 +12,13 @@ from solfer.middleware.ros.node.master import require_master
 
 logger = logging.getLogger(__name__)
 
-PERIOD = 1.0
+MASTER_PERIOD = 1.0
 """Time between two calls [s]."""
 
-PATIENCE = 5.0
+MASTER_PATIENCE = 5.0
 """Time without an answer after which the master is gone for good [s]."""
 
-CALLS = 3
+FAILED_CALLS = 3
 """Calls that have to fail in that time: a process that stood still itself has not called often enough."""
 
 
@@ -48,8 +48,8 @@ class MasterWatch:
         lost: Callable[[], None] = lambda: None,
         number: Callable[[], int] = require_master,
         known: Callable[[], bool] = lambda: True,
-        period: float = PERIOD,
-        patience: float = PATIENCE,
+        period: float = MASTER_PERIOD,
+        patience: float = MASTER_PATIENCE,
     ):
         self._request = number
         self._known = known
@@ -103,4 +103,4 @@ class MasterWatch:
             self._since = now
             logger.warning("%s; if that stays so for %g s this node ends", failure, self._patience)
         self._failures += 1
-        return failure if self._failures >= CALLS and now - self._since >= self._patience else ""
+        return failure if self._failures >= FAILED_CALLS and now - self._since >= self._patience else ""

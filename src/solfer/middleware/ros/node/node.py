@@ -16,7 +16,7 @@ from solfer.middleware.ros.lockstep.client import followers
 from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.clock import make_clock
 from solfer.middleware.ros.node.logs import connect_logs
-from solfer.middleware.ros.node.master import TIMEOUT, knows, refuse_twin, require_master
+from solfer.middleware.ros.node.master import CALL_TIMEOUT, knows, refuse_twin, require_master
 from solfer.middleware.ros.node.master_watch import MasterWatch
 from solfer.middleware.ros.node.waiting import ShutdownRequested
 from solfer.realtime.process import ProcessEnd
@@ -104,7 +104,7 @@ class RosNode:
         if self._watch is not None:
             self._watch.close()
         self._closing.set()
-        socket.setdefaulttimeout(TIMEOUT)  # rospy would wait for a master that hangs; new connections are not made
+        socket.setdefaulttimeout(CALL_TIMEOUT)  # rospy would wait for a master that hangs; new connections are not made
         rospy.signal_shutdown("end")
         # When `rosnode kill` began the shutdown, another thread is still at it.
         self._gone.wait(GRACE)

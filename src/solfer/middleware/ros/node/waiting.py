@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-STEP = 0.02
+WAIT_STEP = 0.02
 """Time between two checks [s]."""
 
 
@@ -11,7 +11,9 @@ class ShutdownRequested(Exception):
     """The node was asked to end while it waited. Not an error to collect or to report."""
 
 
-def wait_for(condition: Callable[[], object], timeout: float, running: Callable[[], bool], step: float = STEP) -> bool:
+def wait_for(
+    condition: Callable[[], object], timeout: float, running: Callable[[], bool], step: float = WAIT_STEP
+) -> bool:
     """Wait until `condition` holds; returns False if it does not within `timeout` [s].
 
     Raises:

@@ -17,32 +17,32 @@ from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene import ContactForce, ScenePose, SceneState, ShownReference
 
-DESIRED = "desired"
+DESIRED_PREFIX = "desired"
 """Prefix of the frames of the desired robot."""
 
 LIFETIME = 0.5
 """Time after which what is not published again disappears [s]."""
 
-LENGTH = 1e-3
+FORCE_SCALE = 1e-3
 """Length of the arrow of a force [m/N]."""
 
-SMALLEST = 0.05
+MARKER_SMALLEST_SIZE = 0.05
 """Smallest height of a cone of friction [m]."""
 
 SIDES = 24
 """Triangles of a cone of friction."""
 
-AXES = 0.1
+AXES_LENGTH = 0.1
 """Length of the axes of a reference [m]."""
 
-MEASURED = (0.1, 0.4, 0.9, 1.0)
+MEASURED_COLOR = (0.1, 0.4, 0.9, 1.0)
 PROJECTED = (0.9, 0.2, 0.2, 1.0)
-EDGES = (0.1, 0.7, 0.2, 1.0)
-INNER = (0.9, 0.7, 0.1, 1.0)
-FORCE = (0.9, 0.3, 0.1, 1.0)
+EDGES_MARKER_COLOR = (0.1, 0.7, 0.2, 1.0)
+INNER_MARKER_COLOR = (0.9, 0.7, 0.1, 1.0)
+FORCE_MARKER_COLOR = (0.9, 0.3, 0.1, 1.0)
 CONE = (0.9, 0.6, 0.1, 0.25)
-PATH = (0.6, 0.2, 0.8, 1.0)
-GOES = (0.5, 0.5, 0.5, 0.7)
+PATH_MARKER_COLOR = (0.6, 0.2, 0.8, 1.0)
+GOAL_MARKER_COLOR = (0.5, 0.5, 0.5, 0.7)
 OF_AXES = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.8, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
 
 
@@ -76,7 +76,7 @@ class SceneMarkers:
     def _placed(self, state: SceneState) -> Iterator[TransformStamped]:
         stamp = genpy.Time(*present())
         for link, pose in state.desired.items():
-            made = TransformStamped(child_frame_id=prefixed(self._prefix, f"{DESIRED}/{link}"))
+            made = TransformStamped(child_frame_id=prefixed(self._prefix, f"{DESIRED_PREFIX}/{link}"))
             made.header.frame_id = state.frame
             made.header.stamp = stamp
             placed = pose_of(pose)
@@ -99,10 +99,13 @@ def markers_of(state: SceneState) -> Iterator[Marker]:
 
 
 def _markers(state: SceneState) -> Iterator[Marker]:
-    yield _ball("center", 0, state.center, size=0.08, color=MEASURED)
+    yield _ball("center", 0, state.center, size=0.08, color=MEASURED_COLOR)
     yield _ball("center", 1, state.projection, size=0.05, color=PROJECTED)
     yield _lines("center", 2, [state.center, state.projection], width=0.005, color=PROJECTED)
-    for name, corners, color in (("polygon", state.polygon, EDGES), ("margins", state.inner, INNER)):
+    for name, corners, color in (
+        ("polygon", state.polygon, EDGES_MARKER_COLOR),
+        ("margins", state.inner, INNER_MARKER_COLOR),
+    ):
         if len(corners):
             yield _lines(name, 0, [*corners, corners[0]], width=0.015, color=color)
     for index, force in enumerate(state.forces):
@@ -111,11 +114,13 @@ def _markers(state: SceneState) -> Iterator[Marker]:
             yield _cone(index, force, state.friction)
     for index, reference in enumerate(state.references):
         yield _frame(index, reference)
-        yield _ball("desired", index, reference.desired.position, size=0.03, color=GOES)
+        yield _ball("desired", index, reference.desired.position, size=0.03, color=GOAL_MARKER_COLOR)
         yield _name(index, reference)
     if len(state.path) > 1:
         ground = state.projection[2]
-        yield _lines("path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], width=0.015, color=PATH)
+        yield _lines(
+            "path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], width=0.015, color=PATH_MARKER_COLOR
+        )
 
 
 def _marker(name: str, number: int, kind: int, scale: tuple[float, float, float], color: Iterable[float]) -> Marker:
@@ -137,14 +142,14 @@ def _lines(name: str, number: int, points: Iterable[np.ndarray], width: float, c
 
 
 def _arrow(number: int, force: ContactForce) -> Marker:
-    made = _marker("forces", number, Marker.ARROW, scale=(0.02, 0.04, 0.06), color=FORCE)
-    made.points = [_point(force.position), _point(force.position + LENGTH * force.force)]
+    made = _marker("forces", number, Marker.ARROW, scale=(0.02, 0.04, 0.06), color=FORCE_MARKER_COLOR)
+    made.points = [_point(force.position), _point(force.position + FORCE_SCALE * force.force)]
     return made
 
 
 def _cone(number: int, force: ContactForce, friction: float) -> Marker:
     """Make a cone as high as the vertical force is long: what friction holds has its tip in the base of the cone."""
-    height = max(LENGTH * float(force.force[2]), SMALLEST)
+    height = max(FORCE_SCALE * float(force.force[2]), MARKER_SMALLEST_SIZE)
     made = _marker("cones", number, Marker.TRIANGLE_LIST, scale=(1.0, 1.0, 1.0), color=CONE)
     angles = [math.tau * each / SIDES for each in range(SIDES + 1)]
     radius = friction * height
@@ -156,19 +161,19 @@ def _cone(number: int, force: ContactForce, friction: float) -> Marker:
 
 def _frame(number: int, reference: ShownReference) -> Marker:
     """Make the axes of a reference; of a position they are those of the frame that it is in."""
-    made = _marker("references", number, Marker.LINE_LIST, scale=(0.01, 0.0, 0.0), color=MEASURED)
+    made = _marker("references", number, Marker.LINE_LIST, scale=(0.01, 0.0, 0.0), color=MEASURED_COLOR)
     position = reference.reference.position
     rotation = reference.reference.rotation
     for axis, color in zip(rotation.T, OF_AXES, strict=True):
-        made.points += [_point(position), _point(position + AXES * axis)]
+        made.points += [_point(position), _point(position + AXES_LENGTH * axis)]
         made.colors += [ColorRGBA(*color)] * 2
     return made
 
 
 def _name(number: int, reference: ShownReference) -> Marker:
-    made = _marker("names", number, Marker.TEXT_VIEW_FACING, scale=(0.0, 0.0, 0.05), color=MEASURED)
+    made = _marker("names", number, Marker.TEXT_VIEW_FACING, scale=(0.0, 0.0, 0.05), color=MEASURED_COLOR)
     made.text = f"{reference.module}/{reference.task}"
-    made.pose.position = _point(reference.reference.position + (0.0, 0.0, AXES))
+    made.pose.position = _point(reference.reference.position + (0.0, 0.0, AXES_LENGTH))
     return made
 
 

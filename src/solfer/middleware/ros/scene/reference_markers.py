@@ -13,17 +13,21 @@ from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
 from solfer.scene.live_scene import WORLD
 
-SIZE = 0.25
+HANDLE_SIZE = 0.25
 """Of a marker [m]."""
 
-MOVED = 1e-3
+HANDLE_STEP = 1e-3
 """How far a reference moves before its marker follows [m, rad]."""
 
-HALF = np.sqrt(0.5)
-AXES = {"x": (HALF, 0.0, 0.0, HALF), "y": (0.0, 0.0, HALF, HALF), "z": (0.0, HALF, 0.0, HALF)}
+ROOT_OF_HALF = np.sqrt(0.5)
+AXIS_QUATERNIONS = {
+    "x": (ROOT_OF_HALF, 0.0, 0.0, ROOT_OF_HALF),
+    "y": (0.0, 0.0, ROOT_OF_HALF, ROOT_OF_HALF),
+    "z": (0.0, ROOT_OF_HALF, 0.0, ROOT_OF_HALF),
+}
 """Quaternions (x, y, z, w) that turn the axis x of a control to each axis."""
 
-DIRECTIONS = {
+DRAG_MODES = {
     "position": (InteractiveMarkerControl.MOVE_AXIS,),
     "orientation": (InteractiveMarkerControl.ROTATE_AXIS,),
     "pose": (InteractiveMarkerControl.MOVE_AXIS, InteractiveMarkerControl.ROTATE_AXIS),
@@ -91,10 +95,10 @@ class ReferenceMarkers:
 
 
 def _made(name: str, frame: str, shown: ShownReference) -> InteractiveMarker:
-    made = InteractiveMarker(name=name, description=name, scale=SIZE, pose=pose_of(shown.own))
+    made = InteractiveMarker(name=name, description=name, scale=HANDLE_SIZE, pose=pose_of(shown.own))
     made.header.frame_id = frame
-    for direction in DIRECTIONS[shown.quantity]:
-        for axis, turn in AXES.items():
+    for direction in DRAG_MODES[shown.quantity]:
+        for axis, turn in AXIS_QUATERNIONS.items():
             control = InteractiveMarkerControl(name=f"{axis}{direction}", interaction_mode=direction)
             place = control.orientation
             place.x, place.y, place.z, place.w = turn
@@ -106,4 +110,4 @@ def _differs(first: ScenePose | None, second: ScenePose) -> bool:
     if first is None:
         return True
     away = np.abs(first.position - second.position).max(), np.abs(first.rotation - second.rotation).max()
-    return not max(away) < MOVED
+    return not max(away) < HANDLE_STEP

@@ -20,7 +20,7 @@ FOLDER_MODE, FILE_MODE = 0o2770, 0o660
 """Permissions of user and group, whatever the process' mask is; files get the group of their folder."""
 
 FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-FILE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC  # a FIFO would block
+OPEN_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC  # a FIFO would block
 LINKS = (errno.ELOOP, errno.ENOTDIR)
 
 Identity = tuple[int, int]
@@ -234,7 +234,7 @@ def _step(folder: int, name: str, where: Path) -> int:
 def _open(folder: int, name: str, flags: int, where: Path) -> int:
     """Open a file in a folder, and check what was opened."""
     try:
-        file = os.open(name, flags | FILE, dir_fd=folder)
+        file = os.open(name, flags | OPEN_FLAGS, dir_fd=folder)
     except OSError as error:
         if error.errno == errno.ELOOP:
             raise _refused("a link: what it leads to is not opened", where) from error
@@ -249,7 +249,7 @@ def _open(folder: int, name: str, flags: int, where: Path) -> int:
 
 def _make(folder: int, name: str) -> int:
     """Make a file in a folder, with its mode."""
-    file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | FILE, FILE_MODE, dir_fd=folder)
+    file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | OPEN_FLAGS, FILE_MODE, dir_fd=folder)
     os.fchmod(file, FILE_MODE)  # the mask of the process may have taken the group's part away
     return file
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory import files
 
-LONGEST = 32  # [B], the number of a process
-TRIES = 5
-PAUSE = 0.01  # [1], [s]: a process that only checks whether a lock is held has it for some microseconds
+LOCK_BYTES = 32  # [B], the number of a process
+LOCK_TRIES = 5
+LOCK_PAUSE = 0.01  # [1], [s]: a process that only checks whether a lock is held has it for some microseconds
 
 _HELD: "weakref.WeakSet[Lock]" = weakref.WeakSet()
 
@@ -32,7 +32,7 @@ class Lock:
     def __init__(self, path: Path):
         self._path = path
         self._file = files.open_or_make(_lock_file(path))
-        if os.fstat(self._file).st_size > LONGEST:
+        if os.fstat(self._file).st_size > LOCK_BYTES:
             os.close(self._file)
             raise MiddlewareError(
                 "the file is not a lock of solfer", where=str(_lock_file(path)), expected="remove the file"
@@ -106,18 +106,18 @@ def _lock_file(path: Path) -> Path:
 
 
 def _try(file: int) -> bool:
-    for turn in range(TRIES):
+    for turn in range(LOCK_TRIES):
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return True
         except BlockingIOError:
-            if turn < TRIES - 1:
-                time.sleep(PAUSE)
+            if turn < LOCK_TRIES - 1:
+                time.sleep(LOCK_PAUSE)
     return False
 
 
 def _owner(file: int) -> str:
-    return os.pread(file, LONGEST, 0).decode(errors="replace") or "of an unknown number"
+    return os.pread(file, LOCK_BYTES, 0).decode(errors="replace") or "of an unknown number"
 
 
 def _forget() -> None:

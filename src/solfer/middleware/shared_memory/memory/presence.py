@@ -7,7 +7,7 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace, lost
 from solfer.middleware.shared_memory.memory.segment import Segment
 
-PERIOD = 0.1
+PRESENCE_PERIOD = 0.1
 """Time between two checks [s]."""
 
 
@@ -29,7 +29,7 @@ class Presence:
         self._namespace = namespace
         self._segments = tuple(segments)
         self.loss = ""
-        self._due = time.monotonic() + PERIOD
+        self._due = time.monotonic() + PRESENCE_PERIOD
 
     def look(self) -> None:
         """Check once, with one system call for each file."""
@@ -37,10 +37,10 @@ class Presence:
         self.loss = self.loss or self._namespace.loss() or next(gone, "")
 
     def lost(self) -> bool:
-        """Return whether the files are lost; may be called in every cycle, checks once per `PERIOD`."""
+        """Return whether the files are lost; may be called in every cycle, checks once per `PRESENCE_PERIOD`."""
         now = time.monotonic()
         if now >= self._due:
-            self._due = now + PERIOD
+            self._due = now + PRESENCE_PERIOD
             self.look()
         return bool(self.loss)
 

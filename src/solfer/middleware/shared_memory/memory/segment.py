@@ -14,8 +14,8 @@ from typing import NamedTuple
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.memory.header import (
-    HEADER,
-    KIND,
+    HEADER_HEADER,
+    HEADER_KIND,
     Word,
     check,
     is_ours,
@@ -53,9 +53,9 @@ class Segment:
         self._memory = memory
         self._lock = lock
         view = memoryview(memory)
-        self._words = view[: KIND.start].cast("q")
-        start = HEADER + padded(self._words[Word.TEXT])
-        self.layout = bytes(view[HEADER : HEADER + self._words[Word.TEXT]])
+        self._words = view[: HEADER_KIND.start].cast("q")
+        start = HEADER_HEADER + padded(self._words[Word.TEXT])
+        self.layout = bytes(view[HEADER_HEADER : HEADER_HEADER + self._words[Word.TEXT]])
         self.data = view[start:]
         self.pid = self._words[Word.PID]
         self.generation = self._words[Word.GENERATION]
@@ -216,10 +216,10 @@ def _previous(path: Path) -> mmap.mmap | None:
 def _replace(path: Path, kind: str, layout: bytes, size: int) -> _Mapped:
     """Put new memory at `path`; the caller holds the lock."""
     previous = _previous(path)
-    words = memoryview(previous)[: KIND.start].cast("q") if previous is not None else None
+    words = memoryview(previous)[: HEADER_KIND.start].cast("q") if previous is not None else None
     generation = words[Word.GENERATION] + 1 if words is not None else 1
     draft = path.with_name(f"{path.name}.new")
-    mapped = _allocate(draft, HEADER + padded(len(layout)) + padded(size))
+    mapped = _allocate(draft, HEADER_HEADER + padded(len(layout)) + padded(size))
     write_header(mapped.memory, kind.encode(), layout, generation=generation)
     files.replace(draft, path)
     if words is not None:

@@ -7,16 +7,16 @@ meanwhile. Readers and writer never wait, and a writer that dies in the middle l
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.header import LINE
+from solfer.middleware.shared_memory.memory.header import HEADER_LINE
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
 
-TRIES = 8
+SLOT_TRIES = 8
 """Attempts of a read until it returns that there is nothing new."""
 
-NEWEST, TAKEN, REFUSED = 0, 1, 2
+NEWEST, TAKEN, REFUSED_WORD = 0, 1, 2
 """Words in front of the slots: number of the newest record; for a ring, the record read last and the refused ones."""
 
-STATE, STAMP = 0, 1
+SLOT_STATE, SLOT_STAMP = 0, 1
 """Words in front of each slot: twice the number of its record, less one while it is written; time of the sender."""
 
 
@@ -43,15 +43,15 @@ class Slots:
         self._content, self._copy = memoryview(self.values), memoryview(np.zeros(width))
         self.words = memory[: self.size(width, count)].cast("q")
         stride = self._stride(width)
-        self._places = [(LINE + index * stride) // 8 for index in range(count)]
-        begins = [2 * LINE + index * stride for index in range(count)]
+        self._places = [(HEADER_LINE + index * stride) // 8 for index in range(count)]
+        begins = [2 * HEADER_LINE + index * stride for index in range(count)]
         self._records = [memory[begin : begin + 8 * width].cast("d") for begin in begins]
         self._count = count
 
     @classmethod
     def size(cls, width: int, count: int) -> int:
         """Compute the memory that the records need [B]."""
-        return LINE + count * cls._stride(width)
+        return HEADER_LINE + count * cls._stride(width)
 
     @property
     def newest(self) -> int:
@@ -64,7 +64,7 @@ class Slots:
 
     @staticmethod
     def _stride(width: int) -> int:
-        return LINE + -(-8 * width // LINE) * LINE
+        return HEADER_LINE + -(-8 * width // HEADER_LINE) * HEADER_LINE
 
     def put(self, stamp: int) -> None:
         """Publish `values` as the next record, `stamp` [ns] in the writer's clock, over the oldest one."""
@@ -72,10 +72,10 @@ class Slots:
         number = self.sequence + 1
         index = number % self._count
         place = self._places[index]
-        words[place + STATE] = 2 * number - 1
-        words[place + STAMP] = stamp
+        words[place + SLOT_STATE] = 2 * number - 1
+        words[place + SLOT_STAMP] = stamp
         self._records[index][:] = self._content
-        words[place + STATE] = 2 * number
+        words[place + SLOT_STATE] = 2 * number
         words[NEWEST] = number
         self.sequence = number
         self.stamp = stamp
@@ -85,11 +85,11 @@ class Slots:
         words = self.words
         index = number % self._count
         place = self._places[index]
-        if words[place + STATE] != 2 * number:
+        if words[place + SLOT_STATE] != 2 * number:
             return False
-        stamp = words[place + STAMP]
+        stamp = words[place + SLOT_STAMP]
         self._copy[:] = self._records[index]
-        if words[place + STATE] != 2 * number:
+        if words[place + SLOT_STATE] != 2 * number:
             return False
         self._content[:] = self._copy
         self.sequence = number
@@ -126,7 +126,7 @@ class Slot(Slots):
         number = self.words[NEWEST]
         if number == self.sequence:
             return OLD if number else NONE
-        for _ in range(TRIES):
+        for _ in range(SLOT_TRIES):
             if self._fetch(number):
                 return NEW
             number = self.words[NEWEST]

@@ -9,7 +9,7 @@ from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.channel import DONE, RpcChannel, interface_of, packed, unpacked
-from solfer.middleware.shared_memory.rpc.services import CALLS, SERVICES, client_name, offered, services_of
+from solfer.middleware.shared_memory.rpc.services import RPC_CALLS, SERVICES, client_name, offered, services_of
 
 
 @dataclass
@@ -134,7 +134,7 @@ class Calls:
     def _channel(self, pending: _PendingCall) -> RpcChannel:
         key = pending.name, pending.interface
         if key not in self._channels:
-            path = self._namespace.place(SERVICES, pending.name, CALLS, self._client)
+            path = self._namespace.place(SERVICES, pending.name, RPC_CALLS, self._client)
             self._channels[key] = RpcChannel.open(path, pending.interface)
             self._namespace.bell(SERVICES, pending.name).ring()
         return self._channels[key]

@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.header import LINE
+from solfer.middleware.shared_memory.memory.header import HEADER_LINE
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.memory.text import Text
 
-KIND = "calls"
+CHANNEL_KIND = "calls"
 OPEN = 4
 """Calls of a client that may wait for the service."""
 
 REQUEST_SIZE, REPLY_SIZE = 16384, 131072
 """Longest request and reply [B]."""
 
-NUMBER, FRONT = 0, 1
+CALL_NUMBER, CALL_COLUMNS = 0, 1
 """Column of a call's number, in front of its text."""
 
 DONE = "done"
-FAILED = "failed"
+FAILED_REPLY = "failed"
 
 
 def interface_of(interface: str, request: type, reply: type) -> bytes:
@@ -44,7 +44,7 @@ class MessageRing:
 
     def __init__(self, memory: memoryview, longest: int, count: int):
         self._ring = Ring(memory, self._width(longest), count, refuse=True)
-        self._text = Text(self._ring.values[FRONT:])
+        self._text = Text(self._ring.values[CALL_COLUMNS:])
 
     @classmethod
     def size(cls, longest: int, count: int) -> int:
@@ -57,7 +57,7 @@ class MessageRing:
         Raises:
             MiddlewareError: It is longer than the longest text.
         """
-        self._ring.values[NUMBER] = number
+        self._ring.values[CALL_NUMBER] = number
         self._text.write(json.dumps(content, default=_plain).encode())
         return self._ring.write(number)
 
@@ -69,11 +69,11 @@ class MessageRing:
         """Read the next number and its content; None if there is none."""
         if not self._ring.read():
             return None
-        return int(self._ring.values[NUMBER]), json.loads(self._text.read())
+        return int(self._ring.values[CALL_NUMBER]), json.loads(self._text.read())
 
     @staticmethod
     def _width(longest: int) -> int:
-        return FRONT + Text.width(longest)
+        return CALL_COLUMNS + Text.width(longest)
 
 
 class RpcChannel:
@@ -87,7 +87,7 @@ class RpcChannel:
 
     def __init__(self, segment: Segment):
         self.segment = segment
-        size = -(-MessageRing.size(REQUEST_SIZE, OPEN) // LINE) * LINE
+        size = -(-MessageRing.size(REQUEST_SIZE, OPEN) // HEADER_LINE) * HEADER_LINE
         self.requests = MessageRing(segment.data[:size], REQUEST_SIZE, OPEN)
         self.replies = MessageRing(segment.data[size:], REPLY_SIZE, 2)
 
@@ -98,8 +98,8 @@ class RpcChannel:
         Raises:
             MiddlewareError: The segment cannot be made.
         """
-        size = MessageRing.size(REQUEST_SIZE, OPEN) + LINE + MessageRing.size(REPLY_SIZE, 2)
-        return cls(Segment.create(path, KIND, interface, size=size))
+        size = MessageRing.size(REQUEST_SIZE, OPEN) + HEADER_LINE + MessageRing.size(REPLY_SIZE, 2)
+        return cls(Segment.create(path, CHANNEL_KIND, interface, size=size))
 
     @classmethod
     def join(cls, path: Path, interface: bytes) -> "RpcChannel":
@@ -108,7 +108,7 @@ class RpcChannel:
         Raises:
             MiddlewareError: There is no such segment, or its client expects another interface.
         """
-        channel = cls(Segment.attach(path, KIND, interface, writable=True))
+        channel = cls(Segment.attach(path, CHANNEL_KIND, interface, writable=True))
         channel.replies.resume()
         return channel
 

@@ -12,7 +12,7 @@ from solfer.errors import MiddlewareError, SolferError, described, located
 from solfer.middleware.shared_memory.memory.lock import remove
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.rpc.channel import DONE, FAILED, RpcChannel, interface_of, packed, unpacked
+from solfer.middleware.shared_memory.rpc.channel import DONE, FAILED_REPLY, RpcChannel, interface_of, packed, unpacked
 from solfer.throttle import Throttle
 from solfer.transport.middleware import Submit
 
@@ -20,8 +20,8 @@ logger = logging.getLogger(__name__)
 
 SERVICES = "services"
 OFFER = "offer"
-CALLS = "calls"
-KIND = "service"
+RPC_CALLS = "calls"
+RPC_KIND = "service"
 
 
 @dataclass
@@ -77,7 +77,7 @@ class ServiceServer:
         self._now = now
         self._worker = worker
         self._interface = interface_of(service.interface, service.request, service.reply)
-        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), KIND, self._interface, size=0)
+        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), RPC_KIND, self._interface, size=0)
         self._channels: dict[str, RpcChannel] = {}
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
@@ -110,8 +110,8 @@ class ServiceServer:
         """Join clients that are new, and clean up after those that have ended."""
         self._bell.acknowledge()
         found = {}
-        for name in self._namespace.present(SERVICES, self.name, CALLS):
-            path = self._namespace.path(SERVICES, self.name, CALLS, name)
+        for name in self._namespace.present(SERVICES, self.name, RPC_CALLS):
+            path = self._namespace.path(SERVICES, self.name, RPC_CALLS, name)
             try:
                 channel = self._channels.get(name)
                 if channel is None or not channel.segment.owned():  # a client of the same name may be another one
@@ -161,7 +161,9 @@ class ServiceServer:
         try:
             return call.channel.replies.send(call.number, [DONE, packed(reply)])
         except BaseException as error:  # a component has made the reply, and may have made anything
-            return call.channel.replies.send(call.number, [FAILED, f"its reply cannot be sent: {described(error)}"])
+            return call.channel.replies.send(
+                call.number, [FAILED_REPLY, f"its reply cannot be sent: {described(error)}"]
+            )
 
     def _result(self, answer: "Future[Any]") -> Any:
         """Return the reply; a failure becomes a refusal with its message."""
@@ -186,7 +188,7 @@ def _failed(error: BaseException) -> "Future[Any]":
 def offered(namespace: Namespace, name: str) -> Segment | None:
     """Attach the offer of a service by a living process; None if there is none."""
     try:
-        segment = Segment.attach(namespace.path(SERVICES, name, OFFER), KIND)
+        segment = Segment.attach(namespace.path(SERVICES, name, OFFER), RPC_KIND)
     except MiddlewareError:
         return None
     return segment if segment.owned() else None

@@ -6,7 +6,7 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment
 
-KIND = "ear"
+EAR_KIND = "ear"
 EARS = "ears"
 
 
@@ -36,7 +36,7 @@ class Ears:
         try:
             path = self._namespace.place(EARS, topic, self._name)
             content = json.dumps({"message": message, "declared": declared}).encode()
-            self._segments[topic] = Segment.create(path, KIND, content, size=0)
+            self._segments[topic] = Segment.create(path, EAR_KIND, content, size=0)
             self._namespace.bell(EARS, topic).ring()
         except MiddlewareError:
             self._segments[topic] = None

@@ -15,9 +15,9 @@ from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.memory.slot import NEWEST, Slot
 from solfer.middleware.shared_memory.topics.layouts import Layout, kind_of
 from solfer.middleware.shared_memory.topics.sender_segment import (
-    DEPTH,
-    KIND,
     PIPES,
+    SENDER_DEPTH,
+    SENDER_KIND,
     SenderSegment,
     SenderSegments,
     file_of,
@@ -267,7 +267,7 @@ class XbotWriter(Writer):
         self._throttle = Throttle(logger)
         require_message(namespace, topic, message)
         path = namespace.place(PIPES, topic, file_of(sender, number))
-        self._segment = Segment.create(path, KIND, header(message, sender, None), size=0)
+        self._segment = Segment.create(path, SENDER_KIND, header(message, sender, None), size=0)
         self._layout: Layout | None = None
         self._last: Message | None = None
         self._end: Ring | None = None
@@ -301,9 +301,9 @@ class XbotWriter(Writer):
 
     def _lay_out(self, message: Message) -> None:
         layout = kind_of(self._message).from_message(message)
-        size = Ring.size(layout.width, DEPTH)
+        size = Ring.size(layout.width, SENDER_DEPTH)
         self._segment = self._segment.recreate(header(self._message, self._sender, layout), size)
-        self._end = Ring(self._segment.data, layout.width, DEPTH)
+        self._end = Ring(self._segment.data, layout.width, SENDER_DEPTH)
         self._record = layout.bind(type_of(self._message), self._end.values, self._sender)
         self._layout = layout
         self._bell.ring()

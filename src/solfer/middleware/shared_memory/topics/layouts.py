@@ -10,8 +10,8 @@ import numpy as np
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.text import Text
 from solfer.middleware.shared_memory.topics.wire_records import (
-    FRONT,
-    OWN,
+    SEPARATE_FIELDS,
+    WIRE_COLUMNS,
     FieldsWireRecord,
     NumbersWireRecord,
     TextWireRecord,
@@ -23,7 +23,7 @@ from solfer.transport.messages import FieldsMessage, Message, RefusalMessage, ty
 TEXT_SIZE = 2048
 """Longest text of a message without numbers [B]."""
 
-SMALLEST, LARGEST = 4096, 65536
+ROOM_MINIMUM, ROOM_MAXIMUM = 4096, 65536
 """Bounds of the room for a message of fields [B]: a sender makes room for twice what its first one needs."""
 
 
@@ -43,14 +43,14 @@ class NumbersLayout:
         self.texts = texts
         self.shapes = shapes
         self.tuples = tuples
-        self.width = FRONT + sum(int(np.prod(shape)) for shape in shapes.values() if shape is not None)
+        self.width = WIRE_COLUMNS + sum(int(np.prod(shape)) for shape in shapes.values() if shape is not None)
         self._texts = tuple(texts.items())
         self._arrays = tuple((name, shape) for name, shape in shapes.items() if name not in tuples)
 
     @classmethod
     def from_message(cls, message: Message) -> "NumbersLayout":
         """Derive the layout from a message."""
-        fields = {name: value for name, value in vars(message).items() if name not in OWN}
+        fields = {name: value for name, value in vars(message).items() if name not in SEPARATE_FIELDS}
         tuples = tuple(
             name
             for name, value in fields.items()
@@ -95,7 +95,7 @@ class NumbersLayout:
 class TextLayout:
     """Layout of messages of texts, the same for all messages of a type."""
 
-    width = FRONT + Text.width(TEXT_SIZE)
+    width = WIRE_COLUMNS + Text.width(TEXT_SIZE)
 
     @classmethod
     def from_message(cls, _message: Message) -> "TextLayout":
@@ -131,7 +131,7 @@ class FieldsLayout:
     """
 
     def __init__(self, size: int):
-        self.size, self.width = size, FRONT + Text.width(size)
+        self.size, self.width = size, WIRE_COLUMNS + Text.width(size)
 
     @classmethod
     def from_message(cls, message: Message) -> "FieldsLayout":
@@ -141,9 +141,9 @@ class FieldsLayout:
             MiddlewareError: It is longer than the longest one.
         """
         needed = len(fields_text(message))
-        if needed > LARGEST:
-            raise MiddlewareError(f"a message of {needed} bytes of text", expected=f"at most {LARGEST}")
-        return cls(min(max(SMALLEST, 2 * needed), LARGEST))
+        if needed > ROOM_MAXIMUM:
+            raise MiddlewareError(f"a message of {needed} bytes of text", expected=f"at most {ROOM_MAXIMUM}")
+        return cls(min(max(ROOM_MINIMUM, 2 * needed), ROOM_MAXIMUM))
 
     def fits(self, message: Message) -> bool:
         """Return whether there is room for a message."""

@@ -17,9 +17,9 @@ from solfer.transport.messages import type_of
 
 logger = logging.getLogger(__name__)
 
-KIND = "pipe"
+SENDER_KIND = "pipe"
 PIPES = "pipes"
-DEPTH = 64
+SENDER_DEPTH = 64
 """Messages that a sender keeps for readers of every one."""
 
 
@@ -63,7 +63,7 @@ class SenderSegment(Publisher):
         super().__init__(published["sender"])
         self.segment = segment
         self.ahead = False
-        self.end = end(segment.data, layout.width, DEPTH)
+        self.end = end(segment.data, layout.width, SENDER_DEPTH)
         self.record: WireRecord = layout.bind(type_of(message), self.end.values, self.name)
 
 
@@ -115,7 +115,7 @@ class SenderSegments:
     def _open(self, path: Path) -> SenderSegment | None:
         """Open a segment; None if nothing was published yet, its sender is dead, or it is refused."""
         try:
-            segment = Segment.attach(path, KIND)
+            segment = Segment.attach(path, SENDER_KIND)
             published = json.loads(segment.layout)
             if published["message"] != self._message:
                 raise MiddlewareError(
@@ -141,7 +141,7 @@ def require_message(namespace: Namespace, topic: str, message: str) -> None:
     for name in namespace.present(PIPES, topic):
         path = namespace.path(PIPES, topic, name)
         try:
-            segment = Segment.attach(path, KIND)
+            segment = Segment.attach(path, SENDER_KIND)
         except MiddlewareError:
             continue  # readers report what is damaged, its writer makes it again
         published = json.loads(segment.layout)

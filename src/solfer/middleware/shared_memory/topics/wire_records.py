@@ -11,10 +11,10 @@ import numpy as np
 from solfer.middleware.shared_memory.memory.text import Text
 from solfer.transport.messages import JOINT_FIELDS, FieldsMessage, JointMessage, Message, copied
 
-SENT, STAMP, FRONT = 0, 1, 2
+SENT_COLUMN, STAMP_COLUMN, WIRE_COLUMNS = 0, 1, 2
 """Columns in front of those of the message: when it was sent and its own stamp, both [s]; number of these columns."""
 
-OWN = ("stamp", "sender", "rows", "block")
+SEPARATE_FIELDS = ("stamp", "sender", "rows", "block")
 """Fields that are kept apart: those that every message has, and how its numbers lie."""
 
 
@@ -30,12 +30,12 @@ class WireRecord(abc.ABC):
     """Whether `message` lacks what changes in the array until `_decode` is called."""
 
     def __init__(self, values: np.ndarray):
-        self._front: Any = memoryview(values)[:FRONT]
+        self._front: Any = memoryview(values)[:WIRE_COLUMNS]
 
     @property
     def sent(self) -> float:
         """When it was sent, in the sender's clock [s]."""
-        return self._front[SENT]
+        return self._front[SENT_COLUMN]
 
     @abc.abstractmethod
     def encode(self, message: Message, sent: float) -> None:
@@ -44,7 +44,7 @@ class WireRecord(abc.ABC):
     def decode(self) -> Message:
         """Bring `message` up to date and return it."""
         message = self.message
-        message.stamp = self._front[STAMP]
+        message.stamp = self._front[STAMP_COLUMN]
         if self._changes:
             self._decode()
         return message
@@ -54,7 +54,7 @@ class WireRecord(abc.ABC):
         """Return the content as a message of its own."""
 
     def _stamp(self, message: Message, sent: float) -> None:
-        self._front[SENT], self._front[STAMP] = sent, message.stamp
+        self._front[SENT_COLUMN], self._front[STAMP_COLUMN] = sent, message.stamp
 
     @abc.abstractmethod
     def _decode(self) -> None:
@@ -84,7 +84,7 @@ class NumbersWireRecord(WireRecord):
     ):
         super().__init__(values)
         self._views: list[tuple[str, np.ndarray]] = []
-        start = FRONT
+        start = WIRE_COLUMNS
         for name, shape in shapes.items():
             if shape is None:
                 continue
@@ -96,7 +96,7 @@ class NumbersWireRecord(WireRecord):
         self._rows: tuple[str, ...] | None = None
         self._changes = bool(self._tuples)
         if isinstance(self.message, JointMessage):
-            self._lay(self.message, values[FRONT:start])
+            self._lay(self.message, values[WIRE_COLUMNS:start])
 
     def copy(self) -> Message:
         """See `WireRecord.copy`."""
@@ -105,7 +105,7 @@ class NumbersWireRecord(WireRecord):
     def encode(self, message: Any, sent: float) -> None:
         """See `WireRecord.encode`."""
         front = self._front
-        front[SENT], front[STAMP] = sent, message.stamp
+        front[SENT_COLUMN], front[STAMP_COLUMN] = sent, message.stamp
         if self._rows is not None and message.block is not None and message.rows == self._rows:
             self._block[...] = message.block
             return
@@ -130,10 +130,10 @@ class TextWireRecord(WireRecord):
 
     def __init__(self, message_type: type, values: np.ndarray, sender: str):
         super().__init__(values)
-        self._text = Text(values[FRONT:])
+        self._text = Text(values[WIRE_COLUMNS:])
         self._type = message_type
         self._sender = sender
-        self._fields = [field.name for field in dataclasses.fields(message_type) if field.name not in OWN]
+        self._fields = [field.name for field in dataclasses.fields(message_type) if field.name not in SEPARATE_FIELDS]
         self.message = message_type(*(() for _ in self._fields), sender=sender)
 
     def copy(self) -> Message:
@@ -160,7 +160,7 @@ class FieldsWireRecord(WireRecord):
 
     def __init__(self, message_type: type, values: np.ndarray, sender: str):
         super().__init__(values)
-        self._text = Text(values[FRONT:])
+        self._text = Text(values[WIRE_COLUMNS:])
         self.message = message_type({}, sender=sender)
 
     def copy(self) -> Message:
