@@ -85,7 +85,7 @@ class Merged:
             error: Its error [m].
             base_speed: Speed of the wheel by the motion of the base in the last cycle [m/s].
         """
-        if self._rests and not desired and abs(error) < kernel.RESTING:
+        if self._rests and not desired and abs(error) < kernel.ORIGINAL_REST_ERROR:
             return self._wheel.angle
         return self._wheel.update(desired, error, base_speed)
 
@@ -122,7 +122,7 @@ class Kept:
         else:
             self._rest = max(self._rest - self._period, 0.0)
         if not self._rest:
-            velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.RESTING / max(distance, 1e-300))
+            velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.ORIGINAL_REST_ERROR / max(distance, 1e-300))
             aim = nearest(cmath.phase(velocity), self.angle)
             way = abs(velocity) * self._period
             self.angle += (1.0 - math.exp(-way / steering.STEERING_RELAXATION)) * (aim - self.angle)

@@ -6,7 +6,7 @@ Names are imported when they are first used, so that reading or cutting a URDF d
 from importlib import import_module
 from typing import Any
 
-_MODEL_HOME = {
+_HOMES = {
     "Actuators": "actuators",
     "BidirectionalMap": "maps",
     "Description": "urdf.description",
@@ -22,10 +22,10 @@ _MODEL_HOME = {
     "UnidirectionalMap": "maps",
 }
 
-__all__ = sorted(_MODEL_HOME)
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _MODEL_HOME:
+    if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(f"{__name__}.{_MODEL_HOME[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

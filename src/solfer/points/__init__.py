@@ -20,12 +20,12 @@ def _homes() -> dict[str, str]:
     return homes
 
 
-_POINTS_HOMES = _homes()
+_HOMES = _homes()
 
-__all__ = sorted(_POINTS_HOMES)
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _POINTS_HOMES:
+    if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(_POINTS_HOMES[name]), name)
+    return getattr(import_module(_HOMES[name]), name)

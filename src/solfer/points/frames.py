@@ -12,7 +12,7 @@ from solfer.points.compiled import frames as kernels
 from solfer.points.offset import direction, finite
 from solfer.points.point import Operand, Point, common_robot
 from solfer.points.program import CompiledPoint, Instruction
-from solfer.points.space import ORIENTATION, POSE_SPACE, vector
+from solfer.points.space import ORIENTATION, POSE, vector
 
 __all__ = ["GroundFrame", "LookAt", "RelativePoint", "WheelFrame"]
 
@@ -36,7 +36,7 @@ class RelativePoint(CompiledPoint):
     """
 
     def __init__(self, point: Point, frame: Point):
-        if point.space not in (vector(3), ORIENTATION, POSE_SPACE) or frame.space != POSE_SPACE:
+        if point.space not in (vector(3), ORIENTATION, POSE) or frame.space != POSE:
             raise SizeMismatch(
                 f"{point} as seen from {frame}", expected="a position, an orientation or a pose, as seen from a pose"
             )
@@ -72,9 +72,9 @@ class _LevelFrame(CompiledPoint):
     crosses: ClassVar[bool]
 
     def __init__(self, pose: Point, axis: ArrayLike, normal: ArrayLike, height: float):
-        if pose.space != POSE_SPACE:
+        if pose.space != POSE:
             raise SizeMismatch(f"{type(self).__name__} at {pose}", expected="a pose")
-        super().__init__(POSE_SPACE, _robot_of(pose))
+        super().__init__(POSE, _robot_of(pose))
         self.pose = pose
         self._numbers = np.zeros(9)
         self._numbers[:3] = direction(axis, f"axis of a {type(self).__name__}")
@@ -167,7 +167,7 @@ class LookAt(CompiledPoint):
 
     def __init__(self, frame: Point, target: Operand):
         target = target if isinstance(target, Point) else Constant(finite(target, 3, "target"))
-        if frame.space != POSE_SPACE or target.space != vector(3):
+        if frame.space != POSE or target.space != vector(3):
             raise SizeMismatch(f"a direction from {frame} to {target}", expected="a pose, and a position")
         super().__init__(3, _robot_of(frame, target))
         self.frame = frame

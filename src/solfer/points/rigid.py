@@ -12,7 +12,7 @@ from solfer.points.compiled.registry import Kernel
 from solfer.points.compiled.rigid import place, velocity
 from solfer.points.offset import OrientationOffset, PositionOffset, quaternion_convention
 from solfer.points.program import CompiledPoint, Instruction, LinkMotion, folded
-from solfer.points.space import ORIENTATION, POSE_SPACE, Space, vector
+from solfer.points.space import ORIENTATION, POSE, Space, vector
 
 __all__ = ["AngularVelocity", "FrameOrientation", "LinearPoint", "LinearVelocity", "SpatialPoint", "SpatialVelocity"]
 
@@ -191,7 +191,7 @@ class SpatialPoint(RigidPoint):
         SizeMismatch, NotFinite: An offset does not fit.
     """
 
-    kind = POSE_SPACE
+    kind = POSE
     kernels = (place,)
     motion = LINEAR + ANGULAR
 

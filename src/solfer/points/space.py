@@ -8,7 +8,7 @@ from solfer.points.compiled.algebra import minus, orientation_minus, pose_minus
 from solfer.points.compiled.kernel import difference
 from solfer.points.compiled.registry import Kernel
 
-__all__ = ["ORIENTATION", "POSE_SPACE", "vector"]
+__all__ = ["ORIENTATION", "POSE", "vector"]
 
 
 @dataclass(frozen=True)
@@ -66,5 +66,5 @@ def vector(size: int) -> Space:
 ORIENTATION = Space("orientation", 4, 3, minus=orientation_minus)
 """Unit quaternions (x, y, z, w); Jacobians map to angular velocities in world axes."""
 
-POSE_SPACE = Space("pose", 7, 6, minus=pose_minus)
+POSE = Space("pose", 7, 6, minus=pose_minus)
 """Positions [m], then unit quaternions (x, y, z, w); Jacobians map to linear, then angular velocities."""

@@ -6,7 +6,7 @@ Names are imported when they are first used: the compiled kernels behind them ta
 from importlib import import_module
 from typing import Any
 
-_TASKS_HOME = {
+_HOMES = {
     "CollisionLimit": "collisions",
     "ConfiguredStack": "building.build",
     "Constraint": "constraints",
@@ -25,10 +25,10 @@ _TASKS_HOME = {
     "joint_bounds": "constraints",
 }
 
-__all__ = sorted(_TASKS_HOME)
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _TASKS_HOME:
+    if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(f"{__name__}.{_TASKS_HOME[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

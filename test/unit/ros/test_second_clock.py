@@ -18,7 +18,7 @@ def test_the_first_living_publisher_is_named(monkeypatch, answer, lives, registe
 
     monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": registered}, {}, {}))
     monkeypatch.setattr(master, "call_master", lambda method, node: f"http://{node}")
-    monkeypatch.setattr(master, "ask", ask)
+    monkeypatch.setattr(master, "call", ask)
     if own == "/first" or not lives:
         master.refuse_second("/clock", own)
         return

@@ -70,7 +70,7 @@ def test_wrong_memory_says_what_is_wrong(path):
     assert attached() == (f"shared memory is damaged: {size} bytes", f"3 bytes; {owner}")
     put(path, Word.SIZE, size)
     boot = put(path, Word.BOOT, 0)
-    assert attached() == ("shared memory from before the machine was started", "an owner that makes it anew")
+    assert attached() == ("shared memory from before the machine was started", "an owner that makes it again")
     put(path, Word.BOOT, boot)
     layout = put(path, Word.LAYOUT, 0)
     assert attached() == ("shared memory is damaged: its layout is not the one it was made with", owner)
@@ -149,7 +149,7 @@ def test_a_lost_process_says_so(tmp_path, monkeypatch):
     with pytest.raises(MiddlewareError) as error:
         here.require()
     assert str(segment.path) in loss and error.value.what == f"no other process finds this one any more: {loss}"
-    assert error.value.expected == "a new start, which makes the namespace anew"
+    assert error.value.expected == "a new start, which makes the namespace again"
 
 
 @pytest.mark.parametrize(("size", "width"), [(0, 1), (1, 2), (8, 2), (9, 3), (17, 4)])

@@ -9,7 +9,7 @@ from solfer.errors import NotFinite, SizeMismatch
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import quaternion_product
 from solfer.points import Constant
-from solfer.points.space import ORIENTATION, POSE_SPACE
+from solfer.points.space import ORIENTATION, POSE
 
 QUANTITY_EMPTY = slice(0, 0)
 
@@ -94,4 +94,4 @@ def quantity_of(reference: Constant) -> str:
     """Return the quantity of a reference."""
     if reference.space == ORIENTATION:
         return "orientation"
-    return "pose" if reference.space == POSE_SPACE else "position"
+    return "pose" if reference.space == POSE else "position"

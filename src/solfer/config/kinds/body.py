@@ -10,13 +10,13 @@ ODOMETRY, IMU = "nav_msgs/Odometry", "sensor_msgs/Imu"
 ONLINE = "imu"
 """Topic of the lower level's inertial measurements."""
 
-BODY_CONTENT = Content(body=True, measures=True, online={"state": ONLINE})
+CONTENT = Content(body=True, measures=True, online={"state": ONLINE})
 
 
 class BodyFeedbackRecord(FeedbackRecord):
     """A link that a plugin receives: the floating base of a State."""
 
-    content: ClassVar[Content] = BODY_CONTENT
+    content: ClassVar[Content] = CONTENT
 
     @property
     def default_message(self) -> str:
@@ -38,7 +38,7 @@ class BodyFeedbackRecord(FeedbackRecord):
 class BodyControllerRecord(ControllerRecord):
     """A link that a plugin publishes."""
 
-    content: ClassVar[Content] = BODY_CONTENT
+    content: ClassVar[Content] = CONTENT
 
     @property
     def default_message(self) -> str:
@@ -51,4 +51,4 @@ class BodyControllerRecord(ControllerRecord):
         return f"link {self.dofs.name}"
 
 
-BODY_RECORDS = KindRecords(BodyFeedbackRecord, BodyControllerRecord)
+RECORDS = KindRecords(BodyFeedbackRecord, BodyControllerRecord)

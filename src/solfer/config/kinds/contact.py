@@ -69,4 +69,4 @@ class ContactControllerRecord(ContactTags, ControllerRecord):
     """Wrenches of its Robot's contacts that a plugin publishes."""
 
 
-CONTACT_RECORDS = KindRecords(ContactFeedbackRecord, ContactControllerRecord, ContactTags, title="Contacts")
+RECORDS = KindRecords(ContactFeedbackRecord, ContactControllerRecord, ContactTags, title="Contacts")

@@ -14,7 +14,7 @@ from solfer.config.records.pipes import (
 MEASUREMENT = "sensor_msgs/JointState"
 """Message of joints that a lower level measures."""
 
-JOINT_CONTENT = Content(
+CONTENT = Content(
     joints=True, measures=True, needed=("function",), online={"state": "joint_states", "motor": "motor_states"}
 )
 
@@ -22,7 +22,7 @@ JOINT_CONTENT = Content(
 class JointFeedbackRecord(FeedbackRecord):
     """Joints that a plugin receives: DoFs of a State."""
 
-    content: ClassVar[Content] = JOINT_CONTENT
+    content: ClassVar[Content] = CONTENT
 
     @property
     def default_message(self) -> str:
@@ -34,7 +34,7 @@ class JointFeedbackRecord(FeedbackRecord):
 class JointCommandRecord(ControllerRecord):
     """Joints that a plugin publishes, or commands."""
 
-    content: ClassVar[Content] = JOINT_CONTENT
+    content: ClassVar[Content] = CONTENT
 
 
-JOINT_RECORDS = KindRecords(JointFeedbackRecord, JointCommandRecord)
+RECORDS = KindRecords(JointFeedbackRecord, JointCommandRecord)

@@ -152,4 +152,4 @@ class PointControllerRecord(PointTags, ControllerRecord):
     """Points that a plugin publishes: an output of its component."""
 
 
-POINT_RECORDS = KindRecords(PointFeedbackRecord, PointControllerRecord, PointTags, title="Points")
+RECORDS = KindRecords(PointFeedbackRecord, PointControllerRecord, PointTags, title="Points")

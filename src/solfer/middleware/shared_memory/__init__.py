@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-_INIT___HOMES = {
+_HOMES = {
     "Namespace": "solfer.middleware.shared_memory.memory.namespace",
     "XbotMiddleware": "solfer.middleware.shared_memory.middleware",
 }
@@ -11,7 +11,7 @@ __all__ = ["Namespace", "XbotMiddleware"]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _INIT___HOMES:
+    if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     # imported when it is first used: an emergency stop needs the memory and nothing else
-    return getattr(import_module(_INIT___HOMES[name]), name)
+    return getattr(import_module(_HOMES[name]), name)
