@@ -21,7 +21,7 @@ import yaml
 from executor import BEGIN, CONFIG, REPOSITORY, end, wait_for_all, wait_for_robot
 from form import Figures, parser_of
 
-from solfer.components.declaration import Accepted
+from solfer.interfaces.declaration import Accepted
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.supervision import supervise

@@ -10,10 +10,10 @@ from driving_cases.golden import CONFIG, CONTACTS, SRDF
 from points import ROUNDS, URDF, unit
 
 from solfer import Robot
-from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
+from solfer.interfaces.geometry import Vector
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 

@@ -4,7 +4,7 @@
 import time
 from contextlib import closing
 
-from solfer.components.trajectories import messages
+from solfer.interfaces import trajectories as messages
 from solfer.middleware.ros import RosMiddleware, RosNode, run_main
 from solfer.transport.declared import ActionClient, Goal
 

@@ -5,9 +5,9 @@ import re
 from scipy.spatial.transform import Rotation
 
 from solfer import Robot
-from solfer.components.declaration import Accepted, Service
-from solfer.components.following.requests import TaskReferences
-from solfer.components.geometry import Pose, Turn, Vector
+from solfer.interfaces.declaration import Accepted, Service
+from solfer.interfaces.geometry import Pose, Turn, Vector
+from solfer.interfaces.task_references import TaskReferences
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.scene import LiveScene
 from solfer.transport import Inbox, JointMessage

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from solfer.cli.diagram import Network, connect
 from solfer.cli.diagram.network import Declared
 from solfer.cli.pipes import received
-from solfer.components.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.config import CheckReport, Configuration, check
 from solfer.errors import ConfigError, SolferError, raise_all
+from solfer.interfaces.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry

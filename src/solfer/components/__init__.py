@@ -1,7 +1,7 @@
 """Algorithms: a Robot in, a Robot out. No pipes, no ROS, no shared memory."""
 
 from solfer.components.base import Component
-from solfer.components.declaration import Action, LiveParameter, Outcome, Parameter, Service, TopicIn, TopicOut
-from solfer.components.port import Port
+from solfer.interfaces.declaration import Action, LiveParameter, Outcome, Parameter, Service, TopicIn, TopicOut
+from solfer.interfaces.port import Port
 
 __all__ = ["Action", "Component", "LiveParameter", "Outcome", "Parameter", "Port", "Service", "TopicIn", "TopicOut"]

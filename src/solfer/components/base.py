@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from solfer.components.declaration import Action, LiveParameter, Parameter, Service, TopicIn, TopicOut
-from solfer.components.port import Port
 from solfer.errors import ComponentError
+from solfer.interfaces.declaration import Action, LiveParameter, Parameter, Service, TopicIn, TopicOut
+from solfer.interfaces.port import Port
 
 if TYPE_CHECKING:
     from solfer.numerics.planar_move import PlanarMove

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from solfer.components.geometry import Header
+from solfer.interfaces.geometry import Header
 
 
 @dataclass(frozen=True)

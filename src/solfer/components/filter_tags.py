@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from solfer.components.declaration import LiveParameter
 from solfer.config import LIVE, Record
+from solfer.interfaces.declaration import LiveParameter
 from solfer.numerics.filters import LowPass
 
 

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from solfer.components.declaration import LiveParameter
 from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import GAIN
 from solfer.errors import ComponentError
+from solfer.interfaces.declaration import LiveParameter
 from solfer.robot import Robot
 
 GAINS = ("stiffness", "damping")

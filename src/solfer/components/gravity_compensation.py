@@ -1,20 +1,20 @@
 """Torques that carry a robot on its contacts, and what others want of its parts (Figs. 3 to 5 of the paper)."""
 
 import logging
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
-from solfer.components.declaration import LiveParameter, Service
 from solfer.components.desired_positions import DesiredPositions
 from solfer.components.gains import GainsOfGroup, configured_gains, live_gains
 from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.dynamics import BIAS, CarryingTorques
 from solfer.errors import ComponentError, UnknownName
+from solfer.interfaces.declaration import LiveParameter, Service
+from solfer.interfaces.lift import LiftContacts, LiftReply
 from solfer.points import Handler, Point
 from solfer.points.contact.contact_constraint import ContactConstraint
 from solfer.robot import Robot
@@ -37,27 +37,6 @@ class GravityTags(Record):
     fade: float = Field(
         0.5, **DURATION, **LIVE, description="time in which torques change when a contact is lifted [s]"
     )
-
-
-@dataclass(frozen=True)
-class LiftContacts:
-    """Which contacts carry the robot.
-
-    Attributes:
-        contacts: Names of contacts; empty: all that are tracked.
-        lifted: Whether they carry nothing from now on; else they carry again.
-    """
-
-    contacts: tuple[str, ...] = ()
-    lifted: bool = True
-
-
-@dataclass(frozen=True)
-class LiftReply:
-    """Answer to `LiftContacts`: whether it is carried out, and why not."""
-
-    success: bool = True
-    message: str = ""
 
 
 class GravityCompensation(Component):

@@ -6,11 +6,13 @@ import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
-from solfer.components.declaration import Action, LiveParameter, Outcome, Service, TopicIn
 from solfer.components.move_joints import CmndReply, JointGoals, JointStateCmnd, MoveJoints, Reply
 from solfer.components.trajectories.check import StaleTrajectory
 from solfer.components.trajectories.follower import TrajectoryFollower
-from solfer.components.trajectories.messages import (
+from solfer.config import LIVE, NameOf, Record
+from solfer.errors import ComponentError, SolferError, UnknownName, described
+from solfer.interfaces.declaration import Action, LiveParameter, Outcome, Service, TopicIn
+from solfer.interfaces.trajectories import (
     FOLLOW,
     INVALID_GOAL,
     INVALID_JOINTS,
@@ -21,8 +23,6 @@ from solfer.components.trajectories.messages import (
     FollowResult,
     JointTrajectory,
 )
-from solfer.config import LIVE, NameOf, Record
-from solfer.errors import ComponentError, SolferError, UnknownName, described
 from solfer.numerics.ramp import Ramp
 from solfer.numerics.turns import whole_turns
 from solfer.recording.log import Logger

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from solfer.components.declaration import LiveParameter
 from solfer.config.tasks.original import OriginalTaskTags, parts_of_tuning
 from solfer.config.tasks.stack import StackRecord
+from solfer.interfaces.declaration import LiveParameter
 from solfer.tasks.building.build import ConfiguredTasks
 
 

@@ -3,8 +3,8 @@
 import logging
 from concurrent.futures import Future
 
-from solfer.components.declaration import Accepted, Service
 from solfer.errors import ComponentError, MiddlewareError
+from solfer.interfaces.declaration import Accepted, Service
 from solfer.navigation.course import Course
 from solfer.navigation.lookahead import LOOKAHEAD_FADE
 from solfer.throttle import Throttle

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.components.following.requests import REFERENCE_MESSAGES, GetReference, ReferenceReply
-from solfer.components.trajectories.messages import TRAJECTORY, JointTrajectory, TrajectoryPoint
 from solfer.config import read
 from solfer.config.tasks.references import ReferenceRecord, ReferencesRecord
 from solfer.errors import UnknownName
+from solfer.interfaces.task_references import REFERENCE_MESSAGES, GetReference, ReferenceReply
+from solfer.interfaces.trajectories import TRAJECTORY, JointTrajectory, TrajectoryPoint
 from solfer.navigation.course import COURSE_STALE_AGE, Course
 from solfer.references import ReferenceGenerator, build_reference, joints_of
 from solfer.transport import JointMessage, Middleware, Reader

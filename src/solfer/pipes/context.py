@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from solfer.components.port import Port
 from solfer.config import CalibrationRecord
 from solfer.config.records.pipes import FeedbackRecord, InterfaceRecord, PipeRecord
 from solfer.errors import PipeError
+from solfer.interfaces.port import Port
 from solfer.model import State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.feedback_pipe import MakeFilter, Reception

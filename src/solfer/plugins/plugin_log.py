@@ -5,9 +5,9 @@ from typing import cast
 
 import numpy as np
 
-from solfer.components.port import Port
 from solfer.config.kinds.point import POINT_MESSAGES
 from solfer.errors import ComponentError, SolferError, located
+from solfer.interfaces.port import Port
 from solfer.model import State
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from solfer.components.declaration import Action, Declaration, Service, TopicIn
 from solfer.errors import UnknownName
+from solfer.interfaces.declaration import Action, Declaration, Service, TopicIn
 from solfer.recording.model import REQUEST
 from solfer.transport.declared.fields import made, plain
 

@@ -12,11 +12,11 @@ import numpy as np
 from pydantic.fields import FieldInfo
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, LiveParameter, Service
 from solfer.config import Record
 from solfer.config.records.live import LiveField, Path, live_fields, revised, value_at
 from solfer.config.yaml.nodes import dotted
 from solfer.errors import ComponentError, Overtaken, SizeMismatch, SolferError, UnknownName, singles
+from solfer.interfaces.declaration import Accepted, LiveParameter, Service
 from solfer.transport.parameters import (
     GET_PARAMETERS,
     GETTING,

@@ -7,8 +7,8 @@ from time import monotonic_ns
 
 import numpy as np
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError
+from solfer.interfaces.declaration import Service
 from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.life.budget import BudgetRules, LeakyCounter
 from solfer.plugins.life.managed_plugin import ManagedPlugin

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from solfer.components.port import Port
 from solfer.errors import RecordingError
+from solfer.interfaces.port import Port
 from solfer.pipes import FeedbackPipe, StateFeedbackPipe
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.recording.kinds import JOINT_PARTS

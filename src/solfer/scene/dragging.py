@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solfer.components.following.requests import REFERENCE_MESSAGES
+from solfer.interfaces.task_references import REFERENCE_MESSAGES
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene.state import ScenePose, ShownReference
 from solfer.transport import Middleware, Writer

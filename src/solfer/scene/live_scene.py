@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from solfer.components.following.requests import TaskReferences, numbers_of
-from solfer.components.geometry import Pose
-from solfer.components.support_shaping.messages import SupportMargins
+from solfer.interfaces.geometry import Pose
+from solfer.interfaces.support_margins import SupportMargins
+from solfer.interfaces.task_references import TaskReferences, numbers_of
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.robot import Robot
 from solfer.scene.discovery import DISCOVERY_STALE_AGE, DiscoveredTopics

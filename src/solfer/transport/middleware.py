@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError
+from solfer.interfaces.declaration import Service
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import canonical

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from solfer.components.declaration import Accepted
 from solfer.errors import MiddlewareError, MissingDependency
+from solfer.interfaces.declaration import Accepted
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene import ContactForce, SceneState
 from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters

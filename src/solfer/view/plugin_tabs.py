@@ -9,7 +9,7 @@ from typing import Any
 
 from viser import GuiApi, GuiCheckboxHandle, GuiEvent, GuiHtmlHandle, GuiSliderHandle, GuiTabHandle, GuiTextHandle
 
-from solfer.components.declaration import Accepted
+from solfer.interfaces.declaration import Accepted
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields

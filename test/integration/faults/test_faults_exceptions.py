@@ -7,10 +7,10 @@ from support.faults.faults_plugin import AT_ONCE
 from support.integration.fault_layer import LARGEST_STEP, PLUGIN, FaultLayer, moving
 from support.plugins.plugin import configuration
 
-from solfer.components.declaration import Service
 from solfer.components.joint_states import JointStates
 from solfer.config import load
 from solfer.errors import ComponentError
+from solfer.interfaces.declaration import Service
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate, run
 from solfer.realtime.telemetry.statistics_memory import LoopCount

@@ -9,8 +9,8 @@ from support.integration.torque_robot import FRICTION, LEGGED, opened
 from support.integration.world import CONFIG, World
 from support.integration.xbot_world import XbotWorld
 
-from solfer.components.following.requests import SetReference
 from solfer.config import load
+from solfer.interfaces.task_references import SetReference
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules

@@ -9,7 +9,8 @@ import pytest
 
 from solfer import Robot
 from solfer.cli.skeletons.robot import RobotSkeleton
-from solfer.components.trajectories.messages import (
+from solfer.config import load
+from solfer.interfaces.trajectories import (
     FOLLOW,
     SUCCESSFUL,
     FollowFeedback,
@@ -19,7 +20,6 @@ from solfer.components.trajectories.messages import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.shared_memory.xbot_bridge import made
 
-from solfer.components.declaration import Service
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
+from solfer.interfaces.declaration import Service
 from solfer.middleware.bridge import Route
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware

@@ -17,8 +17,8 @@ import pytest
 from support.integration.xbot_system import until
 
 from solfer.cli.main import main
-from solfer.components.declaration import Service
 from solfer.errors import SolferError
+from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch

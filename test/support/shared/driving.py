@@ -5,10 +5,10 @@ from support.integration.world import CONFIG
 from support.shared.figure_5 import tree, write
 from support.shared.middlewares import BEGIN, BLEND, STEP, InLayer, InMemory
 
-from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
+from solfer.interfaces.geometry import Vector
 
 LISTED = ("odometry", "driver")
 """The plugins, in the order of their cycles."""

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solfer.components.declaration import Service
-from solfer.components.gravity_compensation import LiftContacts, LiftReply
+from solfer.interfaces.declaration import Service
+from solfer.interfaces.lift import LiftContacts, LiftReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport import BodyMessage, Inbox
 from solfer.transport.messages import FieldsMessage

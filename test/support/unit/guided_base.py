@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solfer.components.declaration import Service
-from solfer.components.following.requests import GetReference, ReferenceReply
+from solfer.interfaces.declaration import Service
+from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport import BodyMessage, Inbox
 from solfer.transport.messages import FieldsMessage

@@ -6,10 +6,10 @@ import numpy as np
 from support.unit.golden import lower_body, rolling_legs
 from support.walk.digest import Digest
 
-from solfer.components.declaration import TopicOut
 from solfer.components.ground_forces import GroundForces
 from solfer.components.odometry import Odometry
 from solfer.config import read
+from solfer.interfaces.declaration import TopicOut
 from solfer.model import History
 
 RATE = 100.0

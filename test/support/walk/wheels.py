@@ -7,13 +7,13 @@ from pathlib import Path
 from support.walk.changes import Change, each
 
 from solfer import Robot
-from solfer.components.following.requests import Vector
-from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
 from solfer.errors import ComponentError
+from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.task_references import Vector
 
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
 COMPONENT = "driving/driving/"

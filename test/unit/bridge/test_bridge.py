@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from support.unit.declarations import COUNT, CountGoal, CountingNode, counting_client
 
-from solfer.components.declaration import Service
 from solfer.config import load
 from solfer.errors import MiddlewareError
+from solfer.interfaces.declaration import Service
 from solfer.middleware.bridge import Bridge, BridgeSearch, Route, ServiceForward, routes
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport.declared import GoalStatus

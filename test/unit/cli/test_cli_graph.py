@@ -16,8 +16,8 @@ from solfer.cli.diagram.network import LOWER_LEVEL_END, SENSORS, Arrow, End, Kin
 from solfer.cli.main import main
 from solfer.cli.plugins import network_of
 from solfer.components import Component, Port, TopicIn, TopicOut
-from solfer.components.geometry import Header, Vector
 from solfer.errors import SolferErrors
+from solfer.interfaces.geometry import Header, Vector
 
 CENTAURO = Path(__file__).parents[3] / "config" / "centauro.yaml"
 FIGURE_5 = Path(__file__).parents[2] / "data" / "graph_shared.yaml"

@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 from support.unit.upper_body import upper_body
 
 from solfer import Robot
-from solfer.components.following.requests import GetReference, SetReference
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.config import read
 from solfer.errors import ComponentError, ConfigError, SolferErrors, UnknownName
+from solfer.interfaces.task_references import GetReference, SetReference
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 

@@ -10,13 +10,13 @@ import pinocchio as pin
 import pytest
 from support.allocations import check_that_it_keeps_no_memory
 
-from solfer.components.following.requests import GetReference, ReachGoal, SetReference
-from solfer.components.geometry import Pose, Vector
-from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.components.inverse_dynamics.component import SECOND_LEVEL
 from solfer.components.inverse_dynamics.problem import QP_ACCELERATION, QP_FORCE
 from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
+from solfer.interfaces.geometry import Pose, Vector
+from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.task_references import GetReference, ReachGoal, SetReference
 from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins import check_file
 from solfer.recording.log import Logger

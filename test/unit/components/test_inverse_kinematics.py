@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solfer import Robot
-from solfer.components.following.requests import GetReference, MovePoint, ReachGoal, SetReference
-from solfer.components.geometry import Pose, Turn, Vector
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.config import load, read
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.interfaces.geometry import Pose, Turn, Vector
+from solfer.interfaces.task_references import GetReference, MovePoint, ReachGoal, SetReference
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.numerics.planar_move import PlanarMove

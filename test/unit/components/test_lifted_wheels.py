@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 from support.unit.golden import lower_body
 
 from solfer import Robot
-from solfer.components.geometry import Vector
-from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
 from solfer.errors import ComponentError, UnknownName
+from solfer.interfaces.geometry import Vector
+from solfer.interfaces.lift import LiftContacts
 from solfer.points import SupportVertex
 from solfer.tasks.task import updated_in_order
 

@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 from support.unit.golden import golden, lower_body, rolling_legs
 
-from solfer.components.declaration import TopicOut
-from solfer.components.geometry import Header, Pose, Turn, Vector
 from solfer.components.odometry import Odometry
 from solfer.components.odometry.kalman_kernel import STATE_TILT
 from solfer.components.odometry.messages import SetBase, StampedUncertainPose, UncertainPose
 from solfer.components.odometry.tags import OdometryTags
 from solfer.errors import ComponentError, NotFinite
+from solfer.interfaces.declaration import TopicOut
+from solfer.interfaces.geometry import Header, Pose, Turn, Vector
 from solfer.numerics.base_chart import rotation_of
 
 RADIUS, RATE, SPEED = 0.078, 200.0, 0.3

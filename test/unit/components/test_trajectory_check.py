@@ -11,8 +11,8 @@ from solfer.components.trajectories.check import (
     StaleTrajectory,
     TrajectoryCheck,
 )
-from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryHeader, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.interfaces.trajectories import JointTolerance, JointTrajectory, TrajectoryHeader, TrajectoryPoint
 
 NAN = float("nan")
 CHECK = TrajectoryCheck(

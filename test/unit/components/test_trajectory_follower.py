@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.components.joint_states import JointStates, MoveJoints
-from solfer.components.trajectories.messages import (
+from solfer.interfaces.trajectories import (
     FOLLOW,
     GOAL_TOLERANCE_VIOLATED,
     INVALID_GOAL,

@@ -7,7 +7,7 @@ import pytest
 from support.unit.joint_pipes import make_robot
 
 from solfer.components.joint_states import JointStates, MoveJoints
-from solfer.components.trajectories.messages import (
+from solfer.interfaces.trajectories import (
     GOAL_TOLERANCE_VIOLATED,
     FollowGoal,
     JointTolerance,

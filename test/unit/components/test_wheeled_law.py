@@ -9,12 +9,12 @@ from support.allocations import check_that_it_keeps_no_memory
 from support.estimation import part
 
 from solfer import Robot
-from solfer.components.geometry import Vector
-from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
+from solfer.interfaces.geometry import Vector
+from solfer.interfaces.lift import LiftContacts
 
 
 @pytest.fixture

@@ -9,14 +9,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solfer import Robot
-from solfer.components.following.requests import GetReference
-from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.original.resteering import RESTEERING_MAXIMUM, Resteering
-from solfer.components.wheeled_motion.targets import LEAD, WheelsSupport
+from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
+from solfer.interfaces.geometry import Vector
+from solfer.interfaces.task_references import GetReference
+from solfer.interfaces.wheels import LEAD
 from solfer.numerics.solvers.damped_descent import DampedDescent
 
 RATE, PERIOD, LOWER = 200.0, 0.005, 30  # [Hz], [s], DoFs of the lower body and the base

@@ -8,8 +8,8 @@ from support.plugins import fleet
 from support.recording.sine import Follower
 from support.recording.turning import DRIVERS, FIRST, ROLL, driven
 
-from solfer.components.trajectories import messages
-from solfer.components.trajectories.messages import FollowGoal, JointTolerance, JointTrajectory, TrajectoryPoint
+from solfer.interfaces import trajectories as messages
+from solfer.interfaces.trajectories import FollowGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.transport.declared import GoalStatus
 from solfer.transport.declared.action_client import ActionClient

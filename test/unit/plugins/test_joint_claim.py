@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, dofs, make_robot, published
 
-from solfer.components.declaration import Service
 from solfer.errors import ClaimRefused
+from solfer.interfaces.declaration import Service
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import JointCommandPipe, PipeContext, factory
 from solfer.pipes.joint.calibration import Calibration

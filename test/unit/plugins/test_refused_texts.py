@@ -8,9 +8,9 @@ from support.plugins.several import Several
 from support.unit.joint_pipes import received
 
 from solfer.components import Component
-from solfer.components.declaration import Service
 from solfer.config import load
 from solfer.errors import SolferError
+from solfer.interfaces.declaration import Service
 from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.registry import load_class
 from solfer.plugins.generation.robot_groups import _two_sources

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from solfer.components.declaration import Service
 from solfer.errors import UnknownName
+from solfer.interfaces.declaration import Service
 from solfer.plugins.requests import RequestNotes
 from solfer.recording.model import REQUEST
 

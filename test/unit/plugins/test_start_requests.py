@@ -3,9 +3,9 @@
 import pytest
 from support.unit.joint_pipes import published
 
-from solfer.components.declaration import Service
 from solfer.config import TextRecord
 from solfer.errors import PipeError
+from solfer.interfaces.declaration import Service
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins.outputs.start_requests import REQUEST_PATIENCE, StartRequests, requests_of
 from solfer.transport import Inbox

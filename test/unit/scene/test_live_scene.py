@@ -8,9 +8,9 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from solfer import Robot
-from solfer.components.following.requests import TaskReferences
-from solfer.components.geometry import Pose, Turn, Vector
-from solfer.components.support_shaping.messages import SupportMargins
+from solfer.interfaces.geometry import Pose, Turn, Vector
+from solfer.interfaces.support_margins import SupportMargins
+from solfer.interfaces.task_references import TaskReferences
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.scene import LiveScene
 from solfer.scene.discovery import DISCOVERY_STALE_AGE

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 import pytest
 
-from solfer.components.declaration import Service
+from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.discovery import published_topics, services
 from solfer.middleware.shared_memory.health_reports import REPORT_SIZE, Reports

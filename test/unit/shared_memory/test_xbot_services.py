@@ -11,8 +11,8 @@ from support.recording.sine import tree
 from support.unit.shared_world import Scale, Scaled, SharedWorld, ask, scale
 
 from solfer.components import Service
-from solfer.components.declaration import Accepted
 from solfer.errors import ComponentError, MiddlewareError, ServiceUnavailable
+from solfer.interfaces.declaration import Accepted
 from solfer.middleware.shared_memory.rpc import channel as channel_module
 from solfer.plugins.generation.config_service import answer_at_once
 from solfer.transport import Inbox

@@ -5,10 +5,10 @@ from support.unit.declarations import Header, Twist, TwistStamped, Vector
 from support.unit.wires import MemoryWire, XbotWire
 
 from solfer.components import TopicIn, TopicOut
-from solfer.components.geometry import ForceAndTorque, StampedWrench
-from solfer.components.geometry import Header as Stamp
-from solfer.components.geometry import Vector as Coordinates
 from solfer.errors import ComponentError, MiddlewareError
+from solfer.interfaces.geometry import ForceAndTorque, StampedWrench
+from solfer.interfaces.geometry import Header as Stamp
+from solfer.interfaces.geometry import Vector as Coordinates
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
 from solfer.transport.declared.topics import STREAM_SILENCE

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from solfer.cli.columns import aligned
 from solfer.cli.params.callers import CALLER_PATIENCE, Caller
-from solfer.components.declaration import Accepted
 from solfer.config.records.live import saved
 from solfer.errors import ConfigError, MiddlewareError, SolferError, UnknownName
+from solfer.interfaces.declaration import Accepted
 from solfer.transport.parameters import (
     GET_PARAMETERS,
     GETTING,

@@ -10,10 +10,16 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Action, LiveParameter, Outcome, Service, TopicIn, TopicOut
 from solfer.components.following.generated import GeneratedPosture, require_speeds
 from solfer.components.following.quantity import quantity_of
-from solfer.components.following.requests import (
+from solfer.components.following.tags import FollowingTags, MotionRecord
+from solfer.components.following.target import WORLD, Target
+from solfer.config.records.live import is_live
+from solfer.config.tasks.references import ReferenceRecord
+from solfer.config.tasks.stack import TaskLevelsRecord, TaskRecord
+from solfer.errors import SizeMismatch, SolferError, UnknownName, raise_all
+from solfer.interfaces.declaration import Accepted, Action, LiveParameter, Outcome, Service, TopicIn, TopicOut
+from solfer.interfaces.task_references import (
     REFERENCE_MESSAGES,
     GetReference,
     MovePoint,
@@ -26,12 +32,6 @@ from solfer.components.following.requests import (
     numbers_of,
     pose_of,
 )
-from solfer.components.following.tags import FollowingTags, MotionRecord
-from solfer.components.following.target import WORLD, Target
-from solfer.config.records.live import is_live
-from solfer.config.tasks.references import ReferenceRecord
-from solfer.config.tasks.stack import TaskLevelsRecord, TaskRecord
-from solfer.errors import SizeMismatch, SolferError, UnknownName, raise_all
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import ReferenceFilter
 from solfer.points import Constant

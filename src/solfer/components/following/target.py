@@ -9,8 +9,8 @@ from solfer.components.following.generated import GeneratedReference
 from solfer.components.following.progress import Residual, TaskProgress
 from solfer.components.following.quantity import PoseNumbers
 from solfer.components.following.tags import MotionRecord
-from solfer.components.port import Port
 from solfer.errors import ComponentError, UnknownName
+from solfer.interfaces.port import Port
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFilter
 from solfer.points import Constant, LookAt

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import LiveParameter, TopicOut
 from solfer.components.diagnostics import Statuses
 from solfer.components.filter_tags import live_filter
-from solfer.components.geometry import ForceAndTorque, Header, StampedWrench, Vector
 from solfer.components.ground_forces.checks import ContactChecks
 from solfer.components.ground_forces.laws import ProjectedLaw, WeightedLaw
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.touch import Touch
-from solfer.components.port import Port
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
+from solfer.interfaces.declaration import LiveParameter, TopicOut
+from solfer.interfaces.geometry import ForceAndTorque, Header, StampedWrench, Vector
+from solfer.interfaces.port import Port
 from solfer.model.contacts import read_contacts
 from solfer.numerics.filters import LowPass
 from solfer.points.contact.contacts import Contact, make_contact

@@ -7,12 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from solfer.components.declaration import LiveParameter, Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.following.follower import ReferenceFollower, record_of
 from solfer.components.following.target import Target
 from solfer.components.gains import GAINS, configured_gains, live_gains
-from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
@@ -21,6 +19,8 @@ from solfer.components.inverse_dynamics.watch import DynamicsWatch
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
 from solfer.errors import ComponentError, ModelError, UnknownName
+from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
+from solfer.interfaces.lift import LiftContacts, LiftReply
 from solfer.numerics.acceleration_bounds import AccelerationBounds
 from solfer.numerics.planar_move import PlanarMove
 from solfer.points import LookAt

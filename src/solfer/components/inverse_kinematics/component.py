@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from solfer.components.declaration import LiveParameter
 from solfer.components.following.follower import ReferenceFollower
 from solfer.components.inverse_kinematics.deflection import Deflection
 from solfer.components.inverse_kinematics.obstacles import obstacles
@@ -12,6 +11,7 @@ from solfer.components.inverse_kinematics.soft_level import SoftLevel
 from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseKinematicsTags
 from solfer.components.live_tunings import live_tunings
 from solfer.errors import ComponentError, UnknownName
+from solfer.interfaces.declaration import LiveParameter
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
 from solfer.tasks import ReferenceIntegrator, Task

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, LiveParameter, Parameter, Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
@@ -25,6 +24,7 @@ from solfer.components.odometry.streams import Streams
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
+from solfer.interfaces.declaration import Accepted, LiveParameter, Parameter, Service, TopicIn, TopicOut
 from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.numerics.base_chart import BaseChart

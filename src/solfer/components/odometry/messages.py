@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solfer.components.geometry import Header, Pose, Turn, Vector
+from solfer.interfaces.geometry import Header, Pose, Turn, Vector
 
 ZEROS = (0.0,) * 36
 

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from solfer.components.declaration import LiveParameter, TopicIn, TopicOut
-from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.original import OriginalShaping
 from solfer.components.support_shaping.shaping import FootprintShaping
 from solfer.components.support_shaping.tags import SupportShapingTags
@@ -13,6 +11,8 @@ from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.component import LIMITS
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
 from solfer.errors import ComponentError
+from solfer.interfaces.declaration import LiveParameter, TopicIn, TopicOut
+from solfer.interfaces.support_margins import SupportMargins
 from solfer.robot import Robot
 
 STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)

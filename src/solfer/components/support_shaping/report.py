@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.support_shaping.governor import SupportGovernor
-from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.tags import SupportShapingTags
+from solfer.interfaces.support_margins import SupportMargins
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)

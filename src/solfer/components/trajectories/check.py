@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.interfaces.trajectories import JointTolerance, JointTrajectory, TrajectoryPoint
 from solfer.numerics.turns import whole_turns
 from solfer.numerics.via_points import ViaPoints
 

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.components.declaration import Outcome
 from solfer.components.trajectories.check import TrajectoryCheck
-from solfer.components.trajectories.messages import (
+from solfer.errors import ComponentError
+from solfer.interfaces.declaration import Outcome
+from solfer.interfaces.trajectories import (
     GOAL_TOLERANCE_VIOLATED,
     INVALID_GOAL,
     PATH_TOLERANCE_VIOLATED,
@@ -16,7 +17,6 @@ from solfer.components.trajectories.messages import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from solfer.errors import ComponentError
 from solfer.numerics.turns import whole_turns
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot

@@ -5,9 +5,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import LiveParameter, Service, TopicIn, TopicOut
-from solfer.components.following.requests import GetReference, ReferenceReply
-from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.live_tunings import live_tunings
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.inputs import ReferenceInputs
@@ -29,10 +26,14 @@ from solfer.components.wheeled_motion.tags import (
     SteeringRecord,
     WheeledMotionTags,
 )
-from solfer.components.wheeled_motion.targets import BASE_PORT, VERTICES_PORT, Targets, WheelsSupport
+from solfer.components.wheeled_motion.targets import Targets, WheelsSupport
 from solfer.components.wheeled_motion.tasks import DrivingTasks
 from solfer.components.wheeled_motion.wheels import DrivenWheels, moved_by
 from solfer.errors import ComponentError, UnknownName
+from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
+from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.task_references import GetReference, ReferenceReply
+from solfer.interfaces.wheels import BASE_PORT, VERTICES_PORT
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
 from solfer.tasks.stack import Stack

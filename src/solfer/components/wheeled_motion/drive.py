@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, follow
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import TARGETS_PATIENCE, check
 from solfer.errors import ComponentError, NotFinite
+from solfer.interfaces.geometry import Vector
 from solfer.numerics.planar_move import PlanarMove
 
 DRIVE_LATENESS = 0.1

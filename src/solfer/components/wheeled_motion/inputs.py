@@ -6,8 +6,9 @@ from solfer.components.wheeled_motion.drive import Drive
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.support.straight import StraightAhead
 from solfer.components.wheeled_motion.tags import DrivingTags
-from solfer.components.wheeled_motion.targets import BASE_PORT, TARGETS_PATIENCE, Targets
+from solfer.components.wheeled_motion.targets import TARGETS_PATIENCE, Targets
 from solfer.components.wheeled_motion.wheels import DrivenWheels
+from solfer.interfaces.wheels import BASE_PORT
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)

@@ -6,24 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.components.port import Port
 from solfer.components.wheeled_motion.pace.kernel import approach
 from solfer.components.wheeled_motion.points import heading_of
 from solfer.components.wheeled_motion.references import References
 from solfer.errors import ComponentError, NotFinite, SizeMismatch
+from solfer.interfaces.port import Port
+from solfer.interfaces.wheels import BASE_PORT, LEAD, VELOCITIES_PORT, VERTICES_PORT
 from solfer.numerics.planar_move import PlanarMove
 
 TARGETS_PATIENCE = 0.55
 """Time after the last velocity, or the last place of a stream, when what it drives begins to stop [s]."""
 
-LEAD = 0.5
-"""Time by whose way places are ahead of a motion that is to be followed without a lag [s]."""
-
 STREAM_JUMPS = (0.3, 0.5, 0.3)
 """Distances between two places of a stream from which on one is a mistake: of base, heading, vertices [m, rad, m]."""
-
-BASE_PORT, VERTICES_PORT, VELOCITIES_PORT = "base", "vertices", "vertex_velocities"
-"""Inputs of the component."""
 
 
 @dataclass(frozen=True)

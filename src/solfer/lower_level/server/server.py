@@ -5,8 +5,8 @@ import logging
 import math
 from collections.abc import Sequence
 
-from solfer.components.declaration import Service
 from solfer.errors import CommandRefused
+from solfer.interfaces.declaration import Service
 from solfer.lower_level.claims.refusals import concerns_claim
 from solfer.lower_level.lower_level import LowerLevel
 from solfer.lower_level.server.ration import largest_command, largest_request

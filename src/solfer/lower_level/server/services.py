@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from solfer.components.declaration import Service
 from solfer.config.yaml.folders import Folders
 from solfer.errors import Suspended
+from solfer.interfaces.declaration import Service
 from solfer.lower_level.claims.request import measured, requested
 from solfer.lower_level.gains.file import Gains, read_gains
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController

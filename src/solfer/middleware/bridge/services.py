@@ -7,8 +7,8 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass
 from typing import Any
 
-from solfer.components.declaration import Service
 from solfer.errors import SolferError
+from solfer.interfaces.declaration import Service
 from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, SolferError, UnknownName, described, raise_all
+from solfer.interfaces.declaration import Service
 from solfer.middleware.memory.faults import TIE, FaultsRecord, Line, Stalls, TopicFaultsRecord, fits
 from solfer.transport.messages import Message
 from solfer.transport.middleware import HealthReport, Submit

@@ -6,8 +6,8 @@ from concurrent.futures import Future
 from dataclasses import fields
 from typing import Any
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, UnknownName, described
+from solfer.interfaces.declaration import Service
 from solfer.middleware.memory.bus import Bus, SenderState, Topic
 from solfer.transport.backlog import Backlog
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Queue, Reader, Writer

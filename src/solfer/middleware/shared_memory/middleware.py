@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol, cast
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, UnknownName
+from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory.clock import MonotonicClock
 from solfer.middleware.shared_memory.discovery import Survey
 from solfer.middleware.shared_memory.health_reports import Reports

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.components.port import Port
+from solfer.interfaces.port import Port
 from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe, PointFormat
 from solfer.points import Handler, LinearPoint
 from solfer.points.contact.contacts import Contact

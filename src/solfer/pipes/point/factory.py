@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from solfer.components.port import Port
 from solfer.config.kinds.point import PointControllerRecord, PointFeedbackRecord
 from solfer.errors import PipeError, UnknownName
+from solfer.interfaces.port import Port
 from solfer.pipes.context import PipeContext, message_of
 from solfer.pipes.point.notation import PointNotation
 from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe, PointFormat

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.components.port import Port
 from solfer.errors import NotFinite, PipeError
+from solfer.interfaces.port import Port
 from solfer.numerics.kernels import finite
 from solfer.numerics.rotations import require_unit
 from solfer.pipes.command_pipe import CommandPipe

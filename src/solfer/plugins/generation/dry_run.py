@@ -7,7 +7,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from solfer.components.declaration import Declaration, Service
 from solfer.config import (
     CalibrationRecord,
     Configuration,
@@ -21,6 +20,7 @@ from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
 from solfer.config.records.sources import TextRecord
 from solfer.config.yaml.files import read_text
 from solfer.errors import MiddlewareError, SolferError, UnknownName
+from solfer.interfaces.declaration import Declaration, Service
 from solfer.model import Description, Kinematics, Semantics
 from solfer.model.urdf.cut import cut
 from solfer.plugins.generation.generator import Generator

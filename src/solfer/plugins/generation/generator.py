@@ -7,9 +7,9 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from solfer.components import Component
-from solfer.components.declaration import Declaration, Service
 from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
 from solfer.errors import ComponentError, PipeError, SolferError, located, raise_all, repeats, singles
+from solfer.interfaces.declaration import Declaration, Service
 from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, factory
 from solfer.pipes.dofs import joint_map
 from solfer.plugins.base_jumps import BaseJumps

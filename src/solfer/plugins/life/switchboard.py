@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, UnknownName
+from solfer.interfaces.declaration import Service
 from solfer.plugins.life.conflicts import find_conflicts
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.transport import Middleware

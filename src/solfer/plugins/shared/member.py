@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-from solfer.components.declaration import Service
+from solfer.interfaces.declaration import Service
 from solfer.plugins.shared.space import OthersReader, SharedSpace, SharedTopic, SpaceReader, SpaceWriter
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health

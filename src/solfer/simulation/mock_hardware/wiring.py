@@ -5,8 +5,8 @@ import logging
 from collections.abc import Callable, Collection, Container, Sequence
 from typing import Any
 
-from solfer.components.declaration import Service
 from solfer.errors import UnknownName
+from solfer.interfaces.declaration import Service
 from solfer.simulation.delay_line import DelayLine
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.throttle import Throttle

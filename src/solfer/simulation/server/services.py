@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from solfer.components.declaration import Service
 from solfer.errors import SimulationError
+from solfer.interfaces.declaration import Service
 from solfer.simulation.robot_body.placement import StartPlacement
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import Flag

@@ -4,8 +4,8 @@ import logging
 from dataclasses import replace
 from typing import Any
 
-from solfer.components.declaration import Action, Outcome, full_name
 from solfer.errors import SolferError, described
+from solfer.interfaces.declaration import Action, Outcome, full_name
 from solfer.throttle import Throttle
 from solfer.transport.declared.action_topics import ActionTopics
 from solfer.transport.declared.fields import value_of

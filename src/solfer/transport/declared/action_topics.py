@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from solfer.components.declaration import Action
+from solfer.interfaces.declaration import Action
 from solfer.transport.declared.fields import message_of
 from solfer.transport.declared.goals import GOAL_ID, STATUS, StatusEntry, StatusList, envelopes, interface_of
 from solfer.transport.middleware import Middleware

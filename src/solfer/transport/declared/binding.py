@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
-from solfer.components.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.errors import ComponentError, SolferError, UnknownName
+from solfer.interfaces.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.transport.declared.action_server import ActionServer
 from solfer.transport.declared.fields import exactly
 from solfer.transport.declared.topics import DeclaredIn, DeclaredOut, SoleSender

@@ -3,8 +3,8 @@
 import logging
 import math
 
-from solfer.components.declaration import TopicIn, TopicOut, full_name
 from solfer.errors import ComponentError, SolferError
+from solfer.interfaces.declaration import TopicIn, TopicOut, full_name
 from solfer.throttle import Throttle
 from solfer.transport.declared.fields import message_of, require_carried, value_of
 from solfer.transport.middleware import Middleware

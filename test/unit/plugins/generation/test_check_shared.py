@@ -10,9 +10,9 @@ from support.plugins.fleet import JOINTS, MOVING, SRDF, tree
 from support.unit.cart import URDF
 
 from solfer.components import Component, TopicOut
-from solfer.components.geometry import Header, Vector
 from solfer.config import load_shared
 from solfer.errors import ClaimRefused, SolferError, singles
+from solfer.interfaces.geometry import Header, Vector
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Registry, check_file
 from solfer.plugins.generation.dry_run import DryMiddleware

@@ -7,8 +7,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, SolferError, described, located
+from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory.memory.lock import remove
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from solfer.components.geometry import Header, Pose, Turn, Vector
+from solfer.interfaces.geometry import Header, Pose, Turn, Vector
 
 
 @dataclass(frozen=True)
