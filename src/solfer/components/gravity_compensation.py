@@ -14,7 +14,7 @@ from solfer.config.records.bounds import DURATION
 from solfer.dynamics import BIAS, CarryingTorques
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service
-from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.points import Handler, Point
 from solfer.points.contact.contact_constraint import ContactConstraint
 from solfer.robot import Robot

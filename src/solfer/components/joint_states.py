@@ -24,7 +24,7 @@ from solfer.interfaces.trajectories import (
     JointTrajectory,
 )
 from solfer.numerics.ramp import Ramp
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.recording.log import Logger
 from solfer.recording.model import JOINTS_KIND
 from solfer.robot import Robot

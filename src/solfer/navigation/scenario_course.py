@@ -6,7 +6,7 @@ from concurrent.futures import Future
 import numpy as np
 
 from solfer.errors import ComponentError, SolferError
-from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.navigation.course import Course, FollowedPace
 from solfer.navigation.lookahead import Lookahead
 from solfer.navigation.scenario_motion import ScenarioPositions, ScenarioVelocities

@@ -8,8 +8,8 @@ from concurrent.futures import Future
 import numpy as np
 
 from solfer.errors import SolferError
+from solfer.interfaces.support import BASE_PORT, LEAD, VERTICES_PORT
 from solfer.interfaces.task_references import GetReference, ReferenceReply
-from solfer.interfaces.wheels import BASE_PORT, LEAD, VERTICES_PORT
 from solfer.navigation.course import MeasuredPose
 from solfer.navigation.reference_course import GET, REFERENCE_PATIENCE
 from solfer.numerics.planar_move import PlanarMove

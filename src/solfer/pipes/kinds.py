@@ -6,8 +6,7 @@ from importlib import import_module
 from typing import Any
 
 from solfer.config.kinds.table import KINDS as RECORDS
-from solfer.config.records.pipes import KindRecords
-from solfer.config.records.spaces import HOMES
+from solfer.config.records.pipes import HOMES, KindRecords
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.context import PipeContext
 from solfer.pipes.feedback_pipe import FeedbackPipe

@@ -1,12 +1,15 @@
 """What is recorded of a plugin: its pipes, its States, times and counts, and what its component declares."""
 
+import json
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import cast
 
 import numpy as np
 
+from solfer.config import Configuration
 from solfer.config.kinds.point import POINT_MESSAGES
-from solfer.errors import ComponentError, SolferError, located
+from solfer.errors import ComponentError, SolferError, UnknownName, located
 from solfer.interfaces.port import Port
 from solfer.model import State
 from solfer.model.urdf.scalar_joints import BASE_DOFS
@@ -17,10 +20,12 @@ from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.plugin import Plugin
 from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
-from solfer.recording.log import Logger, LogSource, with_units
+from solfer.recording.log import Logger, LogSource, RunDocuments, with_units
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND
 from solfer.robot import Robot
+from solfer.transport import Middleware
 from solfer.transport.messages import BodyMessage, JointMessage, PointsMessage, VectorMessage, WrenchMessage
+from solfer.transport.middleware import SEED
 
 NANOSECOND = 1e-9
 """Unit of the times of stages [s]."""
@@ -234,3 +239,14 @@ def _slides(robot: Robot, name: str) -> bool:
     """Return whether a joint slides; one that the Robot does not have counts as turning."""
     joint = robot.description.joints.get(name)
     return name in BASE_DOFS[:3] if joint is None else joint.type == "prismatic"
+
+
+def documents_of(configuration: Configuration, robot: Robot, middleware: Middleware) -> RunDocuments:
+    """Return a plugin's configuration, the description of its robot, its tags, and the seed of a simulated robot."""
+    files = {"configuration.yaml": configuration.text(), "robot.urdf": robot.description.text}
+    if robot.semantics.text:
+        files["robot.srdf"] = robot.semantics.text
+    texts = {f"{configuration.module.name}/tags": json.dumps(configuration.own_tags())}
+    with suppress(UnknownName):  # a robot of hardware has none
+        texts["seed"] = str(middleware.parameter(SEED))
+    return RunDocuments(files, texts)

@@ -8,7 +8,7 @@ import numpy as np
 
 from solfer.config import Configuration
 from solfer.errors import RecordingError, SolferError
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.pipes.joint.pipes import JointCommandPipe
 from solfer.plugins.generation.dry_run import known_without_robot
 from solfer.plugins.generation.generator import Generator

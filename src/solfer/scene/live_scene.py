@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solfer.interfaces.geometry import Pose
-from solfer.interfaces.support_margins import SupportMargins
+from solfer.interfaces.support import SupportMargins
 from solfer.interfaces.task_references import TaskReferences, numbers_of
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.robot import Robot

@@ -1,10 +1,10 @@
 """Messages that are older than what is known already, in shared memory under the executor; on a virtual clock."""
 
 import numpy as np
+from support.bus_clock import BusClock
 from support.integration.fault_layer import PLUGIN, FaultLayer, Relay, relayed
 from support.integration.xbot_world import XbotWorld
 
-from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.transport import JointMessage, MessageStatus

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.bus_clock import BusClock
 from support.integration.world import CONFIG, STEP
 from support.integration.xbot_system import WAIT, until
 from support.integration.xbot_world import XbotWorld
 from support.processes import SOURCES
 
 from solfer.components.move_joints import MoveJoints, Reply
-from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY
 from solfer.plugins import PluginState

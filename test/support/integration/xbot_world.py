@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
+from support.bus_clock import BusClock
 from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.config import load
 from solfer.middleware.memory import FaultsRecord
-from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer

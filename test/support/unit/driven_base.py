@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from solfer.interfaces.declaration import Service
-from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport import BodyMessage, Inbox
 from solfer.transport.messages import FieldsMessage

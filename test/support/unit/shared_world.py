@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
+from support.bus_clock import BusClock
+
 from solfer.components import Service
 from solfer.errors import ComponentError
 from solfer.middleware.memory import Bus
-from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.transport import Inbox
 

@@ -4,8 +4,9 @@ import itertools
 import tempfile
 from pathlib import Path
 
+from support.bus_clock import BusClock
+
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 
 STEP = 0.005

@@ -12,7 +12,7 @@ from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
 from solfer.errors import ComponentError
-from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.support import LiftContacts
 from solfer.interfaces.task_references import Vector
 
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"

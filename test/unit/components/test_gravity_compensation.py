@@ -8,7 +8,7 @@ from support.allocations import check_that_it_keeps_no_memory
 
 from solfer.components.gravity_compensation import GainsOfGroup, GravityCompensation, GravityTags
 from solfer.errors import ComponentError, UnknownName
-from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.support import LiftContacts
 from solfer.model import State
 from solfer.robot import Robot
 

@@ -15,7 +15,7 @@ from solfer.components.inverse_dynamics.component import SECOND_LEVEL
 from solfer.components.inverse_dynamics.problem import QP_ACCELERATION, QP_FORCE
 from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
 from solfer.interfaces.geometry import Pose, Vector
-from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.support import LiftContacts
 from solfer.interfaces.task_references import GetReference, ReachGoal, SetReference
 from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins import check_file

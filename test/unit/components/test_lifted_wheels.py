@@ -13,7 +13,7 @@ from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.geometry import Vector
-from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.support import LiftContacts
 from solfer.points import SupportVertex
 from solfer.tasks.task import updated_in_order
 

@@ -14,7 +14,7 @@ from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
 from solfer.interfaces.geometry import Vector
-from solfer.interfaces.lift import LiftContacts
+from solfer.interfaces.support import LiftContacts
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
 from solfer.interfaces.geometry import Vector
+from solfer.interfaces.support import LEAD
 from solfer.interfaces.task_references import GetReference
-from solfer.interfaces.wheels import LEAD
 from solfer.numerics.solvers.damped_descent import DampedDescent
 
 RATE, PERIOD, LOWER = 200.0, 0.005, 30  # [Hz], [s], DoFs of the lower body and the base

@@ -9,7 +9,7 @@ import yaml
 from solfer.config import load
 from solfer.config.kinds.table import KINDS
 from solfer.config.records.middlewares import MIDDLEWARES
-from solfer.config.records.spaces import HOMES
+from solfer.config.records.pipes import HOMES
 from solfer.pipes.kinds import PIPE_KINDS as PIPES
 
 PACKAGE = Path(__file__).resolve().parents[3] / "src" / "solfer"

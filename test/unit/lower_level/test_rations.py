@@ -12,7 +12,7 @@ from solfer.errors import CommandRefused, MiddlewareError
 from solfer.lower_level import LowerLevelServer
 from solfer.lower_level.claims.claims import BARRED
 from solfer.lower_level.records import RationRecord
-from solfer.lower_level.server.ration import largest_command, largest_request
+from solfer.lower_level.server.server import largest_command, largest_request
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.throttle import KEYS, OTHER_KEYS, Throttle
 from solfer.transport.backlog import SENDERS, Backlog

@@ -7,7 +7,7 @@ from support.unit.cart import DT, GAINS, GROUPS, RECORDS, URDF, bend, claim, mak
 from solfer.errors import SolferError
 from solfer.lower_level import LowerLevelRecord, LowerLevelServer, build_lower_level
 from solfer.lower_level.records import RationRecord
-from solfer.lower_level.server.ration import largest_request
+from solfer.lower_level.server.server import largest_request
 from solfer.lower_level.server.services import lower_level_services
 from solfer.model import Description, Kinematics
 from solfer.transport.health import Health

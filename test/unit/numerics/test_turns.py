@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.numerics.kernels import shorten
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 
 TURNS = np.array([math.tau, 0.0])
 

@@ -11,7 +11,7 @@ from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from solfer.cli.main import main
-from solfer.cli.recordings.limits import limits_of
+from solfer.cli.recordings.actions import limits_of
 from solfer.cli.recordings.progress import progress
 from solfer.model import Description
 from solfer.recording.kinds import NAMED

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from solfer import Robot
 from solfer.interfaces.geometry import Pose, Turn, Vector
-from solfer.interfaces.support_margins import SupportMargins
+from solfer.interfaces.support import SupportMargins
 from solfer.interfaces.task_references import TaskReferences
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.scene import LiveScene

@@ -8,7 +8,8 @@ import numpy as np
 
 from solfer.cli.columns import aligned
 from solfer.cli.recordings.progress import progress
-from solfer.errors import RecordingError
+from solfer.errors import RecordingError, SolferError
+from solfer.model.urdf.description import Description
 from solfer.recording.model import Channel, Recording
 from solfer.recording.reader import read
 from solfer.recording.requests import grouped
@@ -110,3 +111,28 @@ def _size(count: float) -> str:
             return f"{count:.3g} {unit}"
         count /= 1000
     return f"{count:.3g} GB"
+
+
+URDF = "robot.urdf"
+"""Name of the attachment, behind that of the plugin."""
+
+
+def limits_of(recording: Recording, plugin: str) -> dict[str, tuple[float, float]]:
+    """Return the least and the largest position of each joint of a plugin's attached URDF; none without one.
+
+    Raises:
+        ModelError: The attachment is no URDF.
+    """
+    name = f"{plugin}/{URDF}"
+    if name not in recording.attachments:
+        return {}
+    try:
+        description = Description.from_text(recording.attachments[name].decode(errors="replace"), name)
+    except SolferError as error:
+        raise error.at(name) from None
+    joints = description.moving_joints
+    return {
+        joint.name: (joint.lower, joint.upper)
+        for joint in joints
+        if joint.lower is not None and joint.upper is not None
+    }

@@ -20,7 +20,7 @@ from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
 from solfer.errors import ComponentError, ModelError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
-from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.numerics.acceleration_bounds import AccelerationBounds
 from solfer.numerics.planar_move import PlanarMove
 from solfer.points import LookAt

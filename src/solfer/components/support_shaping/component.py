@@ -12,7 +12,7 @@ from solfer.components.wheeled_motion.component import LIMITS
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
 from solfer.errors import ComponentError
 from solfer.interfaces.declaration import LiveParameter, TopicIn, TopicOut
-from solfer.interfaces.support_margins import SupportMargins
+from solfer.interfaces.support import SupportMargins
 from solfer.robot import Robot
 
 STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)

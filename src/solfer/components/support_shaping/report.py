@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.components.support_shaping.governor import SupportGovernor
 from solfer.components.support_shaping.tags import SupportShapingTags
-from solfer.interfaces.support_margins import SupportMargins
+from solfer.interfaces.support import SupportMargins
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)

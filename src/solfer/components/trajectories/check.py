@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.interfaces.trajectories import JointTolerance, JointTrajectory, TrajectoryPoint
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.numerics.via_points import ViaPoints
 
 TRAJECTORY_POINTS = 1000

@@ -17,7 +17,7 @@ from solfer.interfaces.trajectories import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot
 

@@ -31,9 +31,8 @@ from solfer.components.wheeled_motion.tasks import DrivingTasks
 from solfer.components.wheeled_motion.wheels import DrivenWheels, moved_by
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
-from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.support import BASE_PORT, VERTICES_PORT, LiftContacts, LiftReply
 from solfer.interfaces.task_references import GetReference, ReferenceReply
-from solfer.interfaces.wheels import BASE_PORT, VERTICES_PORT
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
 from solfer.tasks.stack import Stack

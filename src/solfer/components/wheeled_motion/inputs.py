@@ -8,7 +8,7 @@ from solfer.components.wheeled_motion.support.straight import StraightAhead
 from solfer.components.wheeled_motion.tags import DrivingTags
 from solfer.components.wheeled_motion.targets import TARGETS_PATIENCE, Targets
 from solfer.components.wheeled_motion.wheels import DrivenWheels
-from solfer.interfaces.wheels import BASE_PORT
+from solfer.interfaces.support import BASE_PORT
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)

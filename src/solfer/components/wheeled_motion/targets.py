@@ -11,7 +11,7 @@ from solfer.components.wheeled_motion.points import heading_of
 from solfer.components.wheeled_motion.references import References
 from solfer.errors import ComponentError, NotFinite, SizeMismatch
 from solfer.interfaces.port import Port
-from solfer.interfaces.wheels import BASE_PORT, LEAD, VELOCITIES_PORT, VERTICES_PORT
+from solfer.interfaces.support import BASE_PORT, LEAD, VELOCITIES_PORT, VERTICES_PORT
 from solfer.numerics.planar_move import PlanarMove
 
 TARGETS_PATIENCE = 0.55

@@ -3,8 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, KindRecords, PipeRecord
-from solfer.config.records.spaces import HOMES
+from solfer.config.records.pipes import HOMES, ControllerRecord, FeedbackRecord, KindRecords, PipeRecord
 
 KINDS: dict[str, KindRecords] = {
     space: import_module(f"solfer.config.kinds.{home}").RECORDS for space, home in HOMES.items()

@@ -5,7 +5,7 @@ A record contains the generic part of a pipe with the middleware's part laid ove
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -18,7 +18,21 @@ from solfer.config.records.conventions import (
 )
 from solfer.config.records.record import Record
 from solfer.config.records.robot_names import NameOf
-from solfer.config.records.spaces import Space
+
+HOMES = {
+    "JOINT": "joint",
+    "OPERATIONAL": "body",
+    "POINT": "point",
+    "POINTS": "point",
+    "CONTACT": "contact",
+    "CONTACTS": "contact",
+}
+"""Home of each kind: its records are in `solfer.config.kinds.<home>`, its pipes are made by `solfer.pipes.<home>`."""
+
+if TYPE_CHECKING:
+    Space = str
+else:
+    Space = Literal[tuple(HOMES)]
 
 CONTROLLER_ALIASES = {
     "custom_controller/ActuatorPositionControllerClasses": "impedance",

@@ -14,7 +14,7 @@ from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.lower_level.laws.command_check import CommandCheck
 from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.transport.messages import JOINT_FIELDS, JointMessage
 
 CONTROLLER_TIMEOUT = 0.5  # [s]

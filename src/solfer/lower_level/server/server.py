@@ -3,20 +3,20 @@
 import dataclasses
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from solfer.errors import CommandRefused
 from solfer.interfaces.declaration import Service
 from solfer.lower_level.claims.refusals import concerns_claim
+from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
-from solfer.lower_level.server.ration import largest_command, largest_request
 from solfer.lower_level.server.services import controller_services, lower_level_services
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Queue
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
 from solfer.transport.lower_level import ALL_OWNERS, LOWER_LEVEL, REFUSALS_TOPIC
-from solfer.transport.messages import REFUSALS, JointMessage, RefusalMessage
+from solfer.transport.messages import JOINT_FIELDS, REFUSALS, JointMessage, RefusalMessage
 from solfer.transport.middleware import Middleware
 
 REFUSALS_PERIOD = 0.02
@@ -127,3 +127,26 @@ class LowerLevelServer:
                 stamp=now,
             )
         )
+
+
+LENGTH_BYTES = 4
+NUMBER_BYTES = 8  # bytes of a length and of a number in a message
+HEADER_BYTES = 1024  # bytes for everything but joints, such as the name of a frame
+NAMES_BYTES = 4096  # bytes for the names of an owner, of controllers, or of a file
+AMPLE = 2  # names of the hardware may be longer than those of the model
+
+
+def largest_command(controller: LowerLevelController) -> int:
+    """Compute the bytes of a command for all joints of a controller, with room to spare."""
+    fields = len(JOINT_FIELDS) * (LENGTH_BYTES + NUMBER_BYTES * len(controller.joints))
+    return AMPLE * (_bytes(controller.joints) + fields) + HEADER_BYTES
+
+
+def largest_request(lower_level: LowerLevel) -> int:
+    """Compute the bytes of a request that names all joints, with room to spare."""
+    joints = [controller.joints for controller in lower_level.controllers.values()]
+    return AMPLE * sum(_bytes(names) + NUMBER_BYTES * len(names) for names in joints) + NAMES_BYTES
+
+
+def _bytes(names: Iterable[str]) -> int:
+    return sum(LENGTH_BYTES + len(name.encode()) for name in names)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.robot import Robot
 
 

@@ -15,7 +15,6 @@ from solfer.pipes.dofs import joint_map
 from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.generation.config_service import answer_at_once, configuration_service
-from solfer.plugins.generation.documents import documents_of
 from solfer.plugins.generation.runners import start_line
 from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.joint_claim import JointClaim
@@ -27,6 +26,7 @@ from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests, requests_of
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin, PluginParts
+from solfer.plugins.plugin_log import documents_of
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.tuning import Tuning
 from solfer.robot import Robot, build

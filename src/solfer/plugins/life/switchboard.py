@@ -1,13 +1,14 @@
 """Starts, stops and aborts the plugins of a loop: checked first, then done at one cycle boundary, all or nothing."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
 
-from solfer.errors import MiddlewareError, UnknownName
+from solfer.errors import ClaimRefused, MiddlewareError, UnknownName
 from solfer.interfaces.declaration import Service
-from solfer.plugins.life.conflicts import find_conflicts
 from solfer.plugins.life.managed_plugin import ManagedPlugin
+from solfer.plugins.outputs.outputs import Claim
 from solfer.transport import Middleware
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import SWITCH, SWITCH_ONE, TRIGGER, Flag, NoFields, Submit, SwitchRequest
@@ -146,3 +147,21 @@ def _abort(plugin: ManagedPlugin, _: NoFields) -> None:
     if not plugin.active and plugin.state is not PluginState.STOPPING:
         raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.explanation}", expected="a plugin that runs")
     plugin.abort("by service")
+
+
+def find_conflicts(claims: Iterable[tuple[str, Set[Claim], str]], expected: str) -> Iterator[ClaimRefused]:
+    """Yield an error for each two plugins that command the same number of a joint.
+
+    Args:
+        claims: Name of each plugin, what it commands, and its place in a file, if it has one.
+        expected: What the user can do about it.
+    """
+    for (one, first, _), (other, second, where) in combinations(claims, 2):
+        common = first & second
+        if common:
+            controller, field, joint = min(common)
+            yield ClaimRefused(
+                f"'{one}' and '{other}' both command the {field} of joint '{joint}' ({len(common)} numbers in common)",
+                where=where or f"controller '{controller}'",
+                expected=expected,
+            )

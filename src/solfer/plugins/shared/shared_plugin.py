@@ -13,7 +13,7 @@ from solfer.plugins.generation.generator import Generator, log_start
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.life.budget import BudgetRules
-from solfer.plugins.life.conflicts import find_conflicts
+from solfer.plugins.life.switchboard import find_conflicts
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.shared.ends import check_ends, publications
 from solfer.plugins.shared.member import SpaceMember

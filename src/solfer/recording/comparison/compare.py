@@ -7,10 +7,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from solfer.errors import RecordingError
-from solfer.numerics.turns import whole_turns
-from solfer.recording.comparison.alignment import shift_of
+from solfer.numerics.rotations import whole_turns
 from solfer.recording.comparison.fit import BLOCK, DELAY_INDEX, GAIN_INDEX, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
-from solfer.recording.comparison.motion import JointMotion, Samples, measured_joints, sampled
+from solfer.recording.comparison.motion import JointMotion, Samples, measured_joints, sampled, shift_of
 from solfer.recording.comparison.verdict import SHAPE, Difference, JointVerdict, excess, judged, thresholds
 from solfer.recording.model import Recording
 

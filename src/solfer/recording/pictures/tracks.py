@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.numerics.turns import whole_turns
+from solfer.numerics.rotations import whole_turns
 from solfer.recording.comparison.motion import continuous_joints
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
 

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _figures(recording: "Recording", options: argparse.Namespace) -> "list[tuple[str, Figure]]":
-    from solfer.cli.recordings.limits import limits_of
+    from solfer.cli.recordings.actions import limits_of
     from solfer.errors import RecordingError
     from solfer.recording.pictures.columns_page import columns_page
     from solfer.recording.pictures.plugin_page import plugin_page

@@ -12,7 +12,7 @@ from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.support.weight import WeightShift
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.errors import ComponentError, UnknownName
-from solfer.interfaces.lift import LiftContacts, LiftReply
+from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.points.contact.contacts import Contact
 
 CARRYING = 3

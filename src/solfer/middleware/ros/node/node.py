@@ -1,5 +1,7 @@
 """The rospy node of a process: its name, its start, and its end."""
 
+import copy
+import io
 import logging
 import signal
 import socket
@@ -15,7 +17,6 @@ from solfer.errors import ConfigError, MiddlewareError, SolferError
 from solfer.middleware.ros.lockstep.client import followers
 from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.clock import make_clock
-from solfer.middleware.ros.node.logs import connect_logs
 from solfer.middleware.ros.node.master import CALL_TIMEOUT, knows, refuse_twin, require_master
 from solfer.middleware.ros.node.master_watch import MasterWatch
 from solfer.middleware.ros.node.waiting import ShutdownRequested
@@ -148,3 +149,25 @@ def run_main(main: Callable[[list[str]], int]) -> None:
         sys.stdout.flush()
         print(f"error: {error}", file=sys.stderr)
     sys.exit(code)
+
+
+class OneLine(logging.Handler):
+    """Passes records to rospy's handlers, each message on one line."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Pass a record on."""
+        flat = copy.copy(record)
+        flat.msg, flat.args = "; ".join(line.strip() for line in record.getMessage().splitlines()), None
+        for handler in logging.getLogger("rosout").handlers:
+            handler.handle(flat)
+
+
+def connect_logs() -> None:
+    """Send solfer's records to the terminal and to /rosout; rospy's root logger writes them into the log file."""
+    # Under roslaunch the output is a pipe; without this, messages come out when its buffer is full.
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a notebook or a test may have replaced it
+        sys.stdout.reconfigure(line_buffering=True)
+    ours = logging.getLogger("solfer")
+    if ours.level == logging.NOTSET:
+        ours.setLevel(logging.INFO)
+    ours.handlers[:] = [OneLine()]

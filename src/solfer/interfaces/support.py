@@ -1,6 +1,33 @@
-"""What the component publishes of the support polygon."""
+"""What components that stand on contacts share: lifts, margins of the support polygon, and ports of wheels."""
 
 from dataclasses import dataclass
+
+BASE_PORT, VERTICES_PORT, VELOCITIES_PORT = "base", "vertices", "vertex_velocities"
+"""Inputs of the component."""
+
+LEAD = 0.5
+"""Time that places are ahead of a motion which is to be followed without a lag [s]."""
+
+
+@dataclass(frozen=True)
+class LiftContacts:
+    """Which contacts carry the robot.
+
+    Attributes:
+        contacts: Names of contacts; empty: all that are tracked.
+        lifted: Whether they carry nothing from now on; else they carry again.
+    """
+
+    contacts: tuple[str, ...] = ()
+    lifted: bool = True
+
+
+@dataclass(frozen=True)
+class LiftReply:
+    """Answer to `LiftContacts`: whether it is carried out, and why not."""
+
+    success: bool = True
+    message: str = ""
 
 
 @dataclass(frozen=True)
