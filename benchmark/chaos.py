@@ -40,6 +40,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from form import Figures, parser_of
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY / "test"))
 
@@ -56,13 +58,6 @@ from solfer.supervision import supervise  # noqa: E402
 SYSTEMS: dict[str, dict[str, Callable[[Path], System]]] = {
     "fig4": {"ros": ros_figure_4, "rt": rt_figure_4},
     "fig5": {"ros": ros_figure_5, "rt": rt_figure_5},
-}
-HEADINGS = {
-    "wheel": "wheel [rad/s]",
-    "excess": "excess [rad/s]",
-    "away": "joint [rad]",
-    "swing": "swing [rad]",
-    "speed": "speed [rad/s]",
 }
 
 
@@ -152,12 +147,11 @@ class Table:
         self._rows[system, kind, victim] = trials + 1, failures + bool(verdict.complaints), worst
         self.failures += bool(verdict.complaints)
 
-    def __str__(self) -> str:
-        lines = [("system", "fault", "victim", "trials", *HEADINGS.values(), "failures")]
+    def show(self, figures: Figures) -> None:
+        """Print a row of each."""
         for (system, kind, victim), (trials, failures, worst) in sorted(self._rows.items()):
-            figures = (f"{getattr(worst, name):.3f}" for name in FIGURES)
-            lines.append((system, kind, victim, str(trials), *figures, str(failures)))
-        return aligned(lines, 3)
+            numbers = {name: float(getattr(worst, name)) for name in FIGURES}
+            figures.row(f"{system}: {kind}, {victim}", trials=trials, **numbers, failures=failures)
 
 
 def log(text: str) -> None:
@@ -182,10 +176,9 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
                 for complaint in verdict.complaints:
                     log(f"    {complaint}")
                 if verdict.complaints:
-                    print(
+                    log(
                         f"failed: --scheme {options.scheme} --system {name} --trials 1 --seed {seed}  ({what}): "
-                        f"{verdict.complaints[0]}",
-                        flush=True,
+                        f"{verdict.complaints[0]}"
                     )
     return table
 
@@ -193,13 +186,8 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
 MINUTE = 60.0
 """Time for which a robot is driven in a trial with `--alarms` [s]."""
 
-SENSOR_HEADINGS = {
-    "joint": "joint [limit]",
-    "base": "base [m/s]",
-    "turn": "turn [rad/s]",
-    "wheel": "wheel [rad/s]",
-    "tilt": "tilt [rad]",
-}
+SENSOR_FIGURES = ("joint", "base", "turn", "wheel", "tilt")
+"""Largest speeds: of a joint [its limit], the base [m/s], its heading [rad/s], a wheel [rad/s]; and tilt [rad]."""
 
 
 def run_sensors(options: argparse.Namespace) -> int:
@@ -213,7 +201,7 @@ def run_sensors(options: argparse.Namespace) -> int:
         seed = options.seed + number
         trial = drawn(seed)
         outcome = judge(trial, trial.run())
-        figures = [getattr(outcome, name) for name in SENSOR_HEADINGS]
+        figures = [getattr(outcome, name) for name in SENSOR_FIGURES]
         rows[trial.fault] = [max(pair) for pair in zip(rows.get(trial.fault, figures), figures, strict=True)]
         count = trials.setdefault(trial.fault, [0, 0])
         count[0] += 1
@@ -224,12 +212,12 @@ def run_sensors(options: argparse.Namespace) -> int:
         verdict = f"FAILED: {'; '.join(outcome.complaints)}" if outcome.complaints else "good"
         log(f"{number + 1}/{options.trials} seed {seed}: {what}: {verdict} ({named}; {left:.0f} s left)")
         if outcome.complaints:
-            print(f"failed: --sensors --trials 1 --seed {seed}  ({what}): {outcome.complaints[0]}", flush=True)
-    lines = [("fault", "trials", *SENSOR_HEADINGS.values(), "failures")]
+            log(f"failed: --sensors --trials 1 --seed {seed}  ({what}): {outcome.complaints[0]}")
+    table = Figures(options.json)
     for fault, figures in sorted(rows.items()):
         count, failures = trials[fault]
-        lines.append((fault, str(count), *(f"{figure:.3f}" for figure in figures), str(failures)))
-    print(aligned(lines, 1))
+        numbers = dict(zip(SENSOR_FIGURES, figures, strict=True))
+        table.row(fault, trials=count, **numbers, failures=failures)
     return 1 if any(failures for _, failures in trials.values()) else 0
 
 
@@ -237,7 +225,7 @@ def run_sizes(options: argparse.Namespace) -> int:
     """Find the smallest size of each fault that is named soon, and run a trial below it; return the exit code."""
     from breaking.sensors import SIZES, Messages, SensorTrial, judge
 
-    lines = [("fault", "named from", "in the mean", *SENSOR_HEADINGS.values(), "complaints", "reason")]
+    table = Figures(options.json)
     failures = 0
     with contextlib.closing(Messages("turns")) as messages:
         for fault, (_, _, unit) in SIZES.items():
@@ -249,11 +237,9 @@ def run_sizes(options: argparse.Namespace) -> int:
             trial = SensorTrial("turns", fault, seed, below)
             outcome = judge(trial, trial.run())
             failures += bool(outcome.complaints)
-            figures = (f"{getattr(outcome, name):.3f}" for name in SENSOR_HEADINGS)
-            what = "; ".join(outcome.complaints)
-            lines.append((fault, f"{size:.3g} {unit}", f"{mean:.3g} {unit}", *figures, what or "none", reason))
-            log("  ".join(lines[-1]))
-    print(aligned(lines, 1))
+            numbers = {name: float(getattr(outcome, name)) for name in SENSOR_FIGURES}
+            texts = {"complaints": "; ".join(outcome.complaints) or "none", "reason": reason}
+            table.row(f"{fault} [{unit}]", named_from=size, mean=mean, **numbers, **texts)
     return 1 if failures else 0
 
 
@@ -268,21 +254,9 @@ def run_alarms(options: argparse.Namespace) -> int:
         failures += bool(alarms)
         log(f"{number + 1}/{options.trials} seed {seed}: {len(alarms)} alarms")
         for time_of_alarm, text in alarms:
-            print(f"failed: --alarms --trials 1 --seed {seed}: at {time_of_alarm:.2f} s {text}", flush=True)
-    print(f"{options.trials} minutes, {failures} of them with a false alarm")
+            log(f"failed: --alarms --trials 1 --seed {seed}: at {time_of_alarm:.2f} s {text}")
+    Figures(options.json).row("sound sensors", minutes=options.trials, false_alarms=failures)
     return 1 if failures else 0
-
-
-def aligned(lines: list[tuple[str, ...]], left: int) -> str:
-    """Align the columns of a table, the first `left` of them to the left."""
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            word.ljust(width) if place < left else word.rjust(width)
-            for place, (word, width) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in lines
-    )
 
 
 def interrupt(number: int, frame: object) -> None:
@@ -292,7 +266,7 @@ def interrupt(number: int, frame: object) -> None:
 
 def main() -> int:
     """Run all trials and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--trials", type=int, default=20, help="number of trials of each system (default: 20)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first trial; the next one has the next number")
     parser.add_argument("--scheme", choices=SYSTEMS, default="fig4", help="figure of the paper (default: fig4)")
@@ -319,7 +293,7 @@ def main() -> int:
             table = run(options, folder)
         except KeyboardInterrupt:
             return 130
-    print(table)
+    table.show(Figures(options.json))
     return 1 if table.failures else 0
 
 

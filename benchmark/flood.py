@@ -9,7 +9,6 @@ Prints how much simulated time passes in a second (one, on a machine that has no
 that the loop takes for a simulated millisecond, and that of the simulator's other threads in a second.
 """
 
-import argparse
 import math
 import multiprocessing
 import os
@@ -21,6 +20,7 @@ from pathlib import Path
 
 import rosgraph
 import rospy
+from form import Figures, parser_of
 from sensor_msgs.msg import JointState
 
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
@@ -105,10 +105,11 @@ def measured(process: int, duration: float) -> tuple[float, float, float]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--duration", type=float, default=DURATION, help="of each flood [s]")
-    duration = parser.parse_args().duration
-    print(f"{'flood':24} {'simulated [s/s]':>16} {'loop [ms/ms]':>16} {'others [s/s]':>16}")
+    options = parser.parse_args()
+    duration = options.duration
+    figures = Figures(options.json)
     context, workers = multiprocessing.get_context("fork"), {}
     gates = {name: context.Event() for name in FLOODS}
     for name, flood in FLOODS.items():
@@ -121,7 +122,7 @@ def main() -> None:
         gates[name].set()
         time.sleep(2.0)
         simulated, loop, others = measured(process, duration)
-        print(f"{name:24} {simulated / duration:16.2f} {loop / simulated:16.3f} {others / duration:16.3f}", flush=True)
+        figures.row(name, factor=simulated / duration, loop_share=loop / simulated, others_share=others / duration)
         worker.kill()
         worker.join()
         time.sleep(1.0)

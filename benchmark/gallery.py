@@ -10,7 +10,6 @@ if that is more than 5 mm, or a base has tilted. The robots come with `pip insta
 PyBullet. The progress goes to stderr.
 """
 
-import argparse
 import logging
 import math
 import sys
@@ -23,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from driving_cases.world import PERIOD, World
+from form import Figures, parser_of
 from PIL import Image
 from robots import state_srdf
 
@@ -187,7 +187,7 @@ def draw(simulation: Simulation, picture: Path, yaw: float) -> None:
         Image.fromarray(renderer.image(simulation.q)).save(picture, quality=QUALITY, optimize=True)
 
 
-def show(name: str, picture: Path) -> bool:
+def show(name: str, picture: Path, figures: Figures) -> bool:
     """Let a robot move, write its picture and its line; return whether it is where it was to be.
 
     Raises:
@@ -197,16 +197,16 @@ def show(name: str, picture: Path) -> bool:
         found = drive(WHEELED[name], Path(folder)) if name in WHEELED else move(ROBOTS[name], Path(folder))
         with closing(found.simulation) as simulation:
             draw(simulation, picture, ROBOTS[name].yaw if name in ROBOTS else 130.0)
-            way = ", ".join(f"{round(part, 3) + 0.0:g}" for part in found.way)
-            tilt = f", tilted by {math.degrees(found.tilt):.0f} deg" if found.tilt > TILTED else ""
-            figures = f"({way}) m, {1e3 * found.away:.1f} mm away{tilt}"
-            print(f"{name:18s}{simulation.kinematics.size:>4d}  {found.link:34s}{figures}", flush=True)
+            moved = ", ".join(f"{round(part, 3) + 0.0:g}" for part in found.way)
+            tilt = math.degrees(found.tilt)
+            dofs = simulation.kinematics.size
+            figures.row(name, dofs=dofs, link=found.link, moved_m=moved, away_mm=1e3 * found.away, tilt_deg=tilt)
     return found.away <= NEAR and found.tilt <= TILTED
 
 
 def main() -> int:
     """Draw the pictures; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     names = [*ROBOTS, *WHEELED]
     parser.add_argument("--robots", nargs="+", choices=names, default=names, metavar="NAME", help=", ".join(names))
     place = Path("out/gallery")
@@ -215,10 +215,11 @@ def main() -> int:
     logging.disable(logging.WARNING)  # of files of others
     options.folder.mkdir(parents=True, exist_ok=True)
     failed = 0
+    figures = Figures(options.json)
     for number, name in enumerate(options.robots, start=1):
         print(f"{number}/{len(options.robots)} {name}", file=sys.stderr, flush=True)
         try:
-            failed += not show(name, options.folder / f"{name}.jpg")
+            failed += not show(name, options.folder / f"{name}.jpg", figures=figures)
         except SolferError as error:
             print(f"{name}: {error}", file=sys.stderr)
             failed += 1

@@ -7,6 +7,7 @@ time of one inverse of its inertia matrix, beside that of `numpy.linalg.inv` for
 """
 
 import argparse
+import json
 import resource
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from form import Figures, parser_of
 
 from solfer.supervision import supervise
 
@@ -43,8 +45,8 @@ def best(call: Callable[[], object]) -> float:
     return 1e6 * min(times)
 
 
-def measure(size: int) -> str:
-    """Measure one line of the table, in this process."""
+def measure(size: int) -> dict[str, float]:
+    """Measure one row of the table, in this process."""
     from solfer import Robot
 
     text, start = chain(size), time.perf_counter()
@@ -56,21 +58,23 @@ def measure(size: int) -> str:
     inertia, _ = dynamics.inertia, dynamics.inertia_inverse
     own = best(dynamics._recursion.compute_inverse)
     numpy = best(lambda: np.linalg.inv(inertia))
-    return f"{size:6d}{loaded:10.3f}{memory:12.0f}{own:13.0f}{numpy:13.0f}{own / numpy:8.2f}"
+    return {"load_s": loaded, "memory_mb": memory, "inverse_us": own, "numpy_us": numpy, "ratio": own / numpy}
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("sizes", nargs="*", type=int, metavar="JOINTS", help=f"lengths of chains (default: {SIZES})")
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one is not None:
-        print(measure(options.one))
+        print(json.dumps(measure(options.one)))
         return
-    print("joints  load [s]  memory [MB]  inverse [us]  NumPy [us]  ratio")
+    figures = Figures(options.json)
     for size in options.sizes or SIZES:
-        subprocess.run([sys.executable, __file__, "--one", str(size)], check=True)
+        command = [sys.executable, __file__, "--one", str(size)]
+        row = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+        figures.row(f"{size} joints", **row)
 
 
 if __name__ == "__main__":

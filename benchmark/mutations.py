@@ -18,7 +18,6 @@ limit. A trial that is in the file already is not run again. The table has rooms
 the survivors; what crashed is among the killed.
 """
 
-import argparse
 import ast
 import difflib
 import hashlib
@@ -35,6 +34,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from form import parser_of
 
 from solfer.supervision import supervise
 
@@ -363,7 +364,7 @@ def report(results: list[dict[str, Any]], sources: Sources) -> Iterator[str]:
 
 def main() -> int:
     """Run what the command line asks for; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser = parser_of(__doc__)
     parser.add_argument(
         "--room", nargs="+", default=(), help="rooms, such as points or middleware/memory; default: all"
     )
@@ -383,7 +384,8 @@ def main() -> int:
         name = hashlib.sha256(str(given.tree.resolve()).encode()).hexdigest()[:8]
         copy = Copy(given.tree.resolve(), ROOT / "build/mutations" / name)
         run(copy, draw(sources, given.room, given.count, given.seed), given.results, given.limit)
-    for line in report(read_results(given.results), sources):
+    results = read_results(given.results)
+    for line in map(json.dumps, results) if given.json else report(results, sources):
         print(line)
     return 0
 

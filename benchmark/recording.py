@@ -18,7 +18,7 @@ from plugin import measure, start
 
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.realtime.telemetry.drain import RecordDrain
-from solfer.recording.kinds import COLUMNS, definition, ros_name
+from solfer.recording.kinds import COLUMNS_KIND, definition, ros_name
 from solfer.recording.writer import RecordingWriter
 
 ROWS = 250
@@ -60,7 +60,7 @@ def theirs(path: Path, rows: tuple[np.ndarray, np.ndarray, np.ndarray], block) -
     """Return the time that the same rows take with a library, as generic columns [s]."""
     begin = time.process_time()
     with path.open("wb") as file, Writer(file) as writer:
-        schema = writer.register_msgdef(ros_name(COLUMNS), definition(COLUMNS))
+        schema = writer.register_msgdef(ros_name(COLUMNS_KIND), definition(COLUMNS_KIND))
         width = block.width // len(block.topics)
         for number, moment, values in zip(*rows, strict=True):
             for place, topic in enumerate(block.topics):

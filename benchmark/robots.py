@@ -8,7 +8,6 @@ tilts. The robots come with PyBullet (`pybullet_data`), which has no SRDFs, and,
 example-robot-data (`pip install -r requirements-examples.txt`): every URDF of it with an SRDF of its own.
 """
 
-import argparse
 import importlib.util
 import logging
 import math
@@ -18,9 +17,11 @@ from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from form import Figures, parser_of
 
 from solfer.errors import SolferError, SolferErrors
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -115,7 +116,6 @@ EXAMPLES = {
     "xarm7": example("xarm_description/urdf/xarm7", "xarm7", False),
     "z1": example("z1_description/urdf/z1", "z1", False),
 }
-HEADER = ("robot", "start", "DoFs", "sag [rad]", "speed [rad/s]", "sinks [mm]", "last [mm]", "tilt [deg]", "")
 
 
 def collections() -> dict[str, tuple[Path, Robot]]:
@@ -139,7 +139,7 @@ def measure(folder: Path, robot: Robot, duration: float) -> tuple[str, ...]:
             srdf.write_text(state_srdf(ElementTree.parse(urdf).getroot().get("name"), robot.joints), encoding="utf-8")
         simulation = Simulation.from_file(read_bundle(urdf, srdf, robot.floating))
     with closing(simulation):
-        return simulation.start or "-", *hold(simulation, duration)
+        return {"start": simulation.start, **hold(simulation, duration)}
 
 
 def state_srdf(robot: str, joints: Mapping[str, float]) -> str:
@@ -152,8 +152,8 @@ def state_srdf(robot: str, joints: Mapping[str, float]) -> str:
     )
 
 
-def hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
-    """Let a robot stand or hold for a while [s]; return its numbers in the table, the verdict last."""
+def hold(simulation: Simulation, duration: float) -> dict[str, Any]:
+    """Let a robot stand or hold for a while [s]; return its figures, the verdict last."""
     joints = slice(6 if simulation.floating else 0, None)
     start, height, heights = simulation.q[joints].copy(), simulation.body.position[2], []
     while simulation.time < duration:
@@ -163,12 +163,13 @@ def hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
     sag, speed = np.abs(simulation.q[joints] - start).max(), np.abs(simulation.v[joints]).max()
     tilt = math.acos(min(1.0, rotation_from_quaternion(simulation.body.orientation)[2, 2]))
     settled = max(heights) - min(heights)
-    base = (f"{1e3 * (height - heights[-1]):.1f}", f"{1e3 * settled:.2f}", f"{math.degrees(tilt):.2f}")
+    base = {"sinks_mm": 1e3 * (height - heights[-1]), "last_mm": 1e3 * settled, "tilt_deg": math.degrees(tilt)}
     if simulation.floating:
         verdict = "falls" if tilt > TILTED else "stands" if settled < SETTLED else "sinks"
     else:
-        verdict, base = "holds" if sag < GIVEN_WAY and speed < MOVING else "gives way", ("-", "-", "-")
-    return str(simulation.kinematics.size), f"{sag:.4f}", f"{speed:.4f}", *base, verdict
+        verdict = "holds" if sag < GIVEN_WAY and speed < MOVING else "gives way"
+        base = dict.fromkeys(base)
+    return {"dofs": simulation.kinematics.size, "sag": float(sag), "speed": float(speed), **base, "verdict": verdict}
 
 
 def why(error: SolferError) -> str:
@@ -180,7 +181,7 @@ def why(error: SolferError) -> str:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="robots (default: all that are installed)")
     parser.add_argument("--duration", type=float, default=5.0, help="simulated time [s] (default: %(default)g)")
     options = parser.parse_args()
@@ -189,13 +190,12 @@ def main() -> None:
     unknown = [name for name in options.names if name not in robots]
     if unknown:
         parser.error(f"no robot '{unknown[0]}'; there are: {', '.join(robots)}")
-    row = "{:20s}{:22s}{:>4s}{:>10s}{:>14s}{:>11s}{:>10s}{:>11s}  {}"
-    print(row.format(*HEADER))
+    figures = Figures(options.json)
     for name in options.names or robots:
         try:
-            print(row.format(name, *measure(*robots[name], options.duration)), flush=True)
+            figures.row(name, **measure(*robots[name], options.duration))
         except SolferError as error:
-            print(f"{name:20s}refused: {why(error)}", flush=True)
+            figures.row(name, refused=why(error))
 
 
 if __name__ == "__main__":

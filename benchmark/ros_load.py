@@ -10,7 +10,6 @@ simulated second, which depends less on what else the machine does. The recorder
 time that was lost while it connected is printed apart from what was lost afterwards.
 """
 
-import argparse
 import contextlib
 import os
 import signal
@@ -20,6 +19,8 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+from form import Figures, parser_of
 
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
@@ -39,21 +40,26 @@ CASES = (("1", "alone"), ("1", "recorded"), ("0", "alone"), ("0", "recorded"))
 
 def main() -> None:
     """Measure each case in processes of its own: a process has one node only."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = parser_of(__doc__)
     parser.add_argument("seconds", type=float, nargs="?", default=15.0)
     parser.add_argument("--rates", default=RATES, help=f"rates of publication (default: {RATES})")
     parser.add_argument("--case", nargs=2, metavar=("FACTOR", "RECORDER"), help="this case only, such as: 1 recorded")
     options = parser.parse_args()
     if options.case:
-        case(options.seconds, options.rates, float(options.case[0]), options.case[1])
+        case(
+            options.seconds,
+            options.rates,
+            float(options.case[0]),
+            recorder=options.case[1],
+            figures=Figures(options.json),
+        )
         return
     for one in CASES:
-        subprocess.run(
-            [sys.executable, __file__, f"{options.seconds:g}", "--rates", options.rates, "--case", *one], check=True
-        )
+        command = [sys.executable, __file__, f"{options.seconds:g}", "--rates", options.rates, "--case", *one]
+        subprocess.run([*command, *(["--json"] if options.json else [])], check=True)
 
 
-def case(seconds: float, rates: str, factor: float, recorder: str) -> None:
+def case(seconds: float, rates: str, factor: float, recorder: str, figures: Figures) -> None:
     """Measure one case and print it."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "launch.log")
@@ -69,16 +75,9 @@ def case(seconds: float, rates: str, factor: float, recorder: str) -> None:
                 with recording(folder, recorder):
                     time.sleep(SETTLE)
                     connected = lost(middleware)
-                    print(
-                        f"{'real time' if factor else 'as fast as possible'}, "
-                        f"{'with' if recorder == 'recorded' else 'without'} rosbag record -a, {rates}"
-                    )
-                    measure(seconds, middleware)
-                    print(
-                        f"  lost in the beginning      {before:.3f} s, in the next {SETTLE:g} s, in which a recorder "
-                        f"connects, {connected - before:.3f} s",
-                        flush=True,
-                    )
+                    title = f"{'real time' if factor else 'as fast as possible'}, {recorder}"
+                    lost_before = {"begin_lost_s": before, "connecting_lost_s": connected - before}
+                    figures.row(title, **measure(seconds, middleware), **lost_before)
 
 
 @contextlib.contextmanager
@@ -96,8 +95,8 @@ def recording(folder: str, recorder: str) -> Iterator[None]:
         process.wait(10.0)
 
 
-def measure(seconds: float, middleware: RosMiddleware) -> None:
-    """Receive the reports for `seconds` and print their figures."""
+def measure(seconds: float, middleware: RosMiddleware) -> dict[str, float]:
+    """Receive the reports for `seconds` and return their figures."""
     begin, used, start = dict(middleware.reports()), cpu(), time.monotonic()
     factors = []
     while time.monotonic() - start < seconds:
@@ -106,20 +105,18 @@ def measure(seconds: float, middleware: RosMiddleware) -> None:
     end, spent = dict(middleware.reports()), cpu()
     before, after = (value(reports, "simulation", "time [s]") for reports in (begin, end))
     passed = after - before
-    print(f"  real-time factor           {sum(factors) / len(factors):.3f}, worst second {min(factors):.3f}")
-    print(
-        f"  simulated time lost        "
-        f"{value(end, 'simulation', LOST) - value(begin, 'simulation', LOST):.3f} s of {passed:.0f} s"
-    )
-    print(
-        f"  plugin's cycle             {value(end, 'joint_states', 'cycle median [ms]'):.3f} ms median, "
-        f"{value(end, 'joint_states', 'cycle p99 [ms]'):.3f} ms p99"
-    )
-    print(f"  transport of a cycle       {value(end, 'joint_states', 'transport median [ms]'):.3f} ms median")
     shares = {name: (ticks - used.get(name, 0)) / TICKS / passed for name, ticks in spent.items()}
     busiest = sorted(shares.items(), key=lambda item: -item[1])[:5]
-    print("  s of a core for each simulated s   " + ", ".join(f"{name} {share:.3f}" for name, share in busiest))
-    print(f"  load of the machine        {Path('/proc/loadavg').read_text().split()[0]}")
+    return {
+        "factor": sum(factors) / len(factors),
+        "worst_factor": min(factors),
+        "lost_s": value(end, "simulation", LOST) - value(begin, "simulation", LOST),
+        "cycle_p50_ms": value(end, "joint_states", "cycle median [ms]"),
+        "cycle_p99_ms": value(end, "joint_states", "cycle p99 [ms]"),
+        "transport_p50_ms": value(end, "joint_states", "transport median [ms]"),
+        **{f"{name}_core_s": share for name, share in busiest},
+        "load": float(Path("/proc/loadavg").read_text().split()[0]),
+    }
 
 
 def lost(middleware: RosMiddleware) -> float:

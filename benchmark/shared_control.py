@@ -7,7 +7,6 @@ its numbers, in periods of the plugins, and the processor time that each process
 the wait for its next step: half a millisecond on average.
 """
 
-import argparse
 import contextlib
 import os
 import subprocess
@@ -17,6 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from form import Figures, parser_of
 
 from solfer.demo.story import MOVE_JOINTS, MoveJoints, Reply
 from solfer.middleware.ros import RosMiddleware, RosNode
@@ -72,7 +72,7 @@ def configuration(folder: Path, layer: str) -> Path:
     return file
 
 
-def measure(middleware: RosMiddleware, seconds: float, rate: float) -> None:
+def measure(middleware: RosMiddleware, seconds: float, rate: float, figures: Figures) -> None:
     """Move both parts and print the figures."""
     received = {name: middleware.queue(name, "solfer/JointCommand", 100_000) for name in JOINTS}
     commands = middleware.queue("position_controller/command", "solfer/JointCommand", 100_000)
@@ -86,23 +86,24 @@ def measure(middleware: RosMiddleware, seconds: float, rate: float) -> None:
     sent = commands.drain()
     for plugin, (joint, _) in JOINTS.items():
         waits = latencies(received[plugin].drain(), sent, joint) * rate
-        print(f"  {plugin} -> whole_body  {np.median(waits):.2f} periods, 99 %: {np.percentile(waits, 99):.2f}")
+        title = f"{rate:g} Hz: {plugin} to whole_body"
+        figures.row(title, p50_periods=float(np.median(waits)), p99_periods=float(np.percentile(waits, 99)))
     for name, used in after.items():
-        print(f"  {name:<12} {100.0 * (used - before[name]) / passed:5.1f} % of a core")
+        figures.row(f"{rate:g} Hz: {name}", core=(used - before[name]) / passed)
 
 
 def main() -> None:
     """Measure at both rates, each in a process of its own: a process has one node only."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = parser_of(__doc__)
     parser.add_argument("seconds", type=float, nargs="?", default=15.0)
     parser.add_argument("--layer", choices=RATES, help="this one only")
     options = parser.parse_args()
     if options.layer is None:
         for layer in RATES:
-            subprocess.run([sys.executable, __file__, f"{options.seconds:g}", "--layer", layer], check=True)
+            command = [sys.executable, __file__, f"{options.seconds:g}", "--layer", layer]
+            subprocess.run([*command, *(["--json"] if options.json else [])], check=True)
         return
     rate = RATES[options.layer]
-    print(f"plugins at {rate:g} Hz", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         file = configuration(Path(folder), options.layer)
         arguments = ["solfer", "figure_4.launch", "merging:=whole_body", f"config:={file}", f"rates:=joints={rate:g}"]
@@ -112,7 +113,7 @@ def main() -> None:
                 while not set(PLUGINS) <= {name for name, report in middleware.reports().items() if not report.level}:
                     system.check()
                     time.sleep(0.1)
-                measure(middleware, options.seconds, rate)
+                measure(middleware, options.seconds, rate, figures=Figures(options.json))
 
 
 if __name__ == "__main__":

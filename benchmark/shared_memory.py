@@ -9,7 +9,6 @@ brought news, the torn ones among them (there must be none: else it ends with 1)
 among as many plain copies without the checks of the seqlock.
 """
 
-import argparse
 import multiprocessing
 import os
 import sys
@@ -20,6 +19,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from form import Figures, parser_of
 
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory.segment import Segment
@@ -47,11 +47,10 @@ def cost(*steps: Callable[[], object]) -> list[float]:
     return list(medians[:-1] - medians[-1])
 
 
-def print_costs(folder: str) -> None:
+def print_costs(folder: str, figures: Figures) -> None:
     """Print the cost of writing and reading through the Middleware."""
     namespace = Namespace("benchmark", Path(folder))
     publisher, subscriber = XbotMiddleware(namespace, "publisher"), XbotMiddleware(namespace, "subscriber")
-    print(f"{'':24}  write   read  nothing new  [us]")
     for kind, fields in (
         ("sensor_msgs/JointState", JOINT_MESSAGES["sensor_msgs/JointState"]),
         ("solfer/JointCommand", JOINT_FIELDS),
@@ -59,7 +58,7 @@ def print_costs(folder: str) -> None:
         message = JointMessage.empty(JOINTS, fields)
         writer, reader = publisher.writer(kind, kind), subscriber.reader(kind, kind)
         write, read, again = cost(partial(writer.write, message), reader.read, reader.read)
-        print(f"{kind:24} {write:6.2f} {read:6.2f} {again:12.2f}")
+        figures.row(kind, write_us=write, read_us=read, nothing_new_us=again)
 
 
 def flood(path: Path, ready: multiprocessing.Event) -> None:
@@ -95,20 +94,21 @@ def count_torn(path: Path, reads: int) -> tuple[int, int, int]:
 
 def main() -> int:
     """Measure, and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("reads", type=int, nargs="?", default=READS)
-    reads = parser.parse_args().reads
+    options = parser.parse_args()
+    figures = Figures(options.json)
     with tempfile.TemporaryDirectory(dir=SHARED_MEMORY) as folder:
-        print_costs(folder)
+        print_costs(folder, figures)
         context, path = multiprocessing.get_context("spawn"), Path(folder) / "flood"
         ready = context.Event()
         writer = context.Process(target=flood, args=(path, ready), daemon=True)
         writer.start()
         ready.wait()
-        bad, given_up, plain = count_torn(path, reads)
+        bad, given_up, plain = count_torn(path, options.reads)
         writer.kill()
         writer.join()
-    print(f"{reads} reads of news: {bad} torn, {given_up} given up; of as many plain copies {plain} torn")
+    figures.row("reads of news", count=options.reads, torn=bad, given_up=given_up, torn_plain_copies=plain)
     return 1 if bad else 0
 
 

@@ -8,7 +8,6 @@ threads, open files and, in the layer, segments and entries of the claims, when 
 is left at the end than after the first use of each, or if topics and services are left when the node has ended.
 """
 
-import argparse
 import statistics
 import subprocess
 import sys
@@ -16,6 +15,8 @@ import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+
+from form import Figures, parser_of
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY / "test"))
@@ -32,12 +33,11 @@ TIMES = 5
 """How often a cost is measured: it differs by a half from one start of the plugins to the next."""
 
 
-def show(layer: str, switches: int, held: tuple[Mapping[str, int], ...], costs: tuple[float, ...]) -> None:
-    """Print the lines of a layer."""
-    print(f"{layer}: {switches} switches")
+def show(figures: Figures, layer: str, held: tuple[Mapping[str, int], ...], costs: tuple[float, ...]) -> None:
+    """Print the rows of a layer."""
     for name in held[0]:
-        print(f"  {name:12s}{held[0][name]:10d} before{held[1][name]:10d} after")
-    print(f"  {'cycle [us]':12s}{costs[0]:10.1f} before{costs[1]:10.1f} after")
+        figures.row(f"{layer}, {name}", before=held[0][name], after=held[1][name])
+    figures.row(f"{layer}, cycle [us]", before=costs[0], after=costs[1])
 
 
 def typical(cost: Callable[[], float]) -> float:
@@ -45,7 +45,7 @@ def typical(cost: Callable[[], float]) -> float:
     return statistics.median(cost() for _ in range(TIMES))
 
 
-def switch_layer(switches: int, seed: int) -> list[str]:
+def switch_layer(figures: Figures, switches: int, seed: int) -> list[str]:
     """Switch the plugins of a real-time layer; return what is left."""
     from support.realtime.switching import STAY, SwitchedLayer
 
@@ -56,13 +56,14 @@ def switch_layer(switches: int, seed: int) -> list[str]:
         before = typical(layer.cost), layer.held()
         layer.switch_at_random(switches)
         after = typical(layer.cost), layer.held()
-        show(f"RT ({layer.refused} refused)", layer.switches, (before[1], after[1]), (before[0], after[0]))
+        title = f"RT: {layer.switches} switches, {layer.refused} refused"
+        show(figures, title, (before[1], after[1]), costs=(before[0], after[0]))
         layer.close()
         left = [segment for segment in layer.segments() if segment not in STAY]
     return left + [f"RT: more {name}" for name in before[1] if after[1][name] > before[1][name]]
 
 
-def switch_node(switches: int, seed: int) -> list[str]:
+def switch_node(figures: Figures, switches: int, seed: int) -> list[str]:
     """Switch the plugins of a ROS node; return what is left."""
     import rospy
     from support.ros.switched_node import WAIT, SwitchedNode, left_at_master
@@ -85,7 +86,7 @@ def switch_node(switches: int, seed: int) -> list[str]:
             finally:
                 process.terminate()
                 process.wait(END)
-        show("ROS", node.switches, (before[1], after[1]), (before[0], after[0]))
+        show(figures, f"ROS: {node.switches} switches", (before[1], after[1]), costs=(before[0], after[0]))
         left = left_at_master()
         rospy.signal_shutdown("done")
     return left + [f"ROS: more {name}" for name in before[1] if after[1][name] > before[1][name]]
@@ -93,16 +94,17 @@ def switch_node(switches: int, seed: int) -> list[str]:
 
 def main() -> int:
     """Switch, and print what is left."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--switches", type=int, default=1000, help="switches in each layer (default: 1000)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the switches (default: 0)")
     parser.add_argument(
         "--layer", choices=("rt", "ros", "both"), default="both", help="what is switched (default: both)"
     )
     options = parser.parse_args()
-    left = switch_layer(options.switches, options.seed) if options.layer != "ros" else []
-    left += switch_node(options.switches, options.seed) if options.layer != "rt" else []
-    print(f"left: {', '.join(left)}" if left else "nothing is left")
+    figures = Figures(options.json)
+    left = switch_layer(figures, options.switches, options.seed) if options.layer != "ros" else []
+    left += switch_node(figures, options.switches, options.seed) if options.layer != "rt" else []
+    figures.row("left at the end", count=len(left), names=", ".join(left))
     return 1 if left else 0
 
 

@@ -1,5 +1,6 @@
 """The short form of `benchmark/chaos.py`: systems that are broken at random, with seeds that do not change."""
 
+import json
 import os
 import signal
 import subprocess
@@ -21,15 +22,14 @@ pytestmark = pytest.mark.soak
 @pytest.mark.parametrize("system", ["ros", "rt"])
 def test_two_faults_move_nothing_without_a_command(system, tmp_path):
     done = subprocess.run(
-        [*CHAOS, "--trials", "1", "--seed", SEED, "--system", system, "--logs", str(tmp_path)],
+        [*CHAOS, "--trials", "1", "--seed", SEED, "--system", system, "--logs", str(tmp_path), "--json"],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
-    heading, *rows = done.stdout.splitlines()
-    assert heading.split()[:4] == ["system", "fault", "victim", "trials"]
-    assert rows and all(row.split()[0] == system for row in rows)
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert rows and all(row["name"].startswith(f"{system}: ") and row["failures"] == 0 for row in rows)
 
 
 def test_an_interrupt_leaves_nothing_behind(tmp_path):

@@ -10,6 +10,8 @@ import pytest
 
 BENCHMARK = Path(__file__).parents[3] / "benchmark"
 SCRIPTS = sorted(path.name for path in BENCHMARK.glob("*.py") if path.name != "form.py")
+PICTURES = ("rviz.py",)
+"""Scripts that draw, and print no figures."""
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
@@ -18,6 +20,7 @@ def test_help_is_all_that_help_prints(script):
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert ended.returncode == 0 and ended.stdout.startswith("usage: "), ended.stderr
     assert len(ended.stdout.splitlines()) > 4
+    assert "--json" in ended.stdout or script in PICTURES
 
 
 def test_the_table_lists_every_script():

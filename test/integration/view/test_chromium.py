@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
 from support.browser import CHROMIUM, browser, element  # noqa: E402
+from support.page import view  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.robot.shipped import robot_of  # noqa: E402
@@ -193,3 +194,17 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
         command = shown.run.plugins["manipulation"].robot.command.position.copy()
         shown.run.step(0.5)
         assert (shown.run.plugins["manipulation"].robot.command.position == command).all()
+
+
+def test_control_is_kept_however_slowly_it_draws(tmp_path):
+    """A process at the pace of the clock; without a graphics card the browser draws about one picture a second."""
+    commands = r"/page \d+ commands/.test(document.body.innerText)"
+    with view("--run", "config/studies/robustness.yaml", "--control") as address:
+        with browser(tmp_path / "profile", address) as seen:
+            seen.wait(f"{BEATS} > 20")
+            seen.click("take control")
+            seen.wait(commands)
+            end = time.monotonic() + 10.0
+            while time.monotonic() < end:
+                assert seen.evaluate(commands)
+                time.sleep(0.2)
