@@ -129,7 +129,7 @@ class Contradiction(PipeError):
 
 
 class Stray(Contradiction):
-    """A way that differs from that by the measured velocities."""
+    """A displacement that differs from that by the measured velocities."""
 
     fleeting = True
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def scenario_page(trace: ScenarioTrace) -> "Figure":
-    """Draw the ways of base and vertices from above, the base, and the vertices' distances from their begins."""
+    """Draw the paths of base and vertices from above, the base, and the vertices' distances from their begins."""
     figure = new_figure(9.0, 6.0)
     above, base, moved = figure.subplot_mosaic([["above", "base"], ["above", "moved"]]).values()
     cos = np.cos(trace.base[:, 3])

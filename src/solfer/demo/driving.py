@@ -82,7 +82,7 @@ class Complaints:
 
 
 class Driving:
-    """Third parties of Fig. 5: navigation, and who reports the hands where to go.
+    """Third parties of Fig. 5: navigation, and the publisher of the hands' references.
 
     Args:
         middleware: Middleware of robot and plugins.

@@ -1,4 +1,4 @@
-"""Figures of the demonstration of Fig. 5: what the robot truly did, against what its recording says was desired."""
+"""Figures of the demonstration of Fig. 5: the true motion of the robot, against the desired one of its recording."""
 
 import math
 from collections.abc import Mapping
@@ -181,7 +181,7 @@ def _heading(quaternion: np.ndarray) -> float:
 
 
 def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
-    """Compute the way that the wheels' material slid over the ground, as a share of the way of their centres."""
+    """Compute the displacement of the wheels' material over the ground, as a share of the path of their centres."""
     joints = recorder.messages("measured")
     times = np.array([each.stamp for each in joints])
     dofs = [robot.dof(name) for name in joints[0].names]
@@ -237,7 +237,7 @@ def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
 
 
 def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waited: bool = False) -> str:
-    """Return what to say of a run that did not hold real time; empty: it did.
+    """Return the remark about a run that did not hold real time; empty: it did.
 
     Args:
         reports: Health of the nodes.

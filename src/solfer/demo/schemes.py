@@ -1,4 +1,4 @@
-"""What the demonstration shows, figures of the paper and squats: launch files, and what is asked of the robot."""
+"""Schemes of the demonstration, figures of the paper and squats: launch files, and the requests to the robot."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -62,7 +62,7 @@ def wave(show: story.Show) -> int:
 
 
 def squat(show: story.Show) -> int:
-    """Squat on torques: nothing is asked of the robot, its configuration generates the reference."""
+    """Squat on torques: no request is sent, the configuration generates the reference."""
     return watch(show, "squat", "it squats", duration=SQUATS, actor=lambda _: lambda _: None)
 
 

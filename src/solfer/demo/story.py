@@ -183,7 +183,7 @@ class StoryTeller:
         return "; ".join(reply.message for reply in replies if not reply.success)
 
     def _insist(self, plugin: str, request: MoveJoints) -> Reply:
-        """Ask until the plugin agrees, or time is up; return its last reply."""
+        """Repeat a request until the plugin agrees, or time is up; return its last reply."""
         end = self._middleware.now() + STORY_PATIENCE
         while not (reply := self._request(plugin, request)).success:
             if self._middleware.now() >= end or not self._middleware.running():

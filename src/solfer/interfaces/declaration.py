@@ -142,8 +142,8 @@ class Action:
         result: Dataclass of the result; it can be made without arguments.
         begin: Takes over a goal, and returns None. A `SolferError` that it raises rejects the goal, with the error as
             text; so does an Outcome that it returns, with its result.
-        outcome: Called after each cycle with a goal: None as long as it is under way.
-        report: Returns the feedback; called at `rate` while a goal is under way.
+        outcome: Called after each cycle with a goal: None as long as it is in progress.
+        report: Returns the feedback; called at `rate` while a goal is in progress.
         cancel: Leaves the goal: the component comes to rest.
         rate: Of the feedback [Hz].
     """

@@ -275,7 +275,7 @@ class LowerLevel:
         target.apply(indices, given)
 
     def _without_drive(self, message: JointMessage, error: CommandRefused) -> CommandRefused:
-        """Return the error that says more of a command for a joint without a drive; of other commands the given one."""
+        """Return a better error about a command for a joint without a drive; of other commands the given one."""
         passive = [name for name in self._passive if name in tuple(message.names or ())]
         if not passive:
             return error

@@ -1,1 +1,1 @@
-"""Middlewares: the ways of plugins to the outside."""
+"""Middlewares: they connect plugins to the outside."""

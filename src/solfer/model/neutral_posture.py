@@ -37,7 +37,7 @@ def neutral_posture(kinematics: Kinematics) -> np.ndarray:
 
 
 def _bent_chains(kinematics: Kinematics, posture: np.ndarray) -> tuple[list[str], np.ndarray]:
-    """Find outermost links behind a joint that is not at zero, and the DoFs of the other joints on the way there."""
+    """Find outermost links behind a joint that is not at zero, and the DoFs of the other joints along the chain."""
     description = kinematics.description
     dofs = kinematics.dofs
     parents = {joint.parent for joint in description.joints.values()}

@@ -1,4 +1,4 @@
-"""Navigation by topics alone: scenarios, references and way-points, by a node without a robot of its own."""
+"""Navigation by topics alone: scenarios, references and waypoints, by a node without a robot of its own."""
 
 from solfer.navigation.course import Course, Localisation
 from solfer.navigation.navigation import Navigation

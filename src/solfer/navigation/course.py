@@ -30,7 +30,7 @@ class Course(abc.ABC):
 
     Attributes:
         writers: Where it is published; each needs a subscriber before it begins.
-        count: How many steps or way-points there are.
+        count: How many steps or waypoints there are.
         share: Share of what is published with which the robot goes on, and with it the clock of the motion.
         most: Largest pace that it can go on at.
         has_dialogue: Whether others answer it before it begins.
@@ -62,7 +62,7 @@ class Course(abc.ABC):
     @property
     @abc.abstractmethod
     def number(self) -> int:
-        """Number of the present step or way-point, from 1; 0 before the first."""
+        """Number of the present step or waypoint, from 1; 0 before the first."""
 
     @property
     @abc.abstractmethod

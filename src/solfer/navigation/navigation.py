@@ -107,7 +107,7 @@ class Navigation:
     Attributes:
         done: Whether the course has come to its end.
         paused: Whether it has been asked to stop until it is asked to go on.
-        pace: Share of the planned speed that it asks for at present.
+        pace: Share of the planned speed that it requests at present.
         elapsed: Time that it has moved, at its planned speed [s].
         waits: What it waits for; empty: nothing.
     """

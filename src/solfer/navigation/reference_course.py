@@ -58,7 +58,7 @@ class _TaskReference(_Reference):
         self._answer: Future[ReferenceReply] | None = None
 
     def awaits(self) -> str:
-        """Ask where the reference is; returns what is missing."""
+        """Request the place of the reference; return what is missing."""
         if self._answer is None:
             request = GetReference(self.name)
             self._answer = self._middleware.request(self._service, GET, request, ReferenceReply, REFERENCE_PATIENCE)

@@ -50,7 +50,7 @@ class ScenarioMotion(abc.ABC):
 
     @abc.abstractmethod
     def arrives(self, period: float) -> bool:
-        """Return whether the robot is still on its way, a period [s] later, when nothing is left to play."""
+        """Return whether the robot still moves, a period [s] later, when nothing is left to play."""
 
 
 class ScenarioVelocities(ScenarioMotion):
@@ -199,7 +199,7 @@ class ScenarioPositions(ScenarioMotion):
         return self._ended < ARRIVING or self._pose.still < STANDING_TIME
 
     def _request(self, task: str) -> str:
-        """Ask where a reference begins; returns what is missing."""
+        """Request the begin of a reference; return what is missing."""
         if self._answer is None:
             self._answer = self._middleware.request(
                 self._service, GET, GetReference(task), ReferenceReply, REFERENCE_PATIENCE

@@ -1,4 +1,4 @@
-"""Way-points on `cmd_vel`."""
+"""Waypoints on `cmd_vel`."""
 
 import math
 
@@ -14,7 +14,7 @@ WAYPOINT_SETTLED_TIME = 0.3
 
 
 class WaypointCourse(Course):
-    """Follows way-points with velocities seen from the heading of the base.
+    """Follows waypoints with velocities seen from the heading of the base.
 
     It ends where the base has come to rest at the last one: a base that lags behind its velocities, as just after its
     start, rolls on and is sent back. In a map it stays until the corrections of the localisation have been followed.
@@ -24,7 +24,7 @@ class WaypointCourse(Course):
         follower: The law.
         target: Namespace of `cmd_vel`.
         odometry: Topic of the odometry.
-        localisation: Where its frame is in that of the way-points; None: they are the same.
+        localisation: Where its frame is in that of the waypoints; None: they are the same.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A follower of way-points: velocities from a pose, without any transport."""
+"""A follower of waypoints: velocities from a pose, without any transport."""
 
 import math
 from collections.abc import Sequence
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from solfer.errors import SolferError
 
 WAYPOINT_ARRIVAL_DISTANCE, WAYPOINT_TURN_LIMIT = 0.01, 0.01
-"""Distance from the last way-point [m], and from its heading [rad], that is near enough."""
+"""Distance from the last waypoint [m], and from its heading [rad], that is near enough."""
 
 STRAYED = 0.02
-"""Distance from the last way-point [m], and from its heading [rad], at which it has been left again."""
+"""Distance from the last waypoint [m], and from its heading [rad], at which it has been left again."""
 
 PASSED = 0.05
-"""Distance at which a way-point on the way counts as passed [m]."""
+"""Distance at which a waypoint on the way counts as passed [m]."""
 
 WAYPOINT_GAIN = 1.5
 """Rate at which what is left of a way decreases near its end [1/s]."""
@@ -63,9 +63,9 @@ class DriveLimits:
 
 
 class WaypointFollower:
-    """Drives a base that can go in all directions along a polygon of way-points, and turns it on the way.
+    """Drives a base that can go in all directions along a polygon of waypoints, and turns it meanwhile.
 
-    It passes a way-point within `PASSED`, slower the more the way bends there, and comes to rest at the last one. Its
+    It passes a waypoint within `PASSED`, slower the more the way bends there, and comes to rest at the last one. Its
     velocities never change faster than the limits say.
 
     Args:
@@ -73,8 +73,8 @@ class WaypointFollower:
         limits: How fast.
 
     Attributes:
-        velocity: x and y in the frame of the way-points [m/s], and rate of the heading [rad/s].
-        index: Way-point that it goes to; the number of way-points when it has arrived.
+        velocity: x and y in the frame of the waypoints [m/s], and rate of the heading [rad/s].
+        index: Waypoint that it goes to; the number of waypoints when it has arrived.
     """
 
     def __init__(self, waypoints: Sequence[Waypoint], limits: DriveLimits):
@@ -91,7 +91,7 @@ class WaypointFollower:
         self._pose = (0.0, 0.0, 0.0)
 
     def step(self, pose: tuple[float, float, float], period: float, pace: float = 1.0) -> bool:
-        """Compute the velocity of the next period; False when it is at rest at the last way-point.
+        """Compute the velocity of the next period; False when it is at rest at the last waypoint.
 
         Args:
             pose: x, y [m] and heading [rad] of the base.
@@ -122,18 +122,18 @@ class WaypointFollower:
 
     @property
     def left(self) -> float:
-        """Time that is left [s], about: way by speed, or turn by rate, and braking."""
+        """Time that is left [s], about: path by speed, or turn by rate, and braking."""
         if self.index >= len(self.waypoints):
             return 0.0
         x, y, heading = self._pose
         limits = self.limits
-        way = self._distance(x, y) + self._after[self.index]
+        path = self._distance(x, y) + self._after[self.index]
         turn = abs(self._turn(heading))
-        return max(_duration(way, limits.speed, limits.acceleration),
+        return max(_duration(path, limits.speed, limits.acceleration),
                    _duration(turn, limits.turn_speed, limits.turn_acceleration))  # fmt: skip
 
     def stay(self, pose: tuple[float, float, float]) -> None:
-        """Go to the last way-point once more if a base that has arrived is elsewhere; see `step`."""
+        """Go to the last waypoint once more if a base that has arrived is elsewhere; see `step`."""
         x, y, heading = pose
         self.index = len(self.waypoints) - 1
         if self._distance(x, y) <= STRAYED and abs(self._turn(heading)) <= STRAYED:
@@ -144,7 +144,7 @@ class WaypointFollower:
         self.velocity = (0.0, 0.0, 0.0)
 
     def _bend(self, places: Sequence[tuple[float, float]], index: int) -> float:
-        """Return the speed at which a way-point is passed [m/s]; where the way to the first comes from is not known."""
+        """Return the speed at which a waypoint is passed [m/s]; the direction before the first is not known."""
         if index == 0:
             return 0.0
         (x0, y0), (x1, y1), (x2, y2) = places[index - 1 : index + 2]
@@ -159,7 +159,7 @@ class WaypointFollower:
         return math.hypot(goal.x - x, goal.y - y)
 
     def _speed(self, distance: float) -> float:
-        """Return the speed at a distance from the next way-point [m/s]."""
+        """Return the speed at a distance from the next waypoint [m/s]."""
         limits = self.limits
         through = self._through[self.index]
         if self.index == len(self.waypoints) - 1:
@@ -169,7 +169,7 @@ class WaypointFollower:
         return min(limits.speed, max(braking, WAYPOINT_GAIN * PASSED))
 
     def _turn(self, heading: float) -> float:
-        """Return what is left to the heading of the present way-point, or of the next one that has one [rad]."""
+        """Return what is left to the heading of the present waypoint, or of the next one that has one [rad]."""
         desired = next((each.heading for each in self.waypoints[self.index :] if each.heading is not None), heading)
         return math.remainder(desired - heading, math.tau)
 
@@ -196,12 +196,12 @@ class WaypointFollower:
 
 
 def _approach(left: float, speed: float, acceleration: float) -> float:
-    """Return the speed with which the end of a way can still be met."""
+    """Return the speed with which the end of a path can still be met."""
     left = abs(left)
     return min(speed, math.sqrt(2.0 * DECELERATION_SHARE * acceleration * left), WAYPOINT_GAIN * left)
 
 
-def _duration(way: float, speed: float, acceleration: float) -> float:
-    """Return the time of a way from the present speed to rest, as if it was the largest."""
+def _duration(path: float, speed: float, acceleration: float) -> float:
+    """Return the time of a path from the present speed to rest, as if it was the largest."""
     braking = speed**2 / (2.0 * acceleration)
-    return (way - braking) / speed + speed / acceleration if way > braking else math.sqrt(2.0 * way / acceleration)
+    return (path - braking) / speed + speed / acceleration if path > braking else math.sqrt(2.0 * path / acceleration)

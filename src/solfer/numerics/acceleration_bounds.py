@@ -1,4 +1,4 @@
-"""Bounds of joint accelerations that keep joints in their ranges, with the way that braking takes."""
+"""Bounds of joint accelerations that keep joints in their ranges, with their braking distances."""
 
 import math
 

@@ -99,7 +99,7 @@ def _collect(arrays, dofs, out):
 
 @part
 def _wrapped(displacement, turn):
-    """Return a way without whole turns; a turn of 0 is none."""
+    """Return a displacement without whole turns; a turn of 0 is none."""
     return displacement - turn * math.floor(displacement / turn + 0.5) if turn else displacement
 
 
@@ -137,7 +137,7 @@ keep_turns = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1
 
 
 def _shorten(displacements, turns):
-    """Remove whole turns from ways, in place; a turn of 0 is none.
+    """Remove whole turns from displacements, in place; a turn of 0 is none.
 
     Args:
         displacements: Differences of positions, one row at a time.

@@ -40,7 +40,7 @@ def release_fence(_typing):
 
 
 def address(array: np.ndarray) -> int:
-    """Return the address of an array's memory; 0 if it has no entries. Who uses it keeps the array alive."""
+    """Return the address of an array's memory; 0 if it has no entries. Its user keeps the array alive."""
     return array.__array_interface__["data"][0] if array.size else 0
 
 

@@ -201,7 +201,7 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
 
 
 def whole_turns(displacements: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Return the whole turns in some ways, shape (..., n) [rad]: without them, none is longer than half a turn.
+    """Return the whole turns in displacements, shape (..., n) [rad]: without them, none is longer than half a turn.
 
     Args:
         displacements: Differences of positions, shape (..., n) [rad, m].

@@ -1,4 +1,4 @@
-"""The table of the kinds of pipes: everything that asks for a kind asks here, or in the records that it builds on."""
+"""The table of the kinds of pipes: the only place for what depends on a kind, with the records that it builds on."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -59,7 +59,7 @@ class ComponentCycle:
         return passed
 
     def update_dynamics(self) -> None:
-        """Compute the dynamics, if the component asks for them."""
+        """Compute the dynamics, if the component requests them."""
         if self._dynamics is not None:
             self._dynamics.update()
 

@@ -36,7 +36,7 @@ NOTICEABLE = 0.02
 
 
 class CycleRecorder(Protocol):
-    """Who records the cycles of a loop."""
+    """A recorder of the cycles of a loop."""
 
     def record(self, time: int, late: int, took: int) -> None:
         """Record a cycle that ends at `time`, began `late` after its deadline and `took` so long [ns]."""

@@ -88,7 +88,7 @@ class Peers:
         self._trouble = ""
 
     def look(self) -> None:
-        """Ask for the topics of other nodes, if that is due; to be called about once a second. Does not block."""
+        """Request the topics of other nodes, if that is due; to be called about once a second. Does not block."""
         now = self._middleware.now()
         if self._has_called or now < self._next:
             return

@@ -259,7 +259,7 @@ class Plugin:
         return {**self._readiness.figures(), **load, **self._work.figures(), **self.outputs.counts(), **computed}
 
     def stop(self) -> None:
-        """Bring the robot to rest: the component's own way first, then wheels at zero in any case."""
+        """Bring the robot to rest: by the component first, then wheels at zero in any case."""
         self._finish(self._come_to_rest)
 
     def abort(self) -> None:
@@ -310,7 +310,7 @@ class Plugin:
             self._readiness.release()
 
     def _obey(self, verdict: CycleVerdict, now: float) -> None:
-        """Do what a verdict of the time `now` [s] asks for."""
+        """Do what a verdict of the time `now` [s] requests."""
         if verdict is HOLD:
             self._hold()
             self._readiness.give_back()
@@ -335,7 +335,7 @@ class Plugin:
             self.component.reset()
 
     def _update_robot(self, life: PluginState) -> None:
-        """Compute the kinematics and the dynamics that the component asks for; at a start, start."""
+        """Compute the kinematics and the dynamics that the component requests; at a start, start."""
         if life is STARTING or self.component.kinematics:
             self.robot.update()
         if life is STARTING:

@@ -1,4 +1,4 @@
-"""What happens to a plugin, and what others ask of its component: noted for a recording, asked again in a replay."""
+"""Events and requests of a plugin: noted for a recording, sent again in a replay."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -31,7 +31,7 @@ class RequestNotes:
             self.notes.append((kind, text))
 
     def noted(self, declaration: Declaration) -> Declaration:
-        """Return a declaration that does the same, and notes what is asked."""
+        """Return a declaration that does the same, and notes the requests."""
         name = declaration.name
         if isinstance(declaration, Service):
             service = declaration

@@ -1,6 +1,6 @@
 """Judges once a cycle whether a plugin may work: it receives its feedbacks, has its joints, its loop goes on.
 
-A verdict is only a word: what it asks for is done by the plugin.
+A verdict is only a word: what it requests is done by the plugin.
 """
 
 import enum

@@ -47,7 +47,7 @@ _Goal = tuple[np.ndarray, bool]
 
 
 class _Motion:
-    """Numbers that count now, on their way to others.
+    """Numbers that count now, while they move to others.
 
     Args:
         write: Takes over numbers.
@@ -69,7 +69,7 @@ class _Motion:
         self._is_finite = bool(np.isfinite(numbers).all())
 
     def go_on(self, time: float) -> bool:
-        """Let the numbers be where they are to be at some time [s]; return whether they are still on their way."""
+        """Let the numbers be where they are to be at some time [s]; return whether they still move."""
         if self.goal is not None:
             (goal, is_finite), begin, self.goal = self.goal, self.numbers, None
             has_ramp = self._is_finite and is_finite

@@ -125,7 +125,7 @@ class GroundFrame(_LevelFrame):
 
 
 class WheelFrame(_LevelFrame):
-    """Pose of the frame in which a wheel rolls: z is the normal, y the part of the axle across it, x the way it rolls.
+    """Pose of the frame in which a wheel rolls: z is the normal, y the part of the axle across it, x the direction.
 
     Its origin is that of the given pose. As seen from a `GroundFrame`, it turns about z by the steering angle.
 

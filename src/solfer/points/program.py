@@ -233,7 +233,7 @@ class CompiledPoint(Point, abc.ABC):
 
     @property
     def is_plain(self) -> bool:
-        """Return whether no subclass computes it in another way."""
+        """Return whether no subclass computes it differently."""
         own = type(self)
         return (
             own.update is CompiledPoint.update

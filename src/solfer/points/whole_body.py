@@ -53,7 +53,7 @@ class AngularMomentum(CompiledPoint):
     """Angular momentum of all links that a DoF moves about their centre of mass, world axes [kg m^2/s].
 
     It is linear in the velocities, and the Jacobian is its matrix: the angular rows of the centroidal momentum matrix.
-    A task on it has the momentum itself as its rate: with gain 0 and the feed-forward velocity h it asks for the
+    A task on it has the momentum itself as its rate: with gain 0 and the feed-forward velocity h it requests the
     momentum h. Source: D. E. Orin, A. Goswami, S.-H. Lee, "Centroidal dynamics of a humanoid robot", Autonomous
     Robots 35, 2013.
 

@@ -88,7 +88,7 @@ class EmergencyStopLatch:
         self._words[TRIPPED] = 1
 
     def answer(self, text: str, holds: bool = True) -> None:
-        """Confirm as the executor that all plugins hold, or say which cannot."""
+        """Confirm as the executor that all plugins hold, or name those that cannot."""
         _write(self._answer, text)
         self._words[ANSWERING] = os.getpid()
         self._words[HOLDS] = holds

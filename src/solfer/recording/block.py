@@ -35,7 +35,7 @@ class RecordedTopic:
         self.kind, self.template = channels[0].kind, template(channels)
 
     def described(self) -> dict[str, str]:
-        """Return what the file says of the topic: the names and units of its channels, as JSON."""
+        """Return the file's description of the topic: the names and units of its channels, as JSON."""
         parts = [[each.name, each.columns, each.units] for each in self.channels]
         return {"channels": json.dumps(parts), "frame": self.channels[0].frame, "child": self.channels[0].child}
 

@@ -1,4 +1,4 @@
-"""What is recorded, declared by those who know it: live arrays with names, units and frames."""
+"""What is recorded, declared by its owners: live arrays with names, units and frames."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -54,7 +54,7 @@ QOS = json.dumps(
         }
     ]
 )
-"""Quality of service of each topic, as `ros2 bag` writes it, which the profile `ros2` of MCAP asks for: YAML."""
+"""Quality of service of each topic, as `ros2 bag` writes it, which the profile `ros2` of MCAP requests: YAML."""
 
 _LEVEL = 1  # of the compression: the fastest that is worth it
 _MEDIA = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}

@@ -149,7 +149,7 @@ def _index(joints: Sequence[str], name: str, where: str) -> int:
 def _waypoints(
     record: ReferenceRecord, waypoints: Sequence[WaypointReferenceRecord], quantity: str, columns: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and values of way-points, shape (k,) and (k, n); what is left out is NaN before the first one."""
+    """Return times and values of waypoints, shape (k,) and (k, n); what is left out is NaN before the first one."""
     keys = {"position": ("position",), "orientation": ("orientation",), "pose": ("position", "orientation")}
     allowed = keys.get(quantity, ("joints",))
     value = np.full(len(columns), math.nan if record.absolute else 0.0)

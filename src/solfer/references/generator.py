@@ -142,7 +142,7 @@ class Swing(OffsetReference):
 
 
 class LineReference(OffsetReference):
-    """A straight line whose share u of the time T makes 10 u^3 - 15 u^4 + 6 u^5 of the way: from rest to rest.
+    """A straight line whose share u of the time T makes 10 u^3 - 15 u^4 + 6 u^5 of the path: from rest to rest.
 
     Args:
         size: How many numbers it has.

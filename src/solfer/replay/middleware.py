@@ -1,4 +1,4 @@
-"""What a replayed plugin has around it: a clock that follows the recording, and nobody who answers."""
+"""Surroundings of a replayed plugin: a clock that follows the recording, and services without answers."""
 
 from collections.abc import Mapping
 from typing import Any

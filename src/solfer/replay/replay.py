@@ -139,7 +139,7 @@ class Replay:
         self.running[row] = plugin.running
 
     def _repeat(self, note: str) -> None:
-        """Ask again what was asked, at the beginning of the cycle."""
+        """Repeat recorded requests, at the beginning of the cycle."""
         try:
             self.plugin.inbox.submit(self.plugin.requests.repeated(note))
         except ValueError:

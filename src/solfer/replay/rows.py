@@ -55,7 +55,7 @@ class RecordedRows:
         return self.states == PluginState.RUNNING
 
     def requests(self) -> dict[int, list[str]]:
-        """Return what was asked of the component, by the index of the cycle that carried it out."""
+        """Return the requests to the component, by the index of the cycle that carried them out."""
         found: dict[int, list[str]] = {}
         for event in self.recording.events:
             if event.plugin == self.plugin and event.kind == REQUEST:

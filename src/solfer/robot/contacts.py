@@ -80,7 +80,7 @@ class Contacts(Handler[Contact]):
         return self._constraints
 
     def update(self, jacobian: bool = True) -> None:
-        """See `Handler.update`; once they were asked for, the constraints are updated, too."""
+        """See `Handler.update`; once they were requested, the constraints are updated, too."""
         super().update(jacobian)
         if self._constraints is not None:
             self._constraints.update(jacobian)

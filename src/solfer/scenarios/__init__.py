@@ -1,4 +1,4 @@
-"""Scenarios: files that say where the base and the wheels of a robot go, and what plays them, step by step."""
+"""Scenarios: files of where the base and the wheels of a robot go, and what plays them, step by step."""
 
 from solfer.scenarios.player import Player
 from solfer.scenarios.reader import read_scenario

@@ -1,4 +1,4 @@
-"""A scenario: what a file says, with all numbers as arrays."""
+"""A scenario: the content of a file, with all numbers as arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -59,7 +59,7 @@ class Scenario:
 
     @property
     def is_absolute(self) -> bool:
-        """Whether the file says where base and vertices begin; else all of it is relative to where they are."""
+        """Whether the file has the begins of base and vertices; else all of it is relative to where they are."""
         return bool(self.base.any() or self.vertices.any())
 
     @property

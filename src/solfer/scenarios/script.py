@@ -64,7 +64,7 @@ class Script:
         self.base_velocity[:] = 0.0
 
     def approach(self, goals: np.ndarray) -> None:
-        """Let vertices approach goals, shape (n, 3) [m]: exponentially, and the end of the way in one period."""
+        """Let vertices approach goals, shape (n, 3) [m]: exponentially, and the end of the path in one period."""
         np.subtract(goals, self.vertices, out=self._left)
         np.divide(self._left, self.period, out=self._left)
         np.multiply(self._left, self.vertex_speed, out=self.vertex_velocity)

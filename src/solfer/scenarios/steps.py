@@ -185,7 +185,7 @@ class _Circle(_Heading):
 
 
 def _straight(left: float, step: float) -> float:
-    """Return after how many steps of a length a way is gone, or passed to and fro for ever."""
+    """Return after how many steps of a length a path is gone, or passed to and fro for ever."""
     if left <= NEAREST:
         return 1.0
     return left / step + 2.0 if step > 0.0 else math.inf

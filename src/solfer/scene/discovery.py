@@ -36,7 +36,7 @@ class DiscoveredTopics:
         self._throttle = Throttle(logger, 5.0)
 
     def update(self) -> None:
-        """Ask for topics now and then, and subscribe what is new."""
+        """Request topics now and then, and subscribe what is new."""
         now = self._middleware.now()
         if self._pending is None and now >= self._next:
             self._pending = self._middleware.topics()

@@ -70,7 +70,7 @@ class ShownReference:
 
 @dataclass(frozen=True, eq=False)
 class SceneState:
-    """A robot with what it measures and what is desired of it; all in the axes of `frame`, if not said otherwise.
+    """A robot with its measured and desired state; all in the axes of `frame`, unless noted otherwise.
 
     Attributes:
         frame: Frame of reference: that of the messages with the pose of the base.

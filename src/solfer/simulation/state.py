@@ -81,7 +81,7 @@ class MotorSide:
     Attributes:
         two_mass: Which DoFs have motors with a motion of their own; for others `position` and `velocity` mean nothing.
         position, velocity: Of these motors [rad], [rad/s].
-        compliance: What the springs of other DoFs give way, zero without a spring [rad/Nm].
+        compliance: What the springs of other DoFs yield, zero without a spring [rad/Nm].
     """
 
     two_mass: np.ndarray

@@ -20,7 +20,7 @@ SHORT = 5.0
 ENGINE_TRIES = 3
 
 ENGINE_CALL_PERIOD = 5.0
-"""Period in which Slurm is asked for its jobs [s]."""
+"""Period in which Slurm is requested its jobs [s]."""
 
 
 class WorkerEngine(abc.ABC):

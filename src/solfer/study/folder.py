@@ -1,4 +1,4 @@
-"""The folder of a study, which is its truth: what runs, who runs it, and the results.
+"""The folder of a study, which is its truth: what runs, its workers, and the results.
 
     study.json                  the study, and its plan
     runs/<id>/claim.<n>         the n-th worker that took up the run

@@ -127,7 +127,7 @@ class Study:
         return _parsed(node), over
 
     def points(self, runs: int | None = None) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Yield seed and variations of each run: of each point of the grid as many as the file, or `runs`, asks for."""
+        """Yield seed and variations of each run: of each point of the grid as many as the file, or `runs`, requests."""
         vary = self.record.vary
         seed = self.record.seed
         grids = {name: each.grid for name, each in vary.items() if each.grid is not None}

@@ -25,7 +25,7 @@ def search(
     options: dict[str, Any],
     log: Callable[[str], None],
 ) -> list[Path]:
-    """Try values until there are as many trials as the file asks for; return the files of the table.
+    """Try values until there are as many trials as the file requests; return the files of the table.
 
     Raises:
         SolferError: Workers cannot work, or the folder cannot be written; the search goes on later.

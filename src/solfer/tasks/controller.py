@@ -76,7 +76,7 @@ class TaskController:
 
         Raises:
             TaskError: The levels cannot be a stack of this Robot, the duration is not positive, or too many changes
-                are under way. Nothing changes then.
+                are in progress. Nothing changes then.
         """
         levels = as_levels(levels)
         if not 0.0 < duration < np.inf:

@@ -205,7 +205,7 @@ class QpHierarchy:
         return None
 
     def _report(self, index: int, text: str, x: np.ndarray) -> None:
-        """Log a failure where it begins, with what is left of what each task of the level asks for."""
+        """Log a failure where it begins, with what is left of what each task of the level requests."""
         if index not in self._failing:
             self._failing.add(index)
             left = ", ".join(f"{name} {value:.3g}" for name, value in self._residuals(index, x[: len(self.velocity)]))

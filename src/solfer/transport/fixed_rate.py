@@ -65,7 +65,7 @@ class FixedRateLoop:
         self._sleep_until(self.deadline)
 
     def run(self, cycle: Callable[[float, int], None], running: Callable[[], bool]) -> None:
-        """Call `cycle` with what `begin` returns, as long as `running` says so.
+        """Call `cycle` with what `begin` returns, while `running` is true.
 
         The first cycle is due at once, or, in lock-step with a simulation, when that begins.
         """

@@ -38,7 +38,7 @@ OF_NODE = "#"
 
 @functools.lru_cache(256)
 def claimant(node: str, component: str) -> str:
-    """Return the name of who claims and commands: a component of a node, such as '/shared#joint_states'.
+    """Return the name of the claimant that commands: a component of a node, such as '/shared#joint_states'.
 
     The component that has the name of its node, as the only one of a node usually has, is the node itself; so is
     who names no component, such as a tool.

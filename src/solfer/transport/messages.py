@@ -58,7 +58,7 @@ class JointMessage:
 
     @property
     def claimant(self) -> str:
-        """Name of who commands with it; see `solfer.transport.lower_level.claimant`."""
+        """Name of the sender that commands with it; see `solfer.transport.lower_level.claimant`."""
         return claimant(self.sender, self.component)
 
     @classmethod

@@ -102,7 +102,7 @@ class HealthReport:
 
 
 class Middleware(abc.ABC):
-    """A way to the outside: topics, services, parameters and a clock.
+    """A connection to the outside: topics, services, parameters and a clock.
 
     Topic names without a leading slash are relative to the node's namespace. Message names are canonical
     (`solfer.transport.messages.canonical`).
@@ -302,7 +302,7 @@ class Middleware(abc.ABC):
 
     @abc.abstractmethod
     def topics(self) -> "Future[Topics]":
-        """Ask for the topics of all other nodes. Not for the cycle: asking takes time, though it does not block.
+        """Request the topics of all other nodes. Not for the cycle: it takes time, though it does not block.
 
         The Future holds the answer, or a MiddlewareError if it cannot be found out.
         """

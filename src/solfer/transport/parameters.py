@@ -31,7 +31,7 @@ class GetParameters:
 
 @dataclass(frozen=True)
 class ParametersReply:
-    """What `GetParameters` asks for: a text for each parameter; values in YAML, and empty where there is none.
+    """What `GetParameters` requests: a text for each parameter; values in YAML, and empty where there is none.
 
     Attributes:
         configured: The values that the plugin was made with.

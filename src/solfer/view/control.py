@@ -54,7 +54,7 @@ class PageControl:
 
     Args:
         server: The pages.
-        requests: Carries out what they ask for.
+        requests: Carries out what they request.
         middleware: Carries the commands.
     """
 

@@ -1,4 +1,4 @@
-"""The button of the emergency stop, which asks once before it stops."""
+"""The button of the emergency stop, with one question before it stops."""
 
 from collections.abc import Callable
 

@@ -26,7 +26,7 @@ class PageLives:
 
     Args:
         server: The pages.
-        now: Time [s]; any thread may ask for it.
+        now: Time [s]; any thread may request it.
     """
 
     def __init__(self, server: PageServer, now: Callable[[], float]):

@@ -32,7 +32,7 @@ CAMERA_FIELD_OF_VIEW = math.radians(40.0)
 
 
 class Page:
-    """A page of one robot; `update` is called by one loop, which does all that pages ask for.
+    """A page of one robot; `update` is called by one loop, which does all that pages request.
 
     Args:
         server: Serves it.

@@ -8,11 +8,11 @@ from solfer.transport import Middleware
 from solfer.transport.parameters import GET_PARAMETERS, GETTING, GetParameters, ParametersReply
 
 TRIALS, PARAMETERS_PAUSE = 10, 2.0
-"""How often, and after which time [s], a part is asked for its parameters: it may report before it offers them."""
+"""How often, and after which time [s], a part is requested its parameters: it may report before it offers them."""
 
 
 class KnownParameters:
-    """Asks each part that reports its health for its parameters, until they are known.
+    """Requests the parameters of each part that reports its health, until they are known.
 
     Args:
         middleware: Has their services.
@@ -29,7 +29,7 @@ class KnownParameters:
         self._next: dict[str, float] = {}
 
     def update(self, parts: Iterable[str]) -> None:
-        """Ask, and take the answers that are there."""
+        """Send requests, and take the replies that are there."""
         now = self._middleware.now()
         for part in parts:
             if part in self._pending:
@@ -42,7 +42,7 @@ class KnownParameters:
                 self._pending[part] = answer
 
     def forget(self, part: str) -> None:
-        """Let a part be asked again, since its parameters have changed."""
+        """Request a part's parameters again, since they have changed."""
         self._left[part] = TRIALS
         self._next[part] = -math.inf
 

@@ -1,4 +1,4 @@
-"""What pages ask for: it arrives in viser's threads, and is carried out in the loop of the page."""
+"""What pages request: it arrives in viser's threads, and is carried out in the loop of the page."""
 
 import logging
 from collections.abc import Callable
@@ -18,7 +18,7 @@ logger = logging.getLogger(__name__)
 
 
 class PageRequests:
-    """Carries out what pages ask for, and calls services.
+    """Carries out what pages request, and calls services.
 
     Args:
         middleware: Has the services.

@@ -85,7 +85,7 @@ class PageServer:
         self.viser.stop()
 
     def _guarded(self, serve: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a `serve` that asks `_refusal` about each request first, and receives signs of life."""
+        """Return a `serve` that checks each request by `_refusal` first, and receives signs of life."""
 
         def guarded(handler: Handler, *arguments: Any, process_request: Process, **options: Any) -> Any:
             self._is_guarded = True

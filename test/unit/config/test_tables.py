@@ -13,7 +13,7 @@ from solfer.config.records.pipes import HOMES
 from solfer.pipes.kinds import PIPE_KINDS as PIPES
 
 PACKAGE = Path(__file__).resolve().parents[3] / "src" / "solfer"
-TABLE = {"config/records/spaces.py", "config/records/middlewares.py"}
+TABLE = {"config/records/middlewares.py"}
 
 
 def words_in(path) -> set[str]:
@@ -33,7 +33,7 @@ def users(words, *homes) -> dict[str, set[str]]:
 @pytest.mark.slow
 def test_only_its_home_knows_a_kind():
     assert users(HOMES, *(f"{folder}/{home}" for home in HOMES.values() for folder in ("config/kinds", "pipes"))) == {
-        "config/records/pipes.py": {"JOINT"},  # what a controller carries that does not say
+        "config/records/pipes.py": set(HOMES),  # the table
         "robot/contact_pipes.py": {"CONTACT"},
     }
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 REPORT_WORD = "report"
-"""Word in place of a file that asks for the page of a study."""
+"""Word in place of a file that requests the page of a study."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Carry out what the command line asks for.
+    """Carry out what the command line requests.
 
     Raises:
         SolferError: The study is wrong, or cannot go on.

@@ -62,7 +62,7 @@ RECORDING_ACTIONS = {"info": info, "cut": cut, "export": export}
 
 
 def _chosen(options: argparse.Namespace) -> Recording:
-    """Return the part of a recording that was asked for."""
+    """Return the part of a recording that was requested."""
     recording = read(options.file)
     _warn(recording)
     start, end = span(recording)

@@ -152,7 +152,7 @@ def _fill(fills: "Sequence[FileDrain]") -> None:
 
 
 def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "RecordingWriter") -> None:
-    """Drain for `seconds`, until a signal asks for the end, or until all that record have ended."""
+    """Drain for `seconds`, until a signal requests the end, or until all that record have ended."""
     from solfer.realtime.process import ProcessEnd
 
     begin = time.monotonic()

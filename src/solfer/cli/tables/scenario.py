@@ -39,7 +39,7 @@ class ScenarioTrace:
 
     @property
     def distance(self) -> np.ndarray:
-        """Way of the base on the ground, shape (T + 1,) [m]."""
+        """Path length of the base on the ground, shape (T + 1,) [m]."""
         steps = np.linalg.norm(np.diff(self.base[:, :2], axis=0), axis=1)
         return np.concatenate(([0.0], np.cumsum(steps)))
 

@@ -340,7 +340,7 @@ class ReferenceFollower(Component, abc.ABC):
         """Return what keeps a task away from its reference."""
 
     def _judge(self) -> None:
-        """Say what cannot be reached, the farthest task first: as long as it moves, it may pull others away."""
+        """Report what cannot be reached, the farthest task first: as long as it moves, it may pull others away."""
         farthest = None
         distance = 0.0
         for target in self._list:

@@ -10,7 +10,7 @@ CHECK, CHECKS = 0.02, 5
 """Time between two looks at whether a task still comes nearer to its reference [s], and how many it may not."""
 
 CREEP, GROWTH = 1e-3, 0.2
-"""Share of the rate that its gain asks for below which it does not: the rest would take a thousand times as long. It
+"""Share of the rate that its gain requests below which it does not: the rest would take a thousand times as long. It
 grows by the factor e in each time of the second number [s] that the reference has been at rest: what an arm gains by
 swinging on gets less and less, and it comes to rest in any case."""
 

@@ -116,7 +116,7 @@ class Target:
         self._progress = TaskProgress(references.period, float(self.task.gain.max()))
 
     def limit(self, motion: MotionRecord) -> None:
-        """Let the reference move as a record says, and errors be corrected no faster, as far as that counts."""
+        """Let the reference move by the limits of a record, and errors be corrected no faster."""
         self._filtered.limits[:] = motion.limits
         correction = self.task.correction
         correction[:] = self._correction
@@ -284,7 +284,7 @@ class Target:
         return self._filtered.is_still
 
     def measure(self) -> float:
-        """Compute how far the point is from its reference; return the displacement that a step asks for, K |e| T."""
+        """Compute how far the point is from its reference; return the displacement that a step requests, K |e| T."""
         residual = self._residual
         if not self._held.is_held:
             residual.measure()
@@ -307,7 +307,7 @@ class Target:
         self._held.take_again()
 
     def judge(self) -> str:
-        """Note whether it has come to rest away from its reference; return what to say about it, once."""
+        """Note whether it has come to rest away from its reference; return a report of that, once."""
         return str(self._residual) if self._progress.judge(self._residual.is_beyond()) else ""
 
     def _end_generated(self) -> None:

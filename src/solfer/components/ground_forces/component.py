@@ -242,7 +242,7 @@ class GroundForces(Component):
 
     def _compute(self) -> None:
         """Write what the law computes into the contacts, and note their normal forces and speeds."""
-        self.model.contacts  # noqa: B018 they are updated where they are asked for
+        self.model.contacts  # noqa: B018 they are updated where they are requested
         for index, contact in enumerate(self._contacts):
             self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
         self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted, self.passed)

@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 SECOND_LEVEL = 1e-5
 """Weight of the second level's tasks beside those of the first. These are weights, and no second QP, which would take
-as long again: a task of the first level gives way by a hundred-thousandth of what the second demands against it, less
+as long again: a task of the first level yields by a hundred-thousandth of what the second demands against it, less
 than a millimetre where legs are nearly stretched."""
 
 HORIZON_PERIODS = 2.0

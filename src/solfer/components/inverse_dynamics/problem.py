@@ -104,7 +104,7 @@ class WholeBodyProblem:
         self._most[: len(self._driven)] = self._limits
 
     def solve(self, jacobian: np.ndarray, desired: np.ndarray, demanded: np.ndarray) -> bool:
-        """Solve the problem at the state of the last update of the Robot; `violated` says why it has no solution.
+        """Solve the problem at the last update of the Robot; `violated` has the reason where there is no solution.
 
         Args:
             jacobian: W J of all tasks, shape (rows, n).

@@ -1,4 +1,4 @@
-"""How far a robot gives way under its load."""
+"""How far a robot yields under its load."""
 
 import numpy as np
 

@@ -55,12 +55,12 @@ class SoftLevel:
 
     def update(self) -> None:
         """Measure how far the targets are from their references, and damp all tasks of the level accordingly."""
-        way = 0.0
+        distance = 0.0
         for one in self._targets:
-            way += one.measure()
+            distance += one.measure()
         if not self._length:
             return
-        added = self._length * way
+        added = self._length * distance
         if added > NEGLIGIBLE * self._least:
             others = added * (DAMPING_SHARE_FAR + DAMPING_SHARE * added) / (DAMPING_SHARE_FAR + added)
             for task, damping, target in self._dampings:

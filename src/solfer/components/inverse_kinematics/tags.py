@@ -16,7 +16,7 @@ _ORIGINAL = "; with the original's tags "
 
 
 class DeflectionRecord(Record):
-    """How far the robot gives way under its load."""
+    """How far the robot yields under its load."""
 
     time_constant: float = Field(
         default=0.5,

@@ -263,7 +263,7 @@ class FilteredOdometry:
             self._weights[:] = 1.0
 
     def _measure_displacements(self) -> None:
-        """Compute the ways that wheels measure without a turn about the vertical, and that of the base's tilting."""
+        """Compute displacements by the wheels without a turn about the vertical, and that of the base's tilting."""
         wheels = self._wheels
         filter_kernel.measure_displacements(
             wheels.jacobian, self._jacobian_before, wheels.arms, self._arms_before, self._step, self._base.turned,

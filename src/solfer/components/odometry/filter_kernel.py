@@ -82,7 +82,7 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
 def _measure_displacements(
     jacobian, before, arms, arms_before, step, turned, weights, displacements, mean, arm, tilting
 ):
-    """Write the ways that wheels measure, with mean Jacobians and arms, and the way of the ground point by tilting."""
+    """Write displacements measured by wheels, with mean Jacobians and arms, and that of the ground point by tilting."""
     px = turned[0]
     py = turned[1]
     total = 0.0
@@ -183,7 +183,7 @@ def height_above_others(weights, arms, normal, i, slope):
 
 @part
 def along_normal(displacements, arms, i, turn, x, y, z):
-    """Return what a wheel measures of the base's way along a normal x, y, z, with a turn about the vertical [m]."""
+    """Return a wheel's part of the base's displacement along a normal x, y, z, with a turn about the vertical [m]."""
     return (
         x * (displacements[i, 0] + turn * arms[i, 1])
         + y * (displacements[i, 1] - turn * arms[i, 0])

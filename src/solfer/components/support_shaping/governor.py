@@ -67,7 +67,7 @@ class LimitRows:
 
 
 class SupportGovernor:
-    """Changes desired velocities of the vertices, seen from the base, as little as the limits of the polygon ask for.
+    """Changes desired velocities of the vertices, seen from the base, as little as the limits of the polygon request.
 
     With the velocities u of the vertices in the heading frame, u_w of those that are desired, the margins m with their
     gradients M and the distances l of wheels from hips (with their directions e), and slacks s:
@@ -128,7 +128,7 @@ class SupportGovernor:
         self.start()
 
     def tune(self, gains: Sequence[float], horizon: float, recovery: float) -> None:
-        """Set the weights, the horizon and the speed of the way back, see above."""
+        """Set the weights, the horizon and the speed of the return, see above."""
         self._rows.horizon = horizon
         self._rows.recovery = recovery
         slacks = np.arange(2 * self.limits.shape[1], 4 * self.limits.shape[1])

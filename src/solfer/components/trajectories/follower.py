@@ -1,4 +1,4 @@
-"""Moves joints along a trajectory, and supervises the goal of an action that asked for it."""
+"""Moves joints along a trajectory, and supervises the goal of an action that requested it."""
 
 from dataclasses import dataclass
 
@@ -94,7 +94,7 @@ class TrajectoryFollower:
         velocity: How fast, shape (n,) [rad/s, m/s]; written.
 
     Attributes:
-        moving: Whether a trajectory is under way.
+        moving: Whether a trajectory is in progress.
         places: The joints that it moves, indices into `joints`.
     """
 
@@ -168,7 +168,7 @@ class TrajectoryFollower:
             self._supervise(self._supervised, self._motion)
 
     def leave(self, why: str) -> None:
-        """Leave the joints where they are, with their speed; a goal that is under way ends with this reason."""
+        """Leave the joints where they are, with their speed; a goal that is in progress ends with this reason."""
         self.moving = False
         self._motion = None
         if self._supervised is not None and self._outcome is None:
@@ -182,7 +182,7 @@ class TrajectoryFollower:
         self._outcome = None
 
     def outcome(self) -> Outcome | None:
-        """Return how the goal has ended; None: it is under way."""
+        """Return how the goal has ended; None: it is in progress."""
         return self._outcome
 
     @property

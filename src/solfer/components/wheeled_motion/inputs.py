@@ -15,7 +15,7 @@ log = logging.getLogger(__name__)
 
 
 class ReferenceInputs:
-    """Lets the references move as others say; where these fall silent in the middle of a motion, it comes to rest.
+    """Lets the references move as messages request; where these fall silent in a motion, it comes to rest.
 
     Args:
         name: Name of the component.

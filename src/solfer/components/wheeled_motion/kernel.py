@@ -1,4 +1,4 @@
-"""Loops over the wheels, compiled: which way they are to point, and the errors and rates of the tasks."""
+"""Loops over the wheels, compiled: their desired directions, and the errors and rates of the tasks."""
 
 import math
 from pathlib import Path
@@ -192,7 +192,7 @@ def _compile_steer(sources):
 
 @part
 def _find_base(place, pose, desired_place, desired_orientation, error):
-    """Write the vector part of the quaternion that turns the base to its reference, and what is left of the way."""
+    """Write the vector part of the quaternion that turns the base to its reference, and the rest of the path."""
     x = pose[3]
     y = pose[4]
     z = pose[5]
@@ -221,7 +221,7 @@ def _find_soft(angles, desired, half, most, error):
 
 @part
 def _choose_turns(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
-    """Write desired directions of wheels, by the shorter way whose end is within the range of the steering joint.
+    """Write desired directions of wheels, by the shorter turn whose end is within the range of the steering joint.
 
     The way goes from where the joint is measured, as the wheel is; its commanded position may be elsewhere, and has to
     be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its

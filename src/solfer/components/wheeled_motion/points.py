@@ -1,4 +1,4 @@
-"""Points of `wheeled_motion`: angles of wheels, pose of the base, and vertices along the wheels' ways of rolling."""
+"""Points of `wheeled_motion`: angles of wheels, pose of the base, and vertices along the rolling directions."""
 
 import abc
 import math
@@ -107,7 +107,7 @@ class BasePose(CompiledPoint):
 
 
 class RollingOffsets(CompiledPoint):
-    """How far the vertices of wheels are behind their references along the ways in which the wheels roll [m], negative.
+    """Distances of the wheels' vertices behind their references along the rolling directions [m], negative.
 
     A vertex p has the reference r in the frame of the base's heading: with the turn R about z by the heading and the
     base's place b, the offset is x.((p - b) - R r), where x is the direction of rolling. What is across x is a matter

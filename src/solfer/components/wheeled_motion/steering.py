@@ -1,4 +1,4 @@
-"""Which way wheels are to point: by the desired motion of the base, and by the errors of the vertices."""
+"""Desired directions of wheels: by the desired motion of the base, and by the errors of the vertices."""
 
 import numpy as np
 

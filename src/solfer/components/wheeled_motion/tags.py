@@ -191,12 +191,12 @@ class DrivingTags(OriginalTaskTags):
 
     @property
     def rests(self) -> bool:
-        """Whether wheels that steer as `steerings` say rest with small errors."""
+        """Whether wheels that steer by `steerings` rest with small errors."""
         return self.rest and not self.is_original
 
     @property
     def gain_across(self) -> float:
-        """Gain of errors across the wheels [1/s]; 0: they steer as `steerings` say."""
+        """Gain of errors across the wheels [1/s]; 0: they steer by `steerings`."""
         return 0.0 if self.is_original else self.across
 
     def steering_record(self) -> SteeringRecord:

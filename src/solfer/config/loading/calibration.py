@@ -63,7 +63,7 @@ def read_calibrations(
 
 
 def _check_all_or_none(pipes: tuple[AnyPipeRecord, ...], problems: Problems) -> None:
-    """Check that a plugin that commands calibrated joints receives them calibrated, and the other way round."""
+    """Check that a plugin that commands calibrated joints receives them calibrated, and vice versa."""
     commands = [pipe for pipe in pipes if isinstance(pipe, ControllerRecord) and pipe.lower_level]
     received = [pipe for pipe in pipes if isinstance(pipe, FeedbackRecord) and not _not_hardware(pipe)]
     receives_calibrated = any(pipe.calibration for pipe in received)

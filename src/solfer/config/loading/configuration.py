@@ -162,7 +162,7 @@ class Part:
         )
 
     def place(self, *path: Key) -> Mark:
-        """Return the place of the module, or of the value at `path` below it, or of the nearest one on the way."""
+        """Return the place of the module, or of the value at `path` below it, or of the nearest one above it."""
         return self.module.nearest(path).mark if path else self.module.head
 
 

@@ -33,7 +33,7 @@ def module_names(file: str | os.PathLike) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class ModulePlacement:
-    """Where modules run, if that is not as their configurations say.
+    """Layers in which modules run, where these differ from their configurations.
 
     Attributes:
         layer: `RT` or `NRT` instead of the layer of the module or the shared plugin.
@@ -226,7 +226,7 @@ def _chosen(kind: str, folder: YamlNode | None, choice: YamlNode | None, problem
 
 
 def _with(node: YamlNode, path: tuple[Key, ...], value: YamlNode) -> YamlNode:
-    """Return `node` with `value` at a key path; what is not a map on the way stays as it is."""
+    """Return `node` with `value` at a key path; what is not a map along the path stays as it is."""
     if not path:
         return value
     if not isinstance(node.value, dict):

@@ -190,7 +190,7 @@ class Reading:
         return sources
 
     def _warn_of_missing_layer(self, config: TextRecord) -> None:
-        """Warn of a file of the RT layer that is not here: only who runs the layer needs it."""
+        """Warn of a file of the RT layer that is not here: only the layer itself needs it."""
         found = Problems()
         location_of(config, found)
         for error in found.errors:

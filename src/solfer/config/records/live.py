@@ -1,4 +1,4 @@
-"""Tags that can be changed while a plugin runs: what their fields say of them, and records with other values."""
+"""Tags that can be changed while a plugin runs: the metadata of their fields, and records with other values."""
 
 import json
 import re

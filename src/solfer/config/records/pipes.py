@@ -53,7 +53,7 @@ LOWER_LEVEL_LAYERS = ("online", "lower_level")
 
 @dataclass(frozen=True)
 class Content:
-    """What pipes of a kind carry, as far as others than these pipes ask.
+    """Content of pipes of a kind, as far as others than these pipes need it.
 
     Attributes:
         joints: Whether it is numbers of joints: those have a motor side, limits, a calibration, and a lower level.

@@ -1,4 +1,4 @@
-"""Records of references that need no program: circles, lines, sines, way-points, and tables in CSV files."""
+"""Records of references that need no program: circles, lines, sines, waypoints, and tables in CSV files."""
 
 from typing import Annotated, Literal
 
@@ -69,7 +69,7 @@ class SineReferenceRecord(Record):
 
 
 class WaypointReferenceRecord(Record):
-    """A way-point; what it leaves out is as at the one before."""
+    """A waypoint; what it leaves out is as at the one before."""
 
     time: float = Field(ge=0.0, le=1e5, description="when it is there, from the beginning of the reference on [s]")
     position: Place | None = Field(default=None, description="position [m]")

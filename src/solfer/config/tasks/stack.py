@@ -138,7 +138,7 @@ class TaskRecord(Record):
 
     @property
     def is_motion(self) -> bool:
-        """Whether it is linear in the velocities, so that its error says nothing."""
+        """Whether it is linear in the velocities, so that its error means nothing."""
         return self.point in ("rolling", "angular_momentum")
 
 

@@ -72,7 +72,7 @@ class YamlNode:
         return None if node.value is None else node
 
     def nearest(self, path: Iterable[Key]) -> "YamlNode":
-        """Return the Node at `path`, or the deepest one on the way to it."""
+        """Return the Node at `path`, or the deepest one above it."""
         node = self
         for key in path:
             child = _child(node, key)

@@ -1,4 +1,4 @@
-"""What the parser of YAML says, in words that name the cure."""
+"""Messages of the parser of YAML, in words that name the cure."""
 
 import re
 import unicodedata

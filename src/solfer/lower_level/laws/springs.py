@@ -25,7 +25,7 @@ class Springs:
         damping: Of the spring [Nms/rad].
         rotor: Inertia of the rotor [kg m^2].
         friction: Damping of the motor [Nms/rad].
-        two_mass: Which DoFs have two masses. Other springs only give way, with the torque of the step.
+        two_mass: Which DoFs have two masses. Other springs only yield, with the torque of the step.
     """
 
     stiffness: np.ndarray
@@ -36,7 +36,7 @@ class Springs:
 
     @property
     def compliance(self) -> np.ndarray:
-        """What the springs give way that only give way [rad/Nm], zero for all others, shape (size,)."""
+        """What the springs yield that only yield [rad/Nm], zero for all others, shape (size,)."""
         static = (self.stiffness > 0.0) & ~self.two_mass
         return np.divide(1.0, self.stiffness, out=np.zeros_like(self.stiffness), where=static)
 

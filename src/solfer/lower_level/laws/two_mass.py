@@ -38,7 +38,7 @@ class TwoMassImpedance(ImplicitImpedance):
     linear system of the size of M. It knows contacts only by what they did in the last second: while they change, the
     spring of a link that they hold is softer than K by up to (w dt)^2 / 12. Link and motor feel opposite torques.
 
-    A spring that swings faster than a step resolves only gives way, theta = q + tau / K: its rotor has no inertia, and
+    A spring that swings faster than a step resolves only yields, theta = q + tau / K: its rotor has no inertia, and
     the impedance acts on the joint, with spring, damper and torque of the law times 1 / (1 + stiffness / K),
     as of springs in series.
 

@@ -158,9 +158,9 @@ class Bridge:
             "services": len(self.forwarding.names),
             "requests": self.forwarding.requests,
         }
-        for way, crossings in (("in", self._forwards_in), ("out", self._forwards_out)):
+        for direction, crossings in (("in", self._forwards_in), ("out", self._forwards_out)):
             for crossing in crossings:
-                values[f"{way} {crossing.topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
+                values[f"{direction} {crossing.topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
         for name, report in self._inside.reports().items():
             if self._reports.get(name) is not report:  # what has ended is not reported again
                 self._reports[name] = report

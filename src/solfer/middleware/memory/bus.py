@@ -108,7 +108,7 @@ class FaultyTopic(Topic):
 
 @dataclass(frozen=True, order=True)
 class _Delivery:
-    """A message on its way."""
+    """A message in transit."""
 
     due: float
     order: int
@@ -134,7 +134,7 @@ class Bus:
     registration where times are equal. The same work gives the same results to the last bit.
 
     Args:
-        parameters: Values that nodes can ask for, by name, such as '/robot_description'.
+        parameters: Values that nodes can request, by name, such as '/robot_description'.
         faults: What goes wrong on its topics and in its loops; None: nothing.
 
     Attributes:

@@ -63,7 +63,7 @@ class FaultsRecord(Record):
 
 
 class Line:
-    """The way of a topic's messages to their readers.
+    """Transit of a topic's messages to their readers.
 
     Args:
         faults: What happens to them.

@@ -59,7 +59,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         interface: Its type, `package/Type`.
         request: Dataclass with the fields of the type's request.
         timeout: Longest time until the reply [s].
-        running: False when the node was asked to end.
+        running: False when the node has to end.
 
     Returns:
         The response, of the type's class.
@@ -67,7 +67,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
     Raises:
         ServiceUnavailable: There was no such service within `timeout`.
         MiddlewareError: There was no reply within `timeout`.
-        Ended: The node was asked to end.
+        Ended: The node has to end.
     """
     resolved = rospy.resolve_name(name)
     ros_class = service_class(interface)

@@ -1,4 +1,4 @@
-"""Topics: the newest message, every message, and a way to write.
+"""Topics: the newest message, every message, and their writers.
 
 rospy's receiving threads only store bytes; what is read is decoded in the thread that reads. Nagle's algorithm is off
 on both ends: with it, messages of the size of a joint state arrive in pairs and up to 40 ms late.

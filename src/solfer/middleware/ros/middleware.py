@@ -188,7 +188,7 @@ class RosMiddleware(Middleware):
         """See `Middleware._first_order`.
 
         Raises:
-            Ended: The node was asked to end.
+            Ended: The node has to end.
         """
         reader = RosReader(topic, message)
         try:
@@ -202,12 +202,12 @@ class RosMiddleware(Middleware):
 
         Raises:
             MiddlewareError: No node offers the service, or no answer came in time.
-            Ended: The node was asked to end.
+            Ended: The node has to end.
         """
         return replied(call(name, interface, request, timeout=timeout, running=self.running), reply)
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
-        """See `Middleware.request`; it is sent also when the node was asked to end."""
+        """See `Middleware.request`; it is sent also when the node has to end."""
         answer = in_thread(
             lambda: replied(call(name, interface, request, timeout=timeout, running=lambda: True), reply)
         )

@@ -47,7 +47,7 @@ class RosService:
         owner: Name of the part that offers it; the service's name is `<owner>/<name>`.
         service: The declaration.
         submit: Passes calls to the loop.
-        running: False when the node was asked to end.
+        running: False when the node has to end.
 
     Attributes:
         name: Its name, before it is resolved.

@@ -26,8 +26,8 @@ class SendBacklog:
     """What a subscriber that reads too slowly has not received yet.
 
     Attributes:
-        rest: End of a message that is under way already; it has to come first.
-        newest: The newest message of each publisher, of which nothing is under way.
+        rest: End of a message that is in progress already; it has to come first.
+        newest: The newest message of each publisher, of which nothing is in progress.
     """
 
     rest: bytes = b""
@@ -39,7 +39,7 @@ class SendBacklog:
         return b"".join((self.rest, *self.newest.values()))
 
     def subtract(self, count: int) -> None:
-        """Forget the first `count` bytes: they are under way."""
+        """Forget the first `count` bytes: they are in progress."""
         self.rest, count = self.rest[count:], count - len(self.rest)
         while count > 0:
             message = self.newest.pop(next(iter(self.newest)))
@@ -51,7 +51,7 @@ Backlogs = dict[TCPROSTransport, SendBacklog]
 
 _backlogs: "WeakKeyDictionary[Any, Backlogs]" = WeakKeyDictionary()
 """The backlogs of each topic of this process: several publishers of it, one of each component, share its connections,
-so that none may send while half a message of another one is under way."""
+so that none may send while half a message of another one is in progress."""
 
 
 class TopicPublisher:
@@ -131,7 +131,7 @@ class TopicPublisher:
         self._publisher.unregister()
 
     def _keep(self, connection: TCPROSTransport, message: bytes, sent: int) -> None:
-        """Keep a message, of which the first `sent` bytes are under way."""
+        """Keep a message, of which the first `sent` bytes are in progress."""
         for known in [each for each in self._backlogs if each.done]:
             del self._backlogs[known]
         self._backlogs[connection] = SendBacklog(newest={self: message})

@@ -10,7 +10,7 @@ from solfer.transport.topics import Topics
 def topics_beside(node: str, endpoints: Sequence[RosReader | RosQueue | RosWriter]) -> Topics:
     """Find the topics that other nodes than `node` publish and receive; `endpoints` are its own.
 
-    The master knows only the types of publishers. A subscriber of this node that did not connect is asked for its type.
+    The master knows only the types of publishers. A subscriber of this node that did not connect is requested its type.
 
     Raises:
         MiddlewareError: The master does not answer.

@@ -81,7 +81,7 @@ class XbotMiddleware(Middleware):
     Args:
         namespace: Name of the namespace, or the namespace itself, which several nodes of one process may share.
         name: Name of the node; it is the sender of what it writes.
-        parameters: Values that can be asked for by name.
+        parameters: Values that can be requested by name.
         clock: Clock of all nodes of the namespace; None: the machine's monotonic clock.
         listens: Whether it counts as a subscriber of the topics that it reads; a bridge, which only forwards, does not.
 
@@ -117,7 +117,7 @@ class XbotMiddleware(Middleware):
     @property
     def rewinds(self) -> int:
         """See `Middleware.rewinds`; of a simulation in this namespace."""
-        return self._simulated.words[REWINDS]  # a cycle asks for it
+        return self._simulated.words[REWINDS]  # a cycle requests it
 
     def now(self) -> float:
         """See `Middleware.now`."""

@@ -119,7 +119,7 @@ class Description:
         return tuple(found)
 
     def _lead(self, name: str, mimic: Mimic) -> list[SolferError]:
-        """Find the joint at the end of the chain that a joint follows; return what keeps it from moving that way."""
+        """Find the joint at the end of the chain that a joint follows; return the reason why it cannot move so."""
         where = self.joints[name].where
         followed = [name]
         while mimic is not None:

@@ -146,7 +146,7 @@ def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
 def _published_gains(
     record: ControllerRecord, context: PipeContext, mapping: BidirectionalMap
 ) -> dict[str, np.ndarray]:
-    """Ask the lower level for the gains that a pipe carries, in its order. A plugin that sends nothing needs none.
+    """Request the lower level's gains that a pipe carries, in its order. A plugin that sends nothing needs none.
 
     Raises:
         MiddlewareError: The lower level does not publish its gains.

@@ -66,6 +66,6 @@ class JointLeaps:
             )
         if wrong >= count:
             raise Contradiction(f"'{name}' at {velocity[wrong - count]:.3g} rad/s", expected=fastest)
-        way = position[wrong] - self._before[0, wrong]
+        leap = position[wrong] - self._before[0, wrong]
         gap = arrival - self._before[1, wrong]
-        raise Contradiction(f"'{name}' leaps by {way:.3g} rad in {1e3 * gap:.0f} ms", expected=fastest)
+        raise Contradiction(f"'{name}' leaps by {leap:.3g} rad in {1e3 * gap:.0f} ms", expected=fastest)

@@ -1,4 +1,4 @@
-"""Which plugins of a process share a Robot, and what feeds it (section 2.3 of the paper): one rule for all who ask.
+"""Which plugins of a process share a Robot, and what feeds it (section 2.3 of the paper): one rule for all.
 
 Nothing here needs a Robot: the runtime, `solfer graph` and the log ask the same functions.
 """

@@ -32,7 +32,7 @@ def wait_for_robot(
     running: Callable[[], bool],
     pause: Callable[[], None],
 ) -> bool:
-    """Wait until the robot is there; says for what, once and every `ROBOT_REPEAT_PERIOD` [s].
+    """Wait until the robot is there; log what is missing, once and every `ROBOT_REPEAT_PERIOD` [s].
 
     Args:
         configurations: Those of the plugins.

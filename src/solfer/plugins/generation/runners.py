@@ -1,4 +1,4 @@
-"""Which node runs a configuration: its `middleware` and `layer` say it, or the file of an RT layer that lists it."""
+"""Which node runs a configuration: by its `middleware` and `layer`, or by the file of an RT layer that lists it."""
 
 import logging
 import os
@@ -33,7 +33,7 @@ class Foreign(NamedTuple):
 
 
 def require_ros(configuration: Configuration, default: Naming, shared: bool = False) -> None:
-    """Check that a node under ROS is what the configuration asks for.
+    """Check that a node under ROS is what the configuration requests.
 
     Args:
         configuration: The configuration.
@@ -124,7 +124,7 @@ def _note_required(report: CheckReport) -> None:
 
 
 def _foreign(configuration: Configuration) -> Foreign | None:
-    """Return what says that a configuration is not for the layer NRT on ROS; also of one with mistakes."""
+    """Return what shows that a configuration is not for the layer NRT on ROS; also of one with mistakes."""
     tree = configuration.tree
     middleware = tree.get("middleware")
     layer = tree.get("modules", configuration.name, "layer")

@@ -109,7 +109,7 @@ class Sharing:
 
 
 def described(groups: Sequence[Sequence[Configuration]]) -> Iterator[str]:
-    """Yield a line for each Robot of a process: who shares it, or why it is another one than the first."""
+    """Yield a line for each Robot of a process: the plugins that share it, or why it is another one than the first."""
     for group in groups:
         names = "', '".join(each.module.name for each in group)
         shares = f"'{names}' share one Robot" if len(group) > 1 else f"'{names}' has a Robot of its own"

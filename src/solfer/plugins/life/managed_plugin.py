@@ -76,7 +76,7 @@ class ManagedPlugin:
             self._try(self.plugin.restart, PluginState.STARTING)
 
     def stop(self, reason: str = "") -> None:
-        """Bring the robot to rest, and release the joints; `reason`: why, where nobody has asked for it."""
+        """Bring the robot to rest, and release the joints; `reason`: why, where nobody has requested it."""
         self._before = ()
         self._try(self.plugin.stop, PluginState.STOPPING, reason)
 

@@ -13,7 +13,7 @@ class JointFollowing:
     """Compares what is commanded to the lower level with what is measured, once a cycle.
 
     - A joint with a position controller does not follow where it has been farther than 1 rad or m from its command
-      for 0.5 s: springs under a load give way less. Without stiffness it is not watched.
+      for 0.5 s: springs under a load yield less. Without stiffness it is not watched.
     - A joint with a velocity controller does not follow where it lags by 0.5 rad or m: by what it is commanded to go
       in all the time in which it goes less than a fifth of that.
 

@@ -71,7 +71,7 @@ class Outputs:
         self.start_position = np.array(robot.state.position)
 
     def _moves(self, pipe: JointCommandPipe) -> bool:
-        """Return whether joints move by what a pipe sends, if only by way of another plugin."""
+        """Return whether joints move by what a pipe sends, if only through another plugin."""
         return not self._idle and bool(np.isin(pipe.dofs, self._robot.actuated).any())
 
     @property
@@ -173,7 +173,7 @@ class Outputs:
     def _find_start(self) -> None:
         """Find where joints start: where they are measured, but those that follow what was sent last, there.
 
-        A joint under a load stays away from its command. If it started where it is, it would give way once more, and
+        A joint under a load stays away from its command. If it started where it is, it would yield once more, and
         again with each further start.
         """
         self.start_position[:] = self._robot.state.position

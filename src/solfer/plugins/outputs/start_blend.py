@@ -128,7 +128,7 @@ class _Field:
         np.subtract(self._values, self._start, out=self.gap)
 
     def time(self) -> float:
-        """Compute how long the way takes [s]; only positions need time of their own."""
+        """Compute the duration of the blend [s]; only positions need time of their own."""
         return 0.0
 
     def blend(self, share: float) -> None:

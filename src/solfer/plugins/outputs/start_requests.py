@@ -28,7 +28,7 @@ class StartRequest(NamedTuple):
         service: Full name of the service.
         interface: `package/Type` of it.
         request: Its fields.
-        what: What the lower level is asked for, for the log.
+        what: What the lower level is requested, for the log.
     """
 
     service: str

@@ -1,4 +1,4 @@
-"""The ends of the shared space: who publishes what, and whether those that receive it can use it."""
+"""The ends of the shared space: publishers, and whether those that receive from them can use it."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -56,7 +56,7 @@ def _check_end(pipe: FeedbackPipe, channel: SpaceChannel, sender: CommandPipe | 
 
 
 def _located(error: SolferError, pipe: FeedbackPipe, publication: SharedTopic, where: str) -> SolferError:
-    """Add both ends to an error of a pipe that was asked whether it fits."""
+    """Add both ends to an error of a pipe that does not fit."""
     sent = ", ".join(filter(None, (publication.topic, publication.where)))
     error.what = f"feedback '{pipe.name}' does not fit what '{publication.component}' sends ({sent}): {error.what}"
     return error.at(where)

@@ -14,7 +14,7 @@ from solfer.transport.topics import Topics
 
 
 class SpaceMember(Middleware):
-    """One component's way to the others of its shared plugin, and to the outside.
+    """One component's connection to the others of its shared plugin, and to the outside.
 
     Args:
         component: Name of its plugin.

@@ -106,7 +106,7 @@ def velocity(row, program, with_jacobian):
 
 @njit
 def _update(row, program, moving, with_jacobian):
-    """Write place or velocity, as `moving` says, and the Jacobian, which is the same for both."""
+    """Write place or velocity, by `moving`, and the Jacobian, which is the same for both."""
     has_linear = row.motion & LINEAR
     angular = row.motion & ANGULAR
     first = 3 if row.motion & LINEAR else 0

@@ -1,4 +1,4 @@
-"""Wheels in the form of a torus: their lowest points, their angles, and what is along their ways of rolling."""
+"""Wheels in the form of a torus: their lowest points, their angles, and what is along their rolling directions."""
 
 import math
 

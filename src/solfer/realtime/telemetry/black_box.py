@@ -130,7 +130,7 @@ class BlackBox:
         self._recorder.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))
 
     def _note_requests(self, name: str, notes: list[tuple[str, str]], now: float) -> None:
-        """Record what was asked of a component, and what else happened to it, in the cycle that ends `now` [s]."""
+        """Record requests to a component, and what else happened to it, in the cycle that ends `now` [s]."""
         for kind, text in notes:
             self._recorder.event(Event(now, name, kind, text=text))
         notes.clear()

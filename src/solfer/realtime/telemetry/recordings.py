@@ -106,7 +106,7 @@ def kept_folder() -> Path | None:
 
 
 def keep(folder: Path, target: Path) -> None:
-    """Copy the memory of a recording, for `kept`; where that is not possible, a warning says so.
+    """Copy the memory of a recording, for `kept`; where that is not possible, warn of it.
 
     Args:
         folder: Folder of the memory.

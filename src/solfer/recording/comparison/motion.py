@@ -40,7 +40,7 @@ class JointMotion:
 
     @property
     def cleaned(self) -> np.ndarray:
-        """Positions in which single outliers gave way to the median of their neighbours (Hampel), shape (T,)."""
+        """Positions in which single outliers yielded to the median of their neighbours (Hampel), shape (T,)."""
         middle = median_filter(self.positions, 5, mode="nearest")
         wrong = np.abs(self.positions - middle) > OUTLIER * self.noise
         return np.where(wrong, middle, self.positions)

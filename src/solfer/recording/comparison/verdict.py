@@ -56,7 +56,7 @@ class JointVerdict:
 
 
 def judged(law: Law, limits: np.ndarray) -> tuple[tuple[Difference, ...], str]:
-    """Say how a law differs from that of a joint that does the same.
+    """Describe how a law differs from that of a joint that does the same.
 
     Args:
         law: The law.

@@ -22,7 +22,7 @@ from solfer.simulation.world.records import WorldRecord
 from solfer.simulation.world.world import Pose
 
 NICENESS = 10  # the simulation goes before its pictures
-CAMERA_PATIENCE = 5.0  # [s] until a drawing process that was asked to end is killed
+CAMERA_PATIENCE = 5.0  # [s] until a drawing process that has to end is killed
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ def _turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def _below(center: np.ndarray, corners: np.ndarray, down: np.ndarray) -> bool:
-    """Return whether the way from `center` along `down` meets a triangle."""
+    """Return whether the ray from `center` along `down` meets a triangle."""
     edges = np.column_stack((corners[1] - corners[0], corners[2] - corners[0], -down))
     if abs(np.linalg.det(edges)) < 1e-15:
         return False

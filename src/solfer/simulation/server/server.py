@@ -1,4 +1,4 @@
-"""Offers a simulation to plugins, in the way in which a robot offers itself."""
+"""Offers a simulation to plugins, just as a robot offers itself."""
 
 import logging
 import math

@@ -117,7 +117,7 @@ class World:
             self._bullet.changeDynamics(body, -1, lateralFriction=coefficient, physicsClientId=self._client)
 
     def under(self, low: np.ndarray, high: np.ndarray) -> tuple[list[int], float]:
-        """Find what a body would meet on its way down.
+        """Find what a body would meet on its descent.
 
         Args:
             low: Lower corner of a box around the body, shape (3,) [m].

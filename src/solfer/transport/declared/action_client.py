@@ -72,7 +72,7 @@ class ActionClient:
         return sent
 
     def cancel(self, goal: Goal | None = None) -> None:
-        """Ask to cancel a goal; None: all goals of all clients."""
+        """Request to cancel a goal; None: all goals of all clients."""
         self._cancels.write(message_of(GOAL_ID, GoalName() if goal is None else GoalName(0.0, goal.name.id)))
 
     def poll(self) -> None:

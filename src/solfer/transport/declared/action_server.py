@@ -34,7 +34,7 @@ class ActionServer:
         middleware: Carries its topics.
 
     Attributes:
-        active: The goal that is under way; None: there is none.
+        active: The goal that is in progress; None: there is none.
 
     Raises:
         SolferError: A dataclass does not fit the interface.
@@ -158,7 +158,7 @@ class ActionServer:
         return name if name.stamp else replace(name, stamp=now)
 
     def _remember(self, entry: StatusEntry) -> None:
-        """Let a goal that is not under way be in the status, as the newest one; the oldest is forgotten."""
+        """Let a goal that is not in progress be in the status, as the newest one; the oldest is forgotten."""
         self._past.pop(entry.goal_id.id, None)
         self._past[entry.goal_id.id] = entry
         if len(self._past) > ACTION_MEMORY:

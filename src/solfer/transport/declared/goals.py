@@ -60,7 +60,7 @@ class StatusEntry:
 
 @dataclass(frozen=True)
 class StatusList:
-    """States of the goals that are under way, and of those that ended lately."""
+    """States of the goals that are in progress, and of those that ended lately."""
 
     status_list: tuple[StatusEntry, ...] = ()
 

@@ -163,7 +163,7 @@ def _keep_margin(memory, state, velocity):
 
 @part
 def _lacks(memory, away, forward):
-    """Whether base and vertices are behind along the way that they are to go.
+    """Whether base and vertices are behind along their desired direction.
 
     It is measured by the rates with which errors would go away along that way. Where the way leads back to where joints
     can follow, it is not held up.

@@ -103,7 +103,7 @@ class Lifting:
         self.stop()
 
     def stop(self) -> None:
-        """Leave all as it is: what is under way is not carried out."""
+        """Leave all as it is: what is in progress is not carried out."""
         self._end("the plugin stopped meanwhile")
 
     def lift(self, request: LiftContacts) -> "Future[LiftReply]":
@@ -112,7 +112,7 @@ class Lifting:
         Raises:
             UnknownName: A contact is not tracked.
             ComponentError: Too few wheels would carry the robot, the Robot is a part of it, or another request
-                is under way.
+                is in progress.
         """
         names = [wheel.name for wheel in self._wheels.contacts]
         for name in request.contacts:
@@ -144,7 +144,7 @@ class Lifting:
         return answer
 
     def update(self, passed: float) -> None:
-        """Write the velocities of what is under way to the references, in place of others, for a time [s]."""
+        """Write the velocities of what is in progress to the references, in place of others, for a time [s]."""
         self._period = passed
         references = self._references
         is_moving = self.phase is not Phase.NONE
@@ -169,7 +169,7 @@ class Lifting:
                 self._end("")
 
     def _give_back(self, requested: list[int], answer: "Future[LiftReply]") -> None:
-        """Put wheels down; a lift that is under way is given up."""
+        """Put wheels down; a lift that is in progress is given up."""
         lifted = self._references.lifted
         if self.phase in (Phase.SHIFT, Phase.SETTLE):
             self._fail("a request to put wheels down")
@@ -187,7 +187,7 @@ class Lifting:
         self.phase = Phase.SHIFT
 
     def _lacking(self, margin: float) -> tuple[float, float]:
-        """Return the way of the centre of mass to where the others carry it with a margin, x and y [m]."""
+        """Return the displacement of the centre of mass to where the others carry it with a margin, x and y [m]."""
         lifted = np.flatnonzero(self._references.lifted).tolist()
         return self.polygon.towards([*self._requested, *lifted], margin)
 
@@ -235,7 +235,7 @@ class Lifting:
                 self._go_back()
 
     def _plane(self, index: int) -> float:
-        """Return the height of the plane of the carrying wheels at another one [m]: the robot gives way, and tilts."""
+        """Return the height of the plane of the carrying wheels at another one [m]: the robot yields, and tilts."""
         states = self._wheels.offsets.states
         carrying = ~self._references.lifted
         carrying[self._requested] = False

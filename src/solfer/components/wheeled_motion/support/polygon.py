@@ -36,7 +36,7 @@ class SupportPolygon:
         self.edges = np.zeros((count, EDGE_SIZE))
 
     def towards(self, lifted: Sequence[int], least: float) -> tuple[float, float]:
-        """Return the shortest way of the centre of mass to where the others carry it with a margin [m], world x, y.
+        """Return the shortest shift of the centre of mass to where the others carry it with a margin [m], world x, y.
 
         Args:
             lifted: Indices of wheels that are not to carry it.

@@ -11,7 +11,7 @@ STRAIGHT_SMALLNESS = 1e-6
 
 
 class StraightAhead:
-    """Removes from the desired velocities what wheels without steering cannot do: ways across them, and turns.
+    """Removes from the desired velocities what wheels without steering cannot do: motions across them, and turns.
 
     Velocities along the wheels and heights stay. The wheels are parallel; the direction of the first one counts.
 

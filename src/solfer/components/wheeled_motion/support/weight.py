@@ -45,23 +45,23 @@ class WeightShift:
         move.move(self.goal)
 
     def begin(self, x: float, y: float) -> None:
-        """Let the base move by a way in the world [m]."""
+        """Let the base move by a displacement in the world [m]."""
         position = self._references.position
         self.goal[:] = position[0] + x, position[1] + y
         self._shift += self._seen(np.array((x, y)))
         self._speed = 0.0
 
     def give_up(self) -> None:
-        """Let the base stay where it has come to: the rest of the way was not gone."""
+        """Let the base stay where it has come to: the rest of the path is given up."""
         self._shift += self._seen(self._references.position[:2] - self.goal)
 
     def begin_back(self) -> None:
-        """Let the base move back by all ways that it has gone."""
+        """Let the base move back by all displacements so far."""
         x, y = turned(self._references.heading, *self._shift.tolist())
         self.begin(-x, -y)
 
     def end(self) -> None:
-        """Let vertices be desired where the way back has left them."""
+        """Let vertices be desired where the return has left them."""
         self._references.vertices[:, :2] += self._moved
         self.start()
 
@@ -91,5 +91,5 @@ class WeightShift:
         return False
 
     def _seen(self, shift: np.ndarray) -> np.ndarray:
-        """Return a way in the world as seen from the heading [m]."""
+        """Return a displacement in the world as seen from the heading [m]."""
         return np.array(seen_from(self._references.heading, *shift.tolist()))

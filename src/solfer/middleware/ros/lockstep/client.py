@@ -1,7 +1,7 @@
 """Lock-step: a simulation waits after each step until the nodes that follow it have made the cycles that are due.
 
 Each tick names the messages that the follower has to have received before, and each acknowledgement those that it has
-sent. So what a cycle reads depends on simulated time only, however long messages are under way.
+sent. So what a cycle reads depends on simulated time only, however long messages are in progress.
 """
 
 import logging
@@ -72,7 +72,7 @@ def wait_for_messages(
 
     Raises:
         MiddlewareError: One does not arrive.
-        Ended: The node was asked to end.
+        Ended: The node has to end.
     """
     for endpoint in endpoints:
         if isinstance(endpoint, RosWriter):
@@ -97,7 +97,7 @@ def wait_for_connections(endpoints: Iterable[Endpoint], name: str, running: Call
     """Wait until all nodes that write what node `name` reads, or read what it writes, are connected to it.
 
     Raises:
-        Ended: The node was asked to end.
+        Ended: The node has to end.
     """
     publishers, subscribers, _ = rosgraph.Master(name).getSystemState()
     writing = dict(publishers)
@@ -125,7 +125,7 @@ def _wait_for_nodes(nodes: set[str], connected: Callable[[], set[str]], running:
 
 
 class LockstepClient:
-    """Makes a node's cycles when the simulation asks for them.
+    """Makes a node's cycles when the simulation requests them.
 
     Args:
         name: Name of the node.

@@ -54,7 +54,7 @@ class StepClock(RosClock):
             prepare: Called before the cycle, while the loop still sleeps.
 
         Raises:
-            Ended: The node was asked to end.
+            Ended: The node has to end.
         """
         with self._moved:
             deadline = self._sleeping()

@@ -62,6 +62,6 @@ class Attendance:
 
 
 def _registered(topic: str) -> set[str]:
-    """Ask the master for the other nodes that publish a topic."""
+    """Look up the other nodes that publish a topic."""
     publishers, _, _ = rosgraph.Master(rospy.get_name()).getSystemState()
     return {name for each, names in publishers if each == topic for name in names} - {rospy.get_name()}

@@ -146,7 +146,7 @@ def make_clock(running: Callable[[], bool], publishes: bool) -> RosClock:
     Raises:
         MiddlewareError: The node has to follow /clock, and no node publishes the time; or it simulates, and another
             node publishes the time.
-        Ended: The node was asked to end meanwhile.
+        Ended: The node has to end meanwhile.
     """
     if not rospy.get_param("/use_sim_time", False):
         return RosClock(running)

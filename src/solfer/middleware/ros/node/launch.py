@@ -74,7 +74,7 @@ class Launch:
         return self
 
     def request_end(self) -> None:
-        """Ask the system to end, without waiting; what is left to do here can be done meanwhile."""
+        """Let the system end, without waiting; what is left to do here can be done meanwhile."""
         self._checked = self._checked or time.monotonic()
         if self._process.poll() is None:
             # roslaunch takes it as it takes SIGINT, of which Python complains while it still begins
@@ -112,7 +112,7 @@ class Launch:
             )
 
     def simulate_time(self) -> None:
-        """Let nodes of this process follow simulated time, too; roslaunch may set the parameter after they ask."""
+        """Let nodes of this process follow simulated time, too; roslaunch may set the parameter after they read it."""
         ServerProxy(self.uri).setParam("/roslaunch", "/use_sim_time", True)  # noqa: FBT003 its own interface
 
     def wait_for_master(self, timeout: float) -> None:

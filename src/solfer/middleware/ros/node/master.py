@@ -112,7 +112,7 @@ def lives(uri: str, process: int) -> bool:
 
 
 def graph() -> Graph:
-    """Ask the master for the nodes that it knows at present.
+    """Look up the nodes that the master knows at present.
 
     Raises:
         MiddlewareError: The master does not answer.
@@ -122,7 +122,7 @@ def graph() -> Graph:
 
 
 def subscribed_type(node: str, topic: str) -> str:
-    """Ask a node for the type of the messages that it expects on a topic; empty if it does not answer."""
+    """Request from a node the type of the messages that it expects on a topic; empty if it does not answer."""
     try:
         return dict(call(call_master("lookupNode", node), "getSubscriptions")).get(topic, "")
     except (*UNREACHABLE, rosgraph.MasterError, MiddlewareError):

@@ -23,7 +23,7 @@ FAILED_CALLS = 3
 
 
 class MasterWatch:
-    """Asks the master for its number, and for this node, periodically, in a thread of its own.
+    """Checks the master's number, and that it knows this node, periodically, in a thread of its own.
 
     A node goes on without a master, but no node finds it any more, even after a master is back: only the master that
     received registrations keeps them, and rospy has no way to make all of them again, so that the node has to start

@@ -119,7 +119,7 @@ class RosNode:
         return knows(self.name, rospy.get_node_uri())
 
     def _on_loss(self) -> None:
-        """End the node with an error, unless it was asked to end already."""
+        """End the node with an error, unless it has to end already."""
         if not self._ends.is_set():
             self.loss = self._watch.loss
             self._ends.set()

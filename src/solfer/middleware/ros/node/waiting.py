@@ -8,7 +8,7 @@ WAIT_STEP = 0.02
 
 
 class ShutdownRequested(Exception):
-    """The node was asked to end while it waited. Not an error to collect or to report."""
+    """The node has to end while it waited. Not an error to collect or to report."""
 
 
 def wait_for(
@@ -17,7 +17,7 @@ def wait_for(
     """Wait until `condition` holds; returns False if it does not within `timeout` [s].
 
     Raises:
-        Ended: The node was asked to end.
+        Ended: The node has to end.
     """
     end = time.monotonic() + timeout
     while not condition():

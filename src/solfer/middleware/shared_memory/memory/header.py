@@ -56,7 +56,7 @@ def is_ours(memory: mmap.mmap) -> bool:
 
 
 def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> None:
-    """Check that memory is whole and what was asked for.
+    """Check that memory is whole and what was requested.
 
     Args:
         path: Its file, for messages.

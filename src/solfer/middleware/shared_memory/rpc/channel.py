@@ -1,4 +1,4 @@
-"""The calls of one client to one service, between two processes: a ring each way."""
+"""The calls of one client to one service, between two processes: a ring in each direction."""
 
 import dataclasses
 import json
@@ -77,7 +77,7 @@ class MessageRing:
 
 
 class RpcChannel:
-    """Requests one way and replies the other.
+    """Requests in one direction and replies in the other.
 
     Attributes:
         segment: The client's segment.

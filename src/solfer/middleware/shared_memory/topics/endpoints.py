@@ -1,4 +1,4 @@
-"""Topics in shared memory: the newest message, every message, and a way to write.
+"""Topics in shared memory: the newest message, every message, and their writers.
 
 Each publisher of a topic has a segment there, a pipe with this one writer, so that no publisher can spoil the messages
 of another one. As on every middleware a reader gets the newest message and knows the publishers.

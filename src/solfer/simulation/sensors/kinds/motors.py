@@ -14,7 +14,7 @@ from solfer.transport.messages import JOINT_MESSAGES, JointMessage
 class MotorSensors(SingleSensor):
     """Positions and velocities at the motor side of all joints, as seen behind the gear, and torques of the springs.
 
-    Where a spring only gives way, with the compliance c, position and velocity follow from the joint's own and from the
+    Where a spring only yields, with the compliance c, position and velocity follow from the joint's own and from the
     torque tau over the newest step: q + c tau and v + c (tau - tau_before) / dt. Without a spring c is zero.
 
     Args:
