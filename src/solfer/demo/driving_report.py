@@ -55,6 +55,49 @@ class Seen:
     hands: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """A measured quantity beside its desired one.
+
+    Attributes:
+        names: Names of the columns.
+        desired: Shape (k, len(names)) [m].
+        measured: Shape (k, len(names)) [m].
+        width: Numbers of one place: columns of x and y, or of x, y and z.
+    """
+
+    names: tuple[str, ...]
+    desired: np.ndarray
+    measured: np.ndarray
+    width: int
+
+    @property
+    def distances(self) -> np.ndarray:
+        """Distance of each place from its desired one, shape (k, places) [m]."""
+        errors = self.desired - self.measured
+        return np.linalg.norm(errors.reshape(len(errors), -1, self.width), axis=2)
+
+
+def tracked(recorder: DrivingRecorder, seen: Seen, recording: Recording) -> dict[str, Tracked]:
+    """Return the measured places beside the desired ones of the recording: centre of mass, vertices and hands."""
+    times = recorder.clock.times(seen.time)
+    count = len(times)
+    vertices = tuple(f"{wheel}.{axis}" for wheel in WHEEL_NAMES for axis in "xy")
+    hands = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")
+    center = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
+    desired = {
+        "centre of mass of the legs, from its reference": center - center[0],
+        "vertices": _at(recording["locomotion/log/vertex_reference"], times, vertices),
+        "hands": _at(recording["hands/log/reference"], times, hands),
+    }
+    measured = (seen.tracked - seen.tracked[0], seen.vertices.reshape(count, -1), seen.hands.reshape(count, -1))
+    names = (("x", "y"), vertices, hands)
+    return {
+        title: Tracked(columns, desired[title], places, width=width)
+        for title, columns, places, width in zip(desired, names, measured, (2, 2, 3), strict=True)
+    }
+
+
 def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
     """Compute what the robot, and its legs, did from joints and the true base."""
     joints = recorder.messages("measured")
@@ -118,7 +161,11 @@ def _size(errors: np.ndarray) -> str:
 
 
 def table(
-    robot: Robot, recorder: DrivingRecorder, seen: Seen, recording: Recording, reports: Mapping[str, HealthReport]
+    robot: Robot,
+    recorder: DrivingRecorder,
+    seen: Seen,
+    places: Mapping[str, Tracked],
+    reports: Mapping[str, HealthReport],
 ) -> list[Row]:
     """Build the closing table.
 
@@ -126,18 +173,11 @@ def table(
         robot: The Robot, for its weight.
         recorder: What was seen.
         seen: What the robot did.
-        recording: What plugins desired.
+        places: Measured beside desired, see `tracked`.
         reports: Health of the nodes.
     """
-    times = recorder.clock.times(seen.time)
     distance = float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
-    desired = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
-    base = np.linalg.norm(desired - desired[0] - (seen.tracked - seen.tracked[0]), axis=1)
-    names = tuple(f"{wheel}.{axis}" for wheel in WHEEL_NAMES for axis in "xy")
-    vertices = _at(recording["locomotion/log/vertex_reference"], times, names).reshape(-1, 4, 2) - seen.vertices
-    names = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")
-    hands = _at(recording["hands/log/reference"], times, names).reshape(-1, 2, 3) - seen.hands
     moved = np.linalg.norm(seen.center - seen.center[0], axis=1)
     width = seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]
     lean = math.degrees(float(np.abs(seen.position[:, 3:5]).max()))
@@ -145,9 +185,8 @@ def table(
     rows = [
         ("driven", driven + bounded(lean, LIMIT_TILT, "degrees of lean: it fell")),
         ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
-        ("centre of mass of the legs, from its reference", _size(base)),
-        ("vertices", _size(np.linalg.norm(vertices, axis=2))),
-        ("hands", _size(off := np.linalg.norm(hands, axis=2)) + bounded(1e3 * float(off.max()), LIMIT_HANDS, "mm")),
+        *((title, _size(each.distances)) for title, each in places.items() if title != "hands"),
+        ("hands", _size(off := places["hands"].distances) + bounded(1e3 * float(off.max()), LIMIT_HANDS, "mm")),
         ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),
         ("odometry against truth", _drift(recorder, seen, distance)),
         ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),

@@ -10,11 +10,17 @@ from solfer.robot import Robot
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.records import WorldRecord
 
-FILM_SIZE, FILM_DENSITY = (320, 240), 100.0
-"""Width and height [pixel], and pixels of an inch."""
+FILM_SIZE = (640, 360)
+"""Width and height [pixel]."""
 
-FILM_STEP, PICTURES = 0.7, 7
-"""Time from one picture to the next [s], and how many are shown a second."""
+PICTURES = 15
+"""Pictures that are shown a second."""
+
+SPEED_UP = 5.0
+"""Speed of the film, over that of the robot."""
+
+FILM_COLORS = 96
+"""Colours of the film, the same in all pictures: what stands still takes no room."""
 
 
 def film(
@@ -35,21 +41,16 @@ def film(
         path: The file.
         progress: Called with the number of pictures that are done, and of all.
     """
-    from matplotlib.animation import PillowWriter
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from PIL import Image
 
-    moments = np.arange(times[0], times[-1], FILM_STEP)
+    moments = np.arange(times[0], times[-1], SPEED_UP / PICTURES)
     rows = np.minimum(np.searchsorted(times, moments), len(times) - 1)
-    figure = Figure(figsize=(FILM_SIZE[0] / FILM_DENSITY, FILM_SIZE[1] / FILM_DENSITY), dpi=FILM_DENSITY)
-    FigureCanvasAgg(figure)
-    writer = PillowWriter(fps=PICTURES)
-    with (
-        closing(Renderer(robot.description, robot.kinematics, *FILM_SIZE, yaw=60.0, world=world)) as renderer,
-        writer.saving(figure, path, FILM_DENSITY),
-    ):
+    pictures: list[Image.Image] = []
+    with closing(Renderer(robot.description, robot.kinematics, *FILM_SIZE, yaw=60.0, world=world)) as renderer:
         for done, row in enumerate(rows, 1):
-            figure.clear()
-            figure.figimage(renderer.image(positions[row]))
-            writer.grab_frame()
+            picture = Image.fromarray(renderer.image(positions[row]))
+            if not pictures:
+                palette = picture.quantize(FILM_COLORS, dither=Image.Dither.NONE)
+            pictures.append(picture.quantize(palette=palette, dither=Image.Dither.NONE))
             progress(done, len(rows))
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / PICTURES), loop=0)

@@ -11,10 +11,9 @@ from solfer.demo import driving_report, report
 from solfer.demo.centauro import Progress
 from solfer.demo.driving_record import DrivingRecorder
 from solfer.demo.film import film
+from solfer.demo.tracking_page import tracking_page
 from solfer.recording.pictures import canvas
-from solfer.recording.pictures.columns_page import columns_page
 from solfer.recording.reader import read
-from solfer.recording.selection import select
 from solfer.robot import Robot
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.world import find_world, read_world
@@ -25,14 +24,6 @@ COURSE_WORLD = "gate"
 
 MISSED = 3
 """Exit code of a demonstration that ran to its end, with figures that are not what they are to be."""
-
-DRAWN_CHANNELS = (
-    "locomotion/log/base_reference",
-    "locomotion/log/vertex_reference",
-    "hands/log/reference",
-    "locomotion/timing",
-)
-"""Channels of the recording that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -69,14 +60,15 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
     recording = read(file)
     world = read_world(find_world(COURSE_WORLD))
     seen = driving_report.see(robot, found.legs, found.recorder)
-    rows = driving_report.table(robot, found.recorder, seen, recording=recording, reports=found.reports)
+    places = driving_report.tracked(found.recorder, seen, recording)
+    rows = driving_report.table(robot, found.recorder, seen, places=places, reports=found.reports)
     if warning := driving_report.warning(found.reports, seen, found.taken, waited=found.waited):
         print(warning)
     print(report.format_table(rows))
     narrowest = int(np.argmin(seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]))
     with closing(Renderer(robot.description, robot.kinematics, yaw=60.0, world=world)) as renderer:
         renderer.save(seen.position[narrowest], output / "demo.png")
-    pages = [("columns", columns_page(select(recording, list(DRAWN_CHANNELS), str(file))))]
+    pages = [("tracking", tracking_page(seen.time, places))]
     plots = list(canvas.saved(pages, output / "demo_plots.png"))
     print(f"pictures: {', '.join(map(str, (output / 'demo.png', *plots)))}")
     if films:

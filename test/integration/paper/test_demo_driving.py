@@ -74,7 +74,8 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     assert shown.run(Told(told)) == 0
     assert told[-1][1] == told[-1][2] > 2.0 and "waits for the topics of others" in {title for title, *_ in told}
     seen = driving_report.see(shown.robot, shown.legs, recorder)
-    rows = dict(driving_report.table(shown.robot, recorder, seen, log.recording(), {}))
+    places = driving_report.tracked(recorder, seen, log.recording())
+    rows = dict(driving_report.table(shown.robot, recorder, seen, places, {}))
     x, turned = re.match(r"(.*) m, turned by (.*) degrees", rows["driven"]).groups()
     now = world.simulation.state.now
     assert float(x) == pytest.approx(np.hypot(*now.position("pelvis")[:2]), abs=0.02) and float(x) > 0.2

@@ -19,7 +19,12 @@ from solfer.simulation.world.world import FLAT_WORLD, Pose, World
 RENDERER_FIELD_OF_VIEW = 40.0  # [deg], vertical
 RENDERER_MARGIN = 1.6  # what is seen, over the extent of the robot
 RENDERER_SAMPLES = 2  # rays along each side of a pixel
+NEAREST, FARTHEST = 0.05, 50.0  # what is drawn, from the camera [m]
+HAZE = (1.2, 2.0)
+"""Distances at which the floor begins to fade, and has faded into the sky, over that of the robot."""
+
 FLOOR_TILE = 0.5  # [m]
+FLOOR_TILES = 20  # along each side
 FLOOR_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
 SKY = np.array([[250.0, 251.0, 253.0], [206.0, 216.0, 228.0]])  # RGB at the lower and at the upper edge
 
@@ -57,7 +62,7 @@ class Renderer:
         self._body = Body(self._engine, description, kinematics, motors=np.zeros(0, dtype=np.intp), friction=Friction())
         self._first = kinematics.size - len(self._body.joints)
         self._world = World(self._engine, world)
-        self._add_floor(self._world.orientation())
+        self._floor = self._make_floor()
 
     def image(self, q: np.ndarray, boxes: Sequence[Pose] = ()) -> np.ndarray:
         """Draw the robot at position q of the model's DoFs: RGB, shape (height, width, 3), uint8.
@@ -73,9 +78,10 @@ class Renderer:
         width, height = (RENDERER_SAMPLES * side for side in self._size)
         yaw, pitch = self._angles
         centre, size = self._extent()
+        self._move_floor(centre)
         distance = RENDERER_MARGIN * size / 2.0 / math.tan(math.radians(RENDERER_FIELD_OF_VIEW / 2.0))
         view = bullet.computeViewMatrixFromYawPitchRoll(centre, distance, yaw, pitch, 0.0, 2)
-        lens = bullet.computeProjectionMatrixFOV(RENDERER_FIELD_OF_VIEW, width / height, 0.05, 50.0)
+        lens = bullet.computeProjectionMatrixFOV(RENDERER_FIELD_OF_VIEW, width / height, NEAREST, FARTHEST)
         picture = bullet.getCameraImage(
             width,
             height,
@@ -92,10 +98,13 @@ class Renderer:
             physicsClientId=client,
         )
         colours = np.array(picture[2], dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
-        nothing = np.reshape(picture[4], (height, width)) < 0
+        depth = np.reshape(picture[3], (height, width))
+        away = NEAREST * FARTHEST / (FARTHEST - (FARTHEST - NEAREST) * depth) / distance
+        haze = np.clip((away - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
+        haze[np.reshape(picture[4], (height, width)) < 0] = 1.0
         share = np.linspace(1.0, 0.0, height)[:, None, None]
-        sky = (share * SKY[1] + (1.0 - share) * SKY[0]).astype(np.uint8)
-        fine = np.where(nothing[:, :, None], sky, colours)
+        sky = share * SKY[1] + (1.0 - share) * SKY[0]
+        fine = colours + haze[:, :, None] * (sky - colours)
         blocks = fine.reshape(
             height // RENDERER_SAMPLES, RENDERER_SAMPLES, width // RENDERER_SAMPLES, RENDERER_SAMPLES, 3
         )
@@ -136,21 +145,39 @@ class Renderer:
         high = boxes[:, 1].max(axis=0)
         return ((low + high) / 2.0).tolist(), float((high - low).max())
 
-    def _add_floor(self, orientation: np.ndarray) -> None:
-        """Add tiles below the plane of the ground, which are visual only."""
+    def _make_floor(self) -> list[int]:
+        """Add tiles below the plane of the ground, which are visual only; return their bodies."""
         bullet = self._engine.bullet
         client = self._engine.client
         half = [FLOOR_TILE / 2.0, FLOOR_TILE / 2.0, 0.005]
-        tiles = [
+        shapes = [
             bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)
             for colour in FLOOR_COLOURS
         ]
-        for row in range(-6, 6):
-            for column in range(-6, 6):
-                place = [(row + 0.5) * FLOOR_TILE, (column + 0.5) * FLOOR_TILE, -0.005]
-                place, _ = bullet.multiplyTransforms([0.0] * 3, orientation, place, [0.0, 0.0, 0.0, 1.0])
-                tile = tiles[(row + column) % 2]
-                bullet.createMultiBody(0.0, -1, tile, place, orientation, physicsClientId=client)
+        return [
+            bullet.createMultiBody(0.0, -1, shapes[(row + column) % 2], physicsClientId=client)
+            for row in range(FLOOR_TILES)
+            for column in range(FLOOR_TILES)
+        ]
+
+    def _move_floor(self, centre: Sequence[float]) -> None:
+        """Move the tiles below the robot, by whole pairs of them, so that the pattern stands still."""
+        bullet = self._engine.bullet
+        client = self._engine.client
+        orientation = self._world.orientation()
+        _, back = bullet.invertTransform([0.0] * 3, orientation)
+        (x, y, _), _ = bullet.multiplyTransforms([0.0] * 3, back, centre, [0.0, 0.0, 0.0, 1.0])
+        pair = 2.0 * FLOOR_TILE
+        first = 0.5 * (1 - FLOOR_TILES) * FLOOR_TILE
+        for number, tile in enumerate(self._floor):
+            row, column = divmod(number, FLOOR_TILES)
+            place = [
+                pair * round(x / pair) + first + row * FLOOR_TILE,
+                pair * round(y / pair) + first + column * FLOOR_TILE,
+                -0.005,
+            ]
+            place, _ = bullet.multiplyTransforms([0.0] * 3, orientation, place, [0.0, 0.0, 0.0, 1.0])
+            bullet.resetBasePositionAndOrientation(tile, place, orientation, physicsClientId=client)
 
 
 def render(simulation: Simulation, path: str | Path) -> None:
