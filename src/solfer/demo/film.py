@@ -16,6 +16,9 @@ FILM_SIZE = (640, 360)
 PICTURES = 15
 """Pictures that are shown a second."""
 
+DURATIONS = (70, 70, 60)
+"""Time that pictures are shown, in turn [ms]: GIFs count in hundredths of a second."""
+
 SPEED_UP = 5.0
 """Speed of the film, over that of the robot."""
 
@@ -53,4 +56,5 @@ def film(
                 palette = picture.quantize(FILM_COLORS, dither=Image.Dither.NONE)
             pictures.append(picture.quantize(palette=palette, dither=Image.Dither.NONE))
             progress(done, len(rows))
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / PICTURES), loop=0)
+    durations = [DURATIONS[number % len(DURATIONS)] for number in range(len(pictures))]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=durations, loop=0)
