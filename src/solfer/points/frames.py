@@ -119,10 +119,6 @@ class GroundFrame(_LevelFrame):
     def __init__(self, pose: Point, height: float = 0.0, axis: ArrayLike = (1.0, 0.0, 0.0), normal: ArrayLike = UP):
         super().__init__(pose, axis, normal, height=height)
 
-    def set_height(self, height: float) -> None:
-        """Set the height of the ground along the normal [m]; a NotFinite if it is not a finite number."""
-        self._numbers[6:7] = finite([height], 1, "height of the ground")
-
 
 class WheelFrame(_LevelFrame):
     """Pose of the frame in which a wheel rolls: z is the normal, y the part of the axle across it, x the direction.

@@ -31,7 +31,6 @@ class NullSpace:
         self._identity = np.eye(size)
         self._basis = np.eye(size, order="F")
         self._rows = self._basis.T
-        self._span = np.zeros((size, size), order="F")
         self._column = np.zeros((size, 1), order="F")
         # the least work space of LAPACK, which is allocated at each call
         self._work = size
@@ -67,14 +66,6 @@ class NullSpace:
             self._turn(self._basis, "N")
             self._basis_is_current = True
         return self._rows[self.rank :]
-
-    def row_span(self) -> np.ndarray:
-        """Compute an orthonormal basis of the rows of C, shape (n, r); live until the next call."""
-        span = self._span[:, : self.rank]
-        if self.rank:
-            np.copyto(span, self._reflectors)
-            lapack.dorgqr(span, self._scales, lwork=self.rank, overwrite_a=1)
-        return span
 
     def project(self, vector: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write A `vector` into the first n - r numbers of `out`, and return these; both have n numbers."""

@@ -13,7 +13,6 @@ from solfer.points import (
     POSE,
     AngularMomentum,
     CenterOfMass,
-    Constant,
     FrameOrientation,
     GroundFrame,
     LinearPoint,
@@ -205,11 +204,6 @@ def ahead(frame: Point, task: TaskRecord) -> np.ndarray:
     frame.update()
     axis = np.array(task.axis or (1.0, 0.0, 0.0))
     return frame.value[:3] + rotation_from_quaternion(frame.value[3:]) @ (axis / np.linalg.norm(axis))
-
-
-def own_constant(point: Point) -> Constant | None:
-    """Return the Constant that sets what a point follows: of a LookAt its target."""
-    return point.target if isinstance(point, LookAt) and isinstance(point.target, Constant) else None
 
 
 def _axle(wheel: ContactRecord) -> tuple[float, float, float]:
