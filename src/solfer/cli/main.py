@@ -45,6 +45,10 @@ PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE e
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
     words = sys.argv[1:] if arguments is None else list(arguments)
+    if "_ARGCOMPLETE" in os.environ:
+        from solfer.cli.completion import complete
+
+        complete(parser())
     _open_streams()
     try:
         try:

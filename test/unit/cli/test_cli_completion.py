@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from solfer.cli.completion import candidates
+from solfer.cli.completion import finder
 from solfer.cli.main import SUB_COMMANDS, main, parser
 from solfer.config import module_names
 
@@ -41,7 +41,9 @@ def folder(monkeypatch):
     ],
 )
 def test_a_word_is_completed(line, offered):
-    assert candidates(parser(), line.split(" ")) == offered
+    *before, word = line.split(" ")
+    found = finder(parser())._get_completions(["solfer", *before], word, "", None)
+    assert sorted(each.rstrip() for each in found) == offered
 
 
 def test_bash_completes_by_the_script(capsys, tmp_path):
@@ -49,7 +51,11 @@ def test_bash_completes_by_the_script(capsys, tmp_path):
     script = capsys.readouterr().out
     (tmp_path / "solfer").write_text(f'#!/bin/sh\nexec "{sys.executable}" "{REPOSITORY}/nodes/solfer" "$@"\n')
     (tmp_path / "solfer").chmod(0o755)
-    ask = "COMP_WORDS=(solfer list jo); COMP_CWORD=2; _solfer; printf '%s\\n' \"${COMPREPLY[@]}\""
+    ask = "COMP_LINE='solfer list jo'; COMP_POINT=14; COMP_TYPE=9; _python_argcomplete solfer"
+    ask += "; printf '%s\\n' \"${COMPREPLY[@]}\""
     command = f'PATH="{tmp_path}:$PATH"\n{script}\n{ask}; complete -p solfer'
     done = subprocess.run([shutil.which("bash"), "-c", command], capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout.splitlines() == ["joints", "complete -F _solfer solfer"]
+    assert done.stdout.split() == [
+        "joints",
+        *"complete -o bashdefault -o default -o nospace -F _python_argcomplete solfer".split(),
+    ]

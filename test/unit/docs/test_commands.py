@@ -7,8 +7,20 @@ import shlex
 import pytest
 from support.modules import forget
 
-from solfer.cli.completion import _command
 from solfer.cli.main import main, parser
+
+
+def sub_command(parser, words):
+    """Return the parser of the sub-command that some words begin with, and the words behind its name."""
+    while subs := next(
+        (each.choices for each in parser._actions if isinstance(each, argparse._SubParsersAction)), None
+    ):
+        if not words or words[0] not in subs:
+            break
+        parser = subs[words[0]]
+        words = words[1:]
+    return parser, words
+
 
 BLOCK = re.compile(r"^```(?:sh|bash|console)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SYNOPSIS = re.compile(r"\b(FILE|NAME|URDF|REASON|SECONDS)\b")
@@ -169,7 +181,7 @@ def test_synopses_name_commands_and_options_that_exist(pages):
     for page, lines in pages.items():
         for line in (line for line in lines if line.startswith("solfer ") and SYNOPSIS.search(line)):
             words = re.sub(r"[\[\]|]|\.\.\.", " ", line).split()[1:]
-            command, rest = _command(parser(), words)
+            command, rest = sub_command(parser(), words)
             assert isinstance(command, argparse.ArgumentParser) and rest != words, (page, line)
             known = {name for action in command._actions for name in action.option_strings}
             known |= {name.replace("--", "--no-", 1) for name in known}

@@ -1,6 +1,6 @@
-"""Print what makes bash complete `solfer`: commands, options, configurations, robots, plugins and files.
+"""Print what makes a shell complete `solfer`: commands, options, configurations, robots, plugins and files.
 
-`eval "$(solfer completion)"` turns it on in a shell; in ~/.bashrc, behind the line that sources the workspace, in all.
+`eval "$(solfer completion)"` turns it on in bash; in ~/.bashrc, behind the line that sources the workspace, in all.
 """
 
 import argparse
@@ -8,16 +8,12 @@ import argparse
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
-    parser.add_argument("words", metavar="WORD", nargs="*", help="complete the last one of these words, and print how")
+    parser.add_argument("--shell", choices=("bash", "zsh", "fish"), default="bash", help="default: %(default)s")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the script, or one line for each completion."""
-    from solfer.cli.completion import BASH_SCRIPT, candidates
-    from solfer.cli.main import parser
+    """Print the script."""
+    from argcomplete import shellcode
 
-    if options.words:
-        print("".join(f"{word}\n" for word in candidates(parser(), options.words)), end="")
-    else:
-        print(BASH_SCRIPT, end="")
+    print(shellcode(["solfer"], shell=options.shell))
     return 0

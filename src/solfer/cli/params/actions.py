@@ -106,21 +106,13 @@ def save(options: argparse.Namespace, caller: Caller) -> None:
 PARAMETER_ACTIONS = {"list": show, "get": get, "set": put, "save": save}
 
 
-def names(before: Iterable[str], action: str) -> list[str]:
-    """List plugins, or the parameters of one, for words that follow others; empty where none can be reached."""
+def names(kind: str, namespace: str, plugin: str) -> list[str]:
+    """List plugins (`running`), or the parameters of one; empty where none can be reached."""
     from solfer.cli.params.callers import caller
 
-    words = [each for each in before if each not in ("params", "list", "get", "set", "save")]
-    namespace = ""
-    if "--namespace" in words[:-1]:
-        place = words.index("--namespace")
-        _ = words.pop(place)
-        namespace = words.pop(place)
     try:
         with caller(namespace) as made:
-            if action == "running":
-                return made.plugins()
-            return [each.name for each in _parameters(made, words[0])]
+            return made.plugins() if kind == "running" else [each.name for each in _parameters(made, plugin)]
     except SolferError:
         return []
 
