@@ -23,6 +23,7 @@ NAMES = {
     "pinocchio": "pin",
     "pybullet_data": "pybullet",
     "pydantic_core": "pydantic",
+    "PIL": "Pillow",
     "yaml": "PyYAML",
 }
 """Modules whose distribution has another name, or that one brings along."""
