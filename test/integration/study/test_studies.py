@@ -225,25 +225,34 @@ def test_the_first_document_of_a_run_is_its_settings(undisturbed, tmp_path):
     assert len(plugins) == 2 and "modules:" in plugins[0]
 
 
-def test_the_commands_of_the_page_run_on_a_study_of_this_size(repository, tmp_path):
-    """Those of docs/how-to/studies.md, with a study of a few short runs in place of the shipped one."""
+PAGES = {
+    "how-to/studies.md": ("robustness", 4, {"grid": [0.3, 0.8]}, {"grid": [0.0, 5.0]}),
+    "tutorials/one_hundred_simulations.md": ("hundred", 5, {"log_uniform": [0.3, 0.8]}, {"uniform": [0.0, 5.0]}),
+}
+"""Pages with commands, by the name of their study: how many they are, and how friction and payload vary."""
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_commands_of_the_page_run_on_a_study_of_this_size(repository, tmp_path, name):
+    """With a study of a few short runs in place of the shipped one, which varies in the same way."""
+    shipped, count, friction, payload = PAGES[name]
     vary = {
-        "friction": {"path": "simulation/friction/wheels", "grid": [0.3, 0.8]},
-        "payload": {"path": "simulation/payload/mass", "grid": [0.0, 5.0]},
+        "friction": {"path": "simulation/friction/wheels", **friction},
+        "payload": {"path": "simulation/payload/mass", **payload},
     }
     measure = {"off": {"columns": "simulation/base/tilt"}}
-    payload = {"payload": {"link": "torso_2", "mass": 0.0}}
-    file = written(tmp_path, vary=vary, measure=measure, simulation=payload)
-    page = (repository / "docs/how-to/studies.md").read_text()
+    fixed = {"payload": {"link": "torso_2", "mass": 0.0}}
+    file = written(tmp_path, vary=vary, measure=measure, simulation=fixed, runs=1 if "grid" in friction else 4)
+    page = (repository / "docs" / name).read_text()
     lines = re.findall(r"^solfer study (.*)$", page, re.MULTILINE)
-    assert len(lines) == 4
+    assert len(lines) == count
     for line in lines:
-        words = line.replace("config/studies/robustness.yaml", str(file)).split()
+        words = line.replace(f"config/studies/{shipped}.yaml", str(file)).split()
         ended = subprocess.run(
             [sys.executable, str(SOLFER), "study", *words], cwd=tmp_path, capture_output=True, text=True, check=False
         )
         assert ended.returncode == 0, (line, ended.stderr)
-    assert (tmp_path / "robustness.png").stat().st_size > 5000
+    assert (tmp_path / f"{shipped}.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize("number", [0, 1])

@@ -54,6 +54,7 @@ ELSEWHERE = {
         "figure_",
     ),
     r"roslaunch solfer figure_5.launch rviz:=true": ("test/integration/simulation/test_rviz.py", "rviz:=true"),
+    r"roslaunch solfer hardware.launch": ("test/ros/hardware.test", "launch/hardware.launch"),
     r"roslaunch solfer rviz.launch": ("test/unit/cli/test_cli_launch.py", "rviz.launch"),
     r"./run exec python benchmark/rviz.py .*": ("test/integration/simulation/test_rviz.py", "benchmark/rviz.py"),
     r"roslaunch solfer figure_5.launch lockstep:=true .*": ("test/ros/figure_5.test", "lockstep"),

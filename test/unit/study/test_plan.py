@@ -1,5 +1,6 @@
 """What varies in a study, and which runs that makes."""
 
+import re
 import shutil
 
 import numpy as np
@@ -122,6 +123,12 @@ def test_a_list_of_another_length_is_an_error(tmp_path):
     }
     with pytest.raises(ConfigError, match="lists of different lengths: mass, noise"):
         made(tmp_path, vary=vary)
+
+
+def test_the_tutorial_shows_its_study(repository):
+    page = (repository / "docs/tutorials/one_hundred_simulations.md").read_text()
+    (shown,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    assert (CONFIG / "studies/hundred.yaml").read_text().endswith(shown)
 
 
 def test_the_shipped_studies_can_run():

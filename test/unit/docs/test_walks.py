@@ -1,0 +1,26 @@
+"""The walks through the code lead to files that exist, and to names that they have."""
+
+import re
+
+STEP = re.compile(r"^\| .* \| `([\w/]+\.py)` \| `(\w+)` \|$", re.MULTILINE)
+
+
+def test_every_step_is_a_file_with_its_name(repository):
+    page = (repository / "docs/how-to/find_your_way.md").read_text()
+    steps = STEP.findall(page)
+    rows = [line for line in page.splitlines() if line.startswith("| ") and not line.startswith("| step")]
+    assert len(steps) == len(rows) > 25
+    source = repository / "src/solfer"
+    missing = [step for step in steps if not re.search(rf"\b{step[1]}\b", read(source / step[0]))]
+    assert missing == []
+
+
+def test_files_in_the_text_exist(repository):
+    page = (repository / "docs/how-to/find_your_way.md").read_text()
+    named = re.findall(r"`((?:middleware|points|config)/[\w./]+)`", re.sub(r"^\|.*$", "", page, flags=re.MULTILINE))
+    assert len(named) >= 2 and all((repository / "src/solfer" / name).exists() for name in named)
+
+
+def read(path):
+    """Return a file's text; empty if there is no such file."""
+    return path.read_text() if path.is_file() else ""
