@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solfer.components.odometry.kalman import WheelInertialFilter
+from solfer.components.odometry.kalman import ImuSample, WheelInertialFilter
 from solfer.components.odometry.kalman_kernel import STATE_HEADING, STATE_RADIUS, STATE_VELOCITY
 
 CONSTANT = re.compile(r"^\| .* \| ([\d.e-]+) \| `([\w.]+)\.(\w+)` \|$", re.MULTILINE)
@@ -35,7 +35,7 @@ def test_the_center_of_rotation_is_at_rest():
 def test_a_correction_is_that_of_the_page():
     """Wheel by wheel and row by row, in plain NumPy: innovation, gain without position and radii, and covariance."""
     kalman = WheelInertialFilter(2, acceleration=1.0, noise=1e-3, bias=1e-2, walk=1e-6, radius=0.0)
-    kalman.predict(turn=0.01, period=0.02, imu_time=0.02)
+    kalman.predict(turn=0.01, period=0.02, sample=ImuSample(time=0.02))
     arms = np.array(((0.3, 0.4, -0.9), (-0.3, 0.4, -0.9)))
     speeds = np.array(((0.01, 0.002, 0.0), (0.011, 0.001, 0.001)))
     state, covariance = kalman.state.copy(), kalman.covariance.copy()

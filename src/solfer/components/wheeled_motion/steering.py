@@ -16,7 +16,7 @@ class Steering:
     With a gain of errors across the wheels, a wheel has to roll so that its vertex stays with its reference: in the
     direction of v + K (1 - d / |e|) e with the desired velocity v of the vertex, its error e and the gain K,
     where |e| is larger than d = 2 mm, and of v where it is not. The slower that is, the slower it is followed: within
-    the way RELAXATION. A wheel that is to be still rests where its error is small, until it is larger.
+    the way of STEERING_RELAXATION. A wheel that is to be still rests where its error is small, until it is larger.
 
     Without it, two directions are merged, each low-passed the more, the slower what points there is: that of the wheel
     in the desired motion of the base, about its instantaneous centre of rotation, and that of its vertex' error. Each
