@@ -67,7 +67,7 @@ def examine(path: Path, floating: bool | None, duration: float, seed: int) -> di
             return {"refused": "no joint moves"}
         same = [*listener.messages, *pinocchio_differs(kinematics)]
         reached = reach(kinematics.twin(), np.random.default_rng(seed))
-        *_, verdict = hold(simulation, duration)
+        verdict = hold(simulation, duration)["verdict"]
     return {"dofs": kinematics.size, "differences": same, "verdict": verdict, "reached": reached}
 
 

@@ -1,5 +1,6 @@
 """The gallery: its script draws two robots, and its page has a picture of each."""
 
+import json
 import logging
 import re
 import subprocess
@@ -23,9 +24,9 @@ def run(folder, *arguments):
 def test_an_arm_reaches_and_wheels_drive(tmp_path):
     """Each picture has the robot's colours before floor and sky, and progress is on stderr."""
     names = ("kuka_iiwa", "wheeled_go2")
-    done = run(tmp_path, "--robots", *names)
+    done = run(tmp_path, "--json", "--robots", *names)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert [line.split()[0] for line in done.stdout.splitlines()] == list(names)
+    assert [json.loads(line)["name"] for line in done.stdout.splitlines()] == list(names)
     assert [line for line in done.stderr.splitlines() if line[1:3] == "/2"] == ["1/2 kuka_iiwa", "2/2 wheeled_go2"]
     assert {path.name for path in tmp_path.iterdir()} == {f"{name}.jpg" for name in names}
     with Image.open(tmp_path / "kuka_iiwa.jpg") as picture:
@@ -54,4 +55,4 @@ def test_a_robot_that_does_not_get_there_is_an_error(tmp_path, monkeypatch, caps
     monkeypatch.setitem(gallery.ROBOTS, "tiago", far)
     monkeypatch.setattr(sys, "argv", ["gallery.py", "--robots", "tiago", "--folder", str(tmp_path)])
     assert gallery.main() == 1
-    assert " mm away" in capsys.readouterr().out
+    assert " away_mm" in capsys.readouterr().out
