@@ -6,6 +6,7 @@ The vectors of a basis are rows, so that sums over the DoFs run through memory i
 import math
 
 from solfer.numerics.compilation import REORDERED, cached, part
+from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
 CANCELLED = 0.5
 """Share of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
@@ -71,37 +72,6 @@ def _span(jacobian, tolerance, span, squares):
 
 
 @part
-def _factorise(matrix, shift, factor):
-    """Write the lower factor of a matrix minus a multiple of 1, by Cholesky; return whether it is positive definite."""
-    for i in range(len(matrix)):
-        for j in range(i + 1):
-            entry = matrix[i, j] - (shift if i == j else 0.0)
-            for k in range(j):
-                entry -= factor[i, k] * factor[j, k]
-            if i > j:
-                factor[i, j] = entry / factor[j, j]
-            elif entry > 0.0:
-                factor[i, i] = math.sqrt(entry)
-            else:  # also not a number
-                return False
-    return True
-
-
-@part
-def _solve(factor, vector):
-    """Replace b by the solution x of L L^T x = b."""
-    size = len(vector)
-    for i in range(size):
-        for j in range(i):
-            vector[i] -= factor[i, j] * vector[j]
-        vector[i] /= factor[i, i]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            vector[i] -= factor[j, i] * vector[j]
-        vector[i] /= factor[i, i]
-
-
-@part
 def _torque(bias, free, span, rank, load, along, torque):
     """Write tau = h - Q x, with x = `along` + B^T `load`; zero for the DoFs `free`."""
     torque[:] = bias
@@ -148,10 +118,15 @@ def _carry(jacobian, bias, free, tolerance, weak, span, squares, held, factor, l
                 entry += span[r, free[i]] * span[r, free[j]]
             held[i, j] = held[j, i] = entry
     if rank and size:
-        if not _factorise(held, weak, factor):
+        factor[:] = held
+        for i in range(size):
+            factor[i, i] -= weak
+        if not cholesky(factor):
             return rank, False
-        _factorise(held, 0.0, factor)
-        _solve(factor, load)
+        factor[:] = held
+        cholesky(factor)
+        forward(factor, load)
+        backward(factor, load)
     _torque(bias, free, span, rank, load, along, torque)
     return rank, True
 
@@ -170,5 +145,6 @@ carry = cached(
     f"{_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR})",
     _carry,
     REORDERED,
+    sources=[DENSE],
 )
 bear = cached(f"void({_VECTOR}, {_INDICES}, {_MATRIX}, int64, {_VECTOR}, {_VECTOR}, {_VECTOR})", _bear, REORDERED)

@@ -20,7 +20,15 @@ class LoadingCache(FunctionCache):
 
     Numba imports that before it loads the first function, which takes longer than all functions together; where one
     has to be compiled, the compiler does so by itself.
+
+    Args:
+        function: The function.
+        sources: Other files whose functions it calls: Numba by itself notices a change of its own file alone.
     """
+
+    def __init__(self, function: Callable[..., Any], sources: Iterable[Path]):
+        super().__init__(function)
+        self._cache_file._source_stamp = (self._cache_file._source_stamp, digest(sources))
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Load a function; None where it is not in the cache."""
@@ -29,19 +37,22 @@ class LoadingCache(FunctionCache):
             return self._load_overload(sig, target_context)
 
 
-def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[str] = False) -> Callable[..., Any]:
+def cached(
+    signature: str, function: Callable[..., Any], fastmath: bool | set[str] = False, sources: Iterable[Path] = ()
+) -> Callable[..., Any]:
     """Compile a function, or load it from the cache on disk; without a place for a cache it is compiled again.
 
     Args:
         signature: Types of result and arguments in numba's notation: nothing else is ever compiled.
         function: The function.
         fastmath: Freedom of the compiler with sums, `REORDERED` or nothing.
+        sources: Other files whose functions it calls.
     """
     compiled: Any = njit(error_model="numpy", fastmath=fastmath)(function)
     if compiled is function:  # NUMBA_DISABLE_JIT is set
         return function
     with contextlib.suppress(RuntimeError):  # numba finds no folder that it may write to
-        compiled._cache = LoadingCache(function)
+        compiled._cache = LoadingCache(function, sources)
     with register_dispatcher(compiled):
         compiled.compile(signature)
         compiled.disable_compile()
@@ -49,10 +60,10 @@ def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[st
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function that functions of its own file call when they are compiled; sums as in `REORDERED`."""
+    """Compile a function that other functions call when they are compiled; sums as in `REORDERED`."""
     return njit(error_model="numpy", fastmath=REORDERED)(function)
 
 
 def digest(sources: Iterable[Path]) -> str:
-    """Hash several source files: numba's cache by itself notices a change only of the file with the function."""
+    """Hash several source files."""
     return hashlib.sha256(b"".join(source.read_bytes() for source in sorted(sources))).hexdigest()

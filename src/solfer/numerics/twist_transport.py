@@ -14,7 +14,7 @@ import numpy as np
 
 from solfer.numerics import base_chart as chart
 from solfer.numerics.base_chart import BaseChart
-from solfer.numerics.compilation import cached, digest, part
+from solfer.numerics.compilation import cached, part
 
 FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, GO_ON = 1, 2, 4, 8, 16
 """Options, as a sum. POSE: the base from a pose; TWIST: its rates from a twist; OWN_AXES: the twist is in the axes of
@@ -120,42 +120,36 @@ _rates = part(chart.rates_of)
 _rotation = part(chart.rotation_of)
 
 
-def _compile(sources: str):
-    """Compile the kernel; the digest of its sources is in its closure, which is part of the cache's key."""
-
-    def update(values, mount, world, origin, base, rates, options):
-        """Update the base; see `Carried.update`."""
-        sources  # noqa: B018 it has to be used to be in the closure
-        to_chart = _transposed(origin)
-        sensor = world
-        if options & WITH_ORIENTATION:
-            sensor = _times(world, _matrix(values))
-        if options & FROM_POSE:
-            rotation = _times(sensor, _transposed(mount))
-            arm = _turned(rotation, mount[9:12])
-            base[:3] = _turned(to_chart, _turned(world, values[4:7]) + world[9:12] - arm - origin[9:12])
-            angles = _angles(_times(to_chart, rotation))
-            for place in range(3):
-                jump = round((base[3 + place] - angles[place]) / FULL_TURN) if options & GO_ON else 0.0
-                base[3 + place] = angles[place] + FULL_TURN * jump
-        else:
-            rotation = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
-            arm = _turned(rotation, mount[9:12])
-        if options & FROM_TWIST:
-            axes = world
-            if options & OWN_AXES:
-                axes = sensor if options & WITH_ORIENTATION else _times(rotation, mount)
-            angular = _turned(axes, values[10:13]) - _turned(rotation, mount[15:18])
-            linear = _turned(axes, values[7:10]) - _turned(rotation, mount[12:15])
-            linear[0] -= angular[1] * arm[2] - angular[2] * arm[1]
-            linear[1] -= angular[2] * arm[0] - angular[0] * arm[2]
-            linear[2] -= angular[0] * arm[1] - angular[1] * arm[0]
-            rates[:3] = _turned(to_chart, linear)
-            wx, wy, wz = _turned(to_chart, angular)
-            rates[3], rates[4], rates[5] = _rates(base[3], base[4], wx, wy, wz)
-
-    vectors = ", ".join(["float64[::1]"] * 6)
-    return cached(f"void({vectors}, int64)", update)
+def update(values, mount, world, origin, base, rates, options):
+    """Update the base; see `Carried.update`."""
+    to_chart = _transposed(origin)
+    sensor = world
+    if options & WITH_ORIENTATION:
+        sensor = _times(world, _matrix(values))
+    if options & FROM_POSE:
+        rotation = _times(sensor, _transposed(mount))
+        arm = _turned(rotation, mount[9:12])
+        base[:3] = _turned(to_chart, _turned(world, values[4:7]) + world[9:12] - arm - origin[9:12])
+        angles = _angles(_times(to_chart, rotation))
+        for place in range(3):
+            jump = round((base[3 + place] - angles[place]) / FULL_TURN) if options & GO_ON else 0.0
+            base[3 + place] = angles[place] + FULL_TURN * jump
+    else:
+        rotation = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
+        arm = _turned(rotation, mount[9:12])
+    if options & FROM_TWIST:
+        axes = world
+        if options & OWN_AXES:
+            axes = sensor if options & WITH_ORIENTATION else _times(rotation, mount)
+        angular = _turned(axes, values[10:13]) - _turned(rotation, mount[15:18])
+        linear = _turned(axes, values[7:10]) - _turned(rotation, mount[12:15])
+        linear[0] -= angular[1] * arm[2] - angular[2] * arm[1]
+        linear[1] -= angular[2] * arm[0] - angular[0] * arm[2]
+        linear[2] -= angular[0] * arm[1] - angular[1] * arm[0]
+        rates[:3] = _turned(to_chart, linear)
+        wx, wy, wz = _turned(to_chart, angular)
+        rates[3], rates[4], rates[5] = _rates(base[3], base[4], wx, wy, wz)
 
 
-_update = _compile(digest((Path(chart.__file__), Path(__file__))))
+_VECTORS = ", ".join(["float64[::1]"] * 6)
+_update = cached(f"void({_VECTORS}, int64)", update, sources=[Path(chart.__file__)])

@@ -1,43 +1,7 @@
 """Compiled steps of `WeightedForces` and `TorqueOffsets`, number by number. Arrays are described there."""
 
-import math
-
 from solfer.numerics.compilation import cached, part
-
-
-@part
-def _decompose(matrix):
-    """Write the lower factor of a positive definite matrix into its lower triangle, by Cholesky."""
-    for i in range(len(matrix)):
-        for j in range(i):
-            left = matrix[i, j]
-            for k in range(j):
-                left -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = left / matrix[j, j]
-        left = matrix[i, i]
-        for k in range(i):
-            left -= matrix[i, k] * matrix[i, k]
-        matrix[i, i] = math.sqrt(left)
-
-
-@part
-def _forward(factor, vector):
-    """Solve L x = b in place."""
-    for i in range(len(vector)):
-        left = vector[i]
-        for k in range(i):
-            left -= factor[i, k] * vector[k]
-        vector[i] = left / factor[i, i]
-
-
-@part
-def _backward(factor, vector):
-    """Solve L^T x = b in place."""
-    for i in range(len(vector) - 1, -1, -1):
-        left = vector[i]
-        for k in range(i + 1, len(vector)):
-            left -= factor[k, i] * vector[k]
-        vector[i] = left / factor[i, i]
+from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
 
 @part
@@ -52,7 +16,7 @@ def _normal_matrix(jacobian, weights, columns, least, factor):
             if weighted != 0.0:
                 for j in range(i + 1):
                     factor[i, j] += weighted * jacobian[j, column]
-    _decompose(factor)
+    cholesky(factor)
 
 
 def _fit(jacobian, world, weights, columns, least, factor, forces, rest):
@@ -62,8 +26,8 @@ def _fit(jacobian, world, weights, columns, least, factor, forces, rest):
         forces[i] = 0.0
         for column in columns:
             forces[i] += jacobian[i, column] * weights[column] * world[column]
-    _forward(factor, forces)
-    _backward(factor, forces)
+    forward(factor, forces)
+    backward(factor, forces)
     for column in range(len(rest)):
         rest[column] = world[column]
     for i in range(len(forces)):
@@ -86,9 +50,9 @@ def _learn(
         for a in range(size):
             column = columns[first + a]
             spread[a, i] = jacobian[i, column] * weights[column]
-    _forward(factor, needed)
+    forward(factor, needed)
     for a in range(size):
-        _forward(factor, spread[a])
+        forward(factor, spread[a])
     for a in range(size):
         column = columns[first + a]
         left = weights[column] * world[column]
@@ -102,11 +66,11 @@ def _learn(
             information[a, b] += share * left - decay * information[a, b]
             solved[a, b] = information[a, b]
         solved[a, a] += prior
-    _decompose(solved)
+    cholesky(solved)
     for a in range(size):
         offsets[a] = learned[a]
-    _forward(solved, offsets)
-    _backward(solved, offsets)
+    forward(solved, offsets)
+    backward(solved, offsets)
 
 
 _MATRIX = "float64[:, ::1]"
@@ -116,9 +80,11 @@ _INDICES = "int64[::1]"
 fit = cached(
     f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR})",
     _fit,
+    sources=[DENSE],
 )
 learn = cached(
     f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, int64, float64, float64, float64, "
     f"{_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})",
     _learn,
+    sources=[DENSE],
 )

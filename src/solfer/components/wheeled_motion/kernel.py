@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
 from solfer.components.wheeled_motion.original.kernel import ORIGINAL_HALF_TURN, ORIGINAL_REST_ERROR, merge, nearest
-from solfer.numerics.compilation import cached, digest, part
+from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
 STEERING_SMALLNESS, AWAKE, STEERING_PERSISTENT = 2.5e-3, 4e-3, 0.3
@@ -124,70 +124,64 @@ def _keep(wheel, law, wx, wy, ex, ey):
     wheel.angle -= math.expm1(-law.rate * math.hypot(x, y)) * (wheel.aim - wheel.angle)
 
 
-def _compile_steer(sources):
-    """Compile the loop that steers; the digest of its sources is in its closure, which is part of the cache's key."""
-
-    def _steer(start):
-        """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
-        sources  # noqa: B018 it has to be used to be in the closure
-        memory = _wheels_at(start)
-        count = memory.count
-        dofs = memory.dofs
-        law = _law_at(memory.law)
-        wheels = _states_at(memory.wheels, count)
-        before = vector_at(memory.before, 3)
-        steered = matrix_at(memory.steered, 4, count)
-        places = matrix_at(memory.places, count, 3)
-        errors = matrix_at(memory.errors, count, 3)
-        velocities = matrix_at(memory.velocities, count, 3)
-        directions = matrix_at(memory.directions, count, 2)
-        lifted = flags_at(memory.lifted, count)
-        pose = vector_at(memory.pose, 7)
-        center = vector_at(memory.center, 2)
-        motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
-        numbers = vector_at(memory.numbers, 4)
-        heading = vector_at(memory.base, 1)[0]
-        period = law.period
-        share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
-        turn = share * matrix_at(memory.motion, 3, 3)[TURN][2]
-        cos = math.cos(heading)
-        sin = math.sin(heading)
-        vx = share * (cos * motion[0] + sin * motion[1])
-        vy = share * (cos * motion[1] - sin * motion[0])
-        dx = pose[0] - before[0]
-        dy = pose[1] - before[1]
-        mx = (cos * dx + sin * dy) / period
-        my = (cos * dy - sin * dx) / period
-        rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
-        before[0], before[1], before[2] = pose[0], pose[1], heading
-        cx = center[0] - pose[0]
-        cy = center[1] - pose[1]
-        sx = cos * cx + sin * cy
-        sy = cos * cy - sin * cx
-        for index in range(count):
-            wheel = wheels[index]
-            px = places[index, 0] - sx
-            py = places[index, 1] - sy
-            ex = errors[index, 0]
-            ey = errors[index, 1]
-            wx = vx - py * turn + share * velocities[index, 0]
-            wy = vy + px * turn + share * velocities[index, 1]
-            if law.across != 0.0:
-                _keep(wheel, law, wx, wy, ex, ey)
-            else:
-                merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
-            steered[SPEEDS, index] = math.hypot(wx, wy)
-            steered[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
-            if lifted[index]:
-                # it points where it does, and nothing waits for it
-                angle = steered[MEASURED, index] - heading
-                wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
-                wheel.motion_speed = wheel.error_speed = wheel.turn = steered[SPEEDS, index] = 0.0
-                if memory.of_steering >= 0:
-                    vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
-            steered[ANGLES, index], steered[AIMS, index] = wheel.angle + heading, wheel.aim
-
-    return cached("void(int64)", _steer)
+def _steer(start):
+    """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
+    memory = _wheels_at(start)
+    count = memory.count
+    dofs = memory.dofs
+    law = _law_at(memory.law)
+    wheels = _states_at(memory.wheels, count)
+    before = vector_at(memory.before, 3)
+    steered = matrix_at(memory.steered, 4, count)
+    places = matrix_at(memory.places, count, 3)
+    errors = matrix_at(memory.errors, count, 3)
+    velocities = matrix_at(memory.velocities, count, 3)
+    directions = matrix_at(memory.directions, count, 2)
+    lifted = flags_at(memory.lifted, count)
+    pose = vector_at(memory.pose, 7)
+    center = vector_at(memory.center, 2)
+    motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
+    numbers = vector_at(memory.numbers, 4)
+    heading = vector_at(memory.base, 1)[0]
+    period = law.period
+    share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
+    turn = share * matrix_at(memory.motion, 3, 3)[TURN][2]
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    vx = share * (cos * motion[0] + sin * motion[1])
+    vy = share * (cos * motion[1] - sin * motion[0])
+    dx = pose[0] - before[0]
+    dy = pose[1] - before[1]
+    mx = (cos * dx + sin * dy) / period
+    my = (cos * dy - sin * dx) / period
+    rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
+    before[0], before[1], before[2] = pose[0], pose[1], heading
+    cx = center[0] - pose[0]
+    cy = center[1] - pose[1]
+    sx = cos * cx + sin * cy
+    sy = cos * cy - sin * cx
+    for index in range(count):
+        wheel = wheels[index]
+        px = places[index, 0] - sx
+        py = places[index, 1] - sy
+        ex = errors[index, 0]
+        ey = errors[index, 1]
+        wx = vx - py * turn + share * velocities[index, 0]
+        wy = vy + px * turn + share * velocities[index, 1]
+        if law.across != 0.0:
+            _keep(wheel, law, wx, wy, ex, ey)
+        else:
+            merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
+        steered[SPEEDS, index] = math.hypot(wx, wy)
+        steered[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
+        if lifted[index]:
+            # it points where it does, and nothing waits for it
+            angle = steered[MEASURED, index] - heading
+            wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
+            wheel.motion_speed = wheel.error_speed = wheel.turn = steered[SPEEDS, index] = 0.0
+            if memory.of_steering >= 0:
+                vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
+        steered[ANGLES, index], steered[AIMS, index] = wheel.angle + heading, wheel.aim
 
 
 @part
@@ -473,7 +467,7 @@ def _write_command(columns, position, velocity, commanded_position, commanded_ve
 _VECTOR = "float64[::1]"
 _INDICES = "int64[::1]"
 
-steer = _compile_steer(digest((Path(original.__file__), Path(__file__))))
+steer = cached("void(int64)", _steer, sources=[Path(original.__file__)])
 find_errors = cached("void(int64)", _find_errors)
 find_rates = cached("int64(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)

@@ -8,14 +8,14 @@ constraints, and R is the upper factor of L^-1 N = Q R.
 """
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solfer.errors import SizeMismatch
-from solfer.numerics.compilation import REORDERED, cached, digest, part
+from solfer.numerics.compilation import REORDERED, cached, part
+from solfer.numerics.solvers import residuals
 from solfer.numerics.solvers.residuals import (
     add_normal,
     is_contradictory,
@@ -327,76 +327,72 @@ _PROBLEM = f"{_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {
 _ACTIVE_SET_TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
 
 
-def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
-    """Compile the method; the digest of its sources is in its closure, which is part of the cache's key."""
+def solve(
+    hessian,
+    gradient,
+    equality_matrix,
+    equality_vector,
+    matrix,
+    lower,
+    upper,
+    least,
+    largest,
+    tolerance,
+    turned,
+    factor,
+    vectors,
+    names,
+    is_active,
+    x,
+):
+    """Write x; return the outcome, the number of steps, and the largest residual.
 
-    def solve(
-        hessian,
-        gradient,
-        equality_matrix,
-        equality_vector,
-        matrix,
-        lower,
-        upper,
-        least,
-        largest,
-        tolerance,
-        turned,
-        factor,
-        vectors,
-        names,
-        is_active,
-        x,
-    ):
-        """Write x; return the outcome, the number of steps, and the largest residual.
-
-        What is inexact because H is almost singular is solved again as a sequence of problems whose cost has the
-        additional term shift |x - before|^2 / 2, which end at the same solution. Source: R. T. Rockafellar, "Monotone
-        operators and the proximal point algorithm", SIAM Journal on Control and Optimization 14(5), 1976.
-        """
-        sources  # noqa: B018 it has to be used to be in the closure
-        limits = (equality_matrix, equality_vector, matrix, lower, upper, least, largest)
-        if not is_sound(hessian, gradient, limits):
-            return NOT_FINITE, 0, np.inf
-        if is_contradictory(lower, upper) or is_contradictory(least, largest):
-            return INFEASIBLE, 0, np.inf
-        work = vectors[:6]
-        moved = vectors[6]
-        before = vectors[7]
-        outcome, steps, residual = _attempt(
-            (hessian, gradient, 0.0), limits, tolerance, turned, factor, work, names, is_active, x
-        )
-        if outcome != INACCURATE:
-            return outcome, steps, residual
-        entry = 0.0
+    What is inexact because H is almost singular is solved again as a sequence of problems whose cost has the
+    additional term shift |x - before|^2 / 2, which end at the same solution. Source: R. T. Rockafellar, "Monotone
+    operators and the proximal point algorithm", SIAM Journal on Control and Optimization 14(5), 1976.
+    """
+    limits = (equality_matrix, equality_vector, matrix, lower, upper, least, largest)
+    if not is_sound(hessian, gradient, limits):
+        return NOT_FINITE, 0, np.inf
+    if is_contradictory(lower, upper) or is_contradictory(least, largest):
+        return INFEASIBLE, 0, np.inf
+    work = vectors[:6]
+    moved = vectors[6]
+    before = vectors[7]
+    outcome, steps, residual = _attempt(
+        (hessian, gradient, 0.0), limits, tolerance, turned, factor, work, names, is_active, x
+    )
+    if outcome != INACCURATE:
+        return outcome, steps, residual
+    entry = 0.0
+    for i in range(len(x)):
+        entry = max(entry, hessian[i, i])
+    shift = SHIFT * entry
+    before[:] = 0.0
+    for _ in range(ACTIVE_SET_ROUNDS):
         for i in range(len(x)):
-            entry = max(entry, hessian[i, i])
-        shift = SHIFT * entry
-        before[:] = 0.0
-        for _ in range(ACTIVE_SET_ROUNDS):
-            for i in range(len(x)):
-                moved[i] = gradient[i] - shift * before[i]
-            outcome, more, residual = _attempt(
-                (hessian, moved, shift), limits, tolerance, turned, factor, work, names, is_active, x
-            )
-            steps += more
-            if outcome != SOLVED:
-                return outcome, steps, residual
-            slope = 0.0
-            scale = 0.0
-            for i in range(len(x)):
-                slope = max(slope, shift * abs(x[i] - before[i]))
-                scale = max(scale, abs(gradient[i]), entry * abs(x[i]))
-            residual += slope / scale if scale > 0.0 else 0.0
-            if residual <= tolerance:
-                return SOLVED, steps, residual
-            before[:] = x
-        return INACCURATE, steps, residual
-
-    return cached(f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED)
+            moved[i] = gradient[i] - shift * before[i]
+        outcome, more, residual = _attempt(
+            (hessian, moved, shift), limits, tolerance, turned, factor, work, names, is_active, x
+        )
+        steps += more
+        if outcome != SOLVED:
+            return outcome, steps, residual
+        slope = 0.0
+        scale = 0.0
+        for i in range(len(x)):
+            slope = max(slope, shift * abs(x[i] - before[i]))
+            scale = max(scale, abs(gradient[i]), entry * abs(x[i]))
+        residual += slope / scale if scale > 0.0 else 0.0
+        if residual <= tolerance:
+            return SOLVED, steps, residual
+        before[:] = x
+    return INACCURATE, steps, residual
 
 
-_compiled = _compile(digest(Path(__file__).parent.glob("*.py")))
+_compiled = cached(
+    f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED, sources=[Path(residuals.__file__)]
+)
 
 
 class ActiveSet:

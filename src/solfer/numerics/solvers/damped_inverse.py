@@ -1,12 +1,11 @@
 """Damped least squares for small stacks of tasks."""
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, SizeMismatch
 from solfer.numerics.compilation import REORDERED, cached
+from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
 
 class DampedInverse:
@@ -69,26 +68,16 @@ def _solve_into(matrix, vector, work, out):
             for k in range(cols):
                 entry += matrix[i, k] * matrix[j, k]
             work[i, j] = entry
-    for i in range(rows):
-        for j in range(i + 1):
-            entry = work[i, j]
-            for k in range(j):
-                entry -= work[i, k] * work[j, k]
-            work[i, j] = math.sqrt(entry) if i == j else entry / work[j, j]
-    for i in range(rows):
-        entry = vector[i]
-        for k in range(i):
-            entry -= work[i, k] * y[k]
-        y[i] = entry / work[i, i]
-    for i in range(rows - 1, -1, -1):
-        entry = y[i]
-        for k in range(i + 1, rows):
-            entry -= work[k, i] * y[k]
-        y[i] = entry / work[i, i]
+    factor = work[:rows]
+    cholesky(factor)
+    y[:] = vector
+    forward(factor, y)
+    backward(factor, y)
     out[:] = 0.0
     for i in range(rows):
         for k in range(cols):
             out[k] += y[i] * matrix[i, k]
 
 
-_solve = cached("void(float64[:, ::1], float64[::1], float64[:, ::1], float64[::1])", _solve_into, REORDERED)
+_TYPES = "void(float64[:, ::1], float64[::1], float64[:, ::1], float64[::1])"
+_solve = cached(_TYPES, _solve_into, REORDERED, sources=[DENSE])

@@ -11,7 +11,7 @@ from typing import Any
 
 from numba import carray, njit
 
-from solfer.numerics.compilation import cached, digest
+from solfer.numerics.compilation import cached
 from solfer.points.compiled.algebra import orientation_difference
 from solfer.points.compiled.instruction import instructions, integers, jacobian_of, programs
 from solfer.points.compiled.registry import KERNELS, Kernel
@@ -37,31 +37,23 @@ def _dispatcher(kernels: dict[str, Kernel]) -> Callable[..., Any]:
 dispatch = _dispatcher(KERNELS)
 
 
-def _compile(sources: str):
-    """Compile the kernels; the digest of their sources is in its closure, which is part of the cache's key."""
-
-    def run(address, with_jacobians):
-        """Update the points of the program at an address; see `solfer.points.compiled.instruction`."""
-        sources  # noqa: B018 it has to be used to be in the closure
-        program = carray(programs(address), (1,))[0]
-        rows = carray(instructions(program.instructions), (program.count,))
-        for index in range(program.count):
-            row = rows[index]
-            flags = carray(integers(row.flags), (2,))
-            if with_jacobians and flags[0]:
-                jacobian_of(row, program)[:] = 0.0
-                flags[0] = 0
-            dispatch(row, program, with_jacobians and not flags[1])
-
-    def difference(a, b, out):
-        """Compute a difference; see `orientation_difference`."""
-        sources  # noqa: B018 as above
-        orientation_difference(a, b, out)
-
-    return (
-        cached("void(int64, boolean)", run),
-        cached("void(float64[::1], float64[::1], float64[::1])", difference),
-    )
+def _run(address, with_jacobians):
+    """Update the points of the program at an address; see `solfer.points.compiled.instruction`."""
+    program = carray(programs(address), (1,))[0]
+    rows = carray(instructions(program.instructions), (program.count,))
+    for index in range(program.count):
+        row = rows[index]
+        flags = carray(integers(row.flags), (2,))
+        if with_jacobians and flags[0]:
+            jacobian_of(row, program)[:] = 0.0
+            flags[0] = 0
+        dispatch(row, program, with_jacobians and not flags[1])
 
 
-run, difference = _compile(digest(KERNEL_FILES))
+def _difference(a, b, out):
+    """Compute a difference; see `orientation_difference`."""
+    orientation_difference(a, b, out)
+
+
+run = cached("void(int64, boolean)", _run, sources=KERNEL_FILES)
+difference = cached("void(float64[::1], float64[::1], float64[::1])", _difference, sources=KERNEL_FILES)

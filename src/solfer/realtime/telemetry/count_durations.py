@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.numerics.compilation import cached, digest, part
+from solfer.numerics.compilation import cached, part
 from solfer.realtime.telemetry import histograms
 
 _bucket_of = part(histograms.bucket_of)
@@ -21,20 +21,14 @@ def count_durations(rows: np.ndarray, times: np.ndarray, always: int) -> None:
     _count(rows, times, always)
 
 
-def _compile(sources: str):
-    """Compile the kernel; the digest of its sources is in its closure, which is part of the cache's key."""
-
-    def count(rows, times, always):
-        """See `count_durations`."""
-        sources  # noqa: B018 it has to be used to be in the closure
-        for row in range(len(times)):
-            time = times[row]
-            if row < always or time != 0:
-                rows[row, 0] += 1
-                rows[row, 1] = max(rows[row, 1], time)
-                rows[row, 2 + _bucket_of(time)] += 1
-
-    return cached("void(int64[:, ::1], int64[::1], int64)", count)
+def count(rows, times, always):
+    """See `count_durations`."""
+    for row in range(len(times)):
+        time = times[row]
+        if row < always or time != 0:
+            rows[row, 0] += 1
+            rows[row, 1] = max(rows[row, 1], time)
+            rows[row, 2 + _bucket_of(time)] += 1
 
 
-_count = _compile(digest((Path(histograms.__file__), Path(__file__))))
+_count = cached("void(int64[:, ::1], int64[::1], int64)", count, sources=[Path(histograms.__file__)])
