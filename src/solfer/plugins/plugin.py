@@ -203,7 +203,7 @@ class Plugin:
             if not self.peers.complaint():
                 raise fault
             following.start()  # no node receives its commands, which the health says
-        if life is RUNNING:
+        if work.jumps is not None and life is RUNNING:
             work.jump()
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
@@ -224,7 +224,8 @@ class Plugin:
         self.outputs.send(self._now())
         work.publish()
         times[WRITE] = clock() - begin
-        work.log(now)
+        if work.logger is not None:
+            work.log(now)
 
     def measure_with(self, nanoseconds: Callable[[], int], times: memoryview | None = None) -> None:
         """Measure the stages of a cycle with another clock, and into memory of the caller; see `CycleTiming`."""
