@@ -22,6 +22,8 @@ class ComponentCycle:
     Attributes:
         robot_time: See above.
         jumps: See above.
+        dynamics: What it asks for of the Robot's dynamics; None: nothing.
+        publish: See above.
         logger: Where the component logs its cycles; None: it logs nothing by itself.
     """
 
@@ -37,9 +39,9 @@ class ComponentCycle:
         self._component = component
         self.jumps = jumps
         self._guard = guard
-        self._publish = tuple(publish)
+        self.publish = tuple(publish)
         # made before the first cycle: importing its modules takes a while
-        self._dynamics = component.model.dynamics if component.dynamics else None
+        self.dynamics = component.model.dynamics if component.dynamics else None
         self.logger: Logger | None = None
         self._began = 0.0  # [s]
 
@@ -59,11 +61,6 @@ class ComponentCycle:
         component.passed = passed = self.robot_time.advance(now)
         component.time_lost = self.robot_time.lost
         return passed
-
-    def update_dynamics(self) -> None:
-        """Compute the dynamics, if the component asks for them."""
-        if self._dynamics is not None:
-            self._dynamics.update()
 
     def jump(self) -> None:
         """Move the component's references with a base whose estimate has jumped."""
@@ -90,11 +87,6 @@ class ComponentCycle:
         except BaseException:
             guard.restore()
             raise
-
-    def publish(self) -> None:
-        """Publish what the component declares."""
-        for publish in self._publish:
-            publish()
 
     def log(self, now: float) -> None:
         """Let the component log the cycle of the time `now` [s]."""

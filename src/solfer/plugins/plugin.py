@@ -186,7 +186,7 @@ class Plugin:
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._readiness.feedbacks.read(now, self.outputs.distance)
+        self._readiness.feedbacks.read(now, self.outputs.joints.distance)
         verdict = self._readiness.judge(now, life is RUNNING)
         end = clock()
         times[READ] = end - begin
@@ -222,7 +222,8 @@ class Plugin:
         times[GATE] = end - begin
         begin = end
         self.outputs.send(self._now())
-        work.publish()
+        for publish in work.publish:
+            publish()
         times[WRITE] = clock() - begin
         if work.logger is not None:
             work.log(now)
@@ -341,7 +342,8 @@ class Plugin:
             self.robot.update()
         if life is STARTING:
             self._start()
-        self._work.update_dynamics()
+        if self._work.dynamics is not None:
+            self._work.dynamics.update()
 
     def _wait(self) -> None:
         """Wait for what the plugin lacks, and log it if it has changed."""
