@@ -161,11 +161,12 @@ class JointStates(Component):
 
     def update(self) -> None:
         """Follow the ramp and the trajectory of the joints, and bring the wheels nearer to their speed."""
-        self._ramp.advance(self.time_step, self._position, self._velocity)
-        self._follower.advance(self.time_step)
+        step = self.time_step
+        self._ramp.advance(step, self._position, self._velocity)
+        self._follower.advance(step)
         if self._follower.violated:
             self._brake()
-        self._speeds.advance(self.tags.wheel_acceleration * self.time_step)
+        self._speeds.advance(self.tags.wheel_acceleration * step)
 
     def send(self) -> None:
         """Write positions and velocities of the joints, and velocities of the wheels."""

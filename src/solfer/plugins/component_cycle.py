@@ -21,6 +21,10 @@ class ComponentCycle:
 
     Attributes:
         robot_time: See above.
+        jumps: See above.
+        dynamics: What it requests of the Robot's dynamics; None: nothing.
+        publish: See above.
+        logger: Where the component logs its cycles; None: it logs nothing by itself.
     """
 
     def __init__(
@@ -33,12 +37,12 @@ class ComponentCycle:
     ):
         self.robot_time = robot_time
         self._component = component
-        self._jumps = jumps
+        self.jumps = jumps
         self._guard = guard
-        self._publish = tuple(publish)
+        self.publish = tuple(publish)
         # made before the first cycle: importing its modules takes a while
-        self._dynamics = component.model.dynamics if component.dynamics else None
-        self._logger: Logger | None = None
+        self.dynamics = component.model.dynamics if component.dynamics else None
+        self.logger: Logger | None = None
         self._began = 0.0  # [s]
 
     def start(self, now: float) -> None:
@@ -49,7 +53,7 @@ class ComponentCycle:
     def start_log(self, logger: Logger) -> None:
         """Let the component declare what it logs; from now on its `log`, if it has one, is called by `log`."""
         self._component.start_log(logger)
-        self._logger = logger if type(self._component).log is not Component.log else None
+        self.logger = logger if type(self._component).log is not Component.log else None
 
     def advance(self, now: float) -> float:
         """Let time pass for the component until `now` [s]; return how much has passed [s]."""
@@ -58,20 +62,15 @@ class ComponentCycle:
         component.time_lost = self.robot_time.lost
         return passed
 
-    def update_dynamics(self) -> None:
-        """Compute the dynamics, if the component requests them."""
-        if self._dynamics is not None:
-            self._dynamics.update()
-
     def jump(self) -> None:
         """Move the component's references with a base whose estimate has jumped."""
-        if self._jumps is not None and (move := self._jumps.find(self._component.passed)):
+        if self.jumps is not None and (move := self.jumps.find(self._component.passed)):
             self._component.move_world(move)
 
     def forget_jumps(self) -> None:
         """Begin with the base where it is."""
-        if self._jumps is not None:
-            self._jumps.restart()
+        if self.jumps is not None:
+            self.jumps.restart()
 
     def work(self) -> None:
         """Run the component; if it fails, or leaves numbers that are not finite, others see what was before."""
@@ -89,16 +88,11 @@ class ComponentCycle:
             guard.restore()
             raise
 
-    def publish(self) -> None:
-        """Publish what the component declares."""
-        for publish in self._publish:
-            publish()
-
     def log(self, now: float) -> None:
         """Let the component log the cycle of the time `now` [s]."""
-        if self._logger is not None:
-            self._component.log(self._logger, now - self._began)
+        if self.logger is not None:
+            self._component.log(self.logger, now - self._began)
 
     def figures(self) -> dict[str, float | str]:
         """Return figures for health reports."""
-        return {} if self._jumps is None else {"jumps of the base": self._jumps.count}
+        return {} if self.jumps is None else {"jumps of the base": self.jumps.count}

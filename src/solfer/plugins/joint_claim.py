@@ -1,39 +1,21 @@
 """A plugin's claim on the joints that it commands."""
 
-import dataclasses
 import logging
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from typing import Any
 
 import numpy as np
 
-from solfer.errors import ClaimRefused, MiddlewareError, ServiceUnavailable
+from solfer.errors import ClaimRefused
 from solfer.pipes import JointCommandPipe
+from solfer.plugins.claim_requests import ClaimRequests
 from solfer.recording.model import CLAIMED, LOST_EVENT, RELEASED_EVENT
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
-from solfer.transport.lower_level import (
-    ALL_OWNERS,
-    CLAIM_INTERFACE,
-    LOWER_LEVEL,
-    REFUSALS_TOPIC,
-    RELEASE,
-    TOPIC,
-    Answer,
-    ClaimAnswer,
-    ClaimRequest,
-    ReleaseRequest,
-    claimant,
-)
+from solfer.transport.lower_level import ALL_OWNERS, REFUSALS_TOPIC, TOPIC
 from solfer.transport.messages import REFUSALS, RefusalMessage
-from solfer.transport.middleware import TRIGGER, NoFields
 
 logger = logging.getLogger(__name__)
-
-CLAIM_PATIENCE = 2.0
-"""Longest wait for an answer of the lower level [s]."""
 
 CLAIM_REPEAT_PERIOD = 0.25
 """Time between two requests for a claim that is temporarily refused [s]."""
@@ -76,34 +58,19 @@ class JointClaim:
         publishes: Sequence[str] = (),
         position: Callable[[], np.ndarray] | None = None,
     ):
-        self._position = position
-        self._pipes = tuple(pipes)
-        self._plugin = plugin
-        self._middleware = middleware
-        self.reason = ""
-        pairs = [(pipe.controller, field) for pipe in pipes for field, _ in pipe.fields]
-        joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
-        self._claim = ClaimRequest(
-            claimant(middleware.name, plugin),
-            tuple(name for name, _ in pairs),
-            tuple(field for _, field in pairs),
-            joints=tuple(joints),
-            follows=tuple(map(_bare, follows)),
-        )
+        self._requests = ClaimRequests(plugin, pipes, middleware, follows=tuple(map(_bare, follows)), position=position)
+        self._now = middleware.now
         self._topics = frozenset(f"{TOPIC}{_bare(topic)}" for topic in publishes)
-        self._answer: Future[Any] | None = None
-        self._release: Future[Any] | None = None
-        self._commands = bool(pairs)
-        self._granted = not pairs
+        self._granted = not self._requests.commands
         self._since = -math.inf
         self._next = -math.inf
         self._settled = -math.inf
         self._refusals = middleware.queue(REFUSALS_TOPIC, REFUSALS)
+        self.reason = ""
         self.restarted = False
         self.is_taken = False
         self.refused = 0
         self.note: Callable[[str, str], None] = lambda kind, text: None
-        self._description = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
         self._complaint = ""
         self._throttle = Throttle(logger)
 
@@ -113,28 +80,26 @@ class JointClaim:
         Raises:
             ClaimRefused: The lower level refuses; names the owner of the joints.
         """
+        now = self._now()
         if self._granted:
             self.reason = ""
-            return self._middleware.now() >= self._settled
-        if self._answer is None:
-            self._request()
-        if self._answer is None or not self._answer.done():
+            return now >= self._settled
+        answer = self._requests.claim(may_request=now >= self._next)
+        if answer is None:
             return False
-        answer = self._reply(self._answer)
-        self._answer = None
         if not answer.success:
             if not answer.later:
-                raise ClaimRefused(f"plugin '{self._plugin}' does not get its joints: {answer.message}")
-            self.reason, self._next = answer.message, self._middleware.now() + CLAIM_REPEAT_PERIOD
+                raise ClaimRefused(f"plugin '{self._requests.plugin}' does not get its joints: {answer.message}")
+            self.reason = answer.message
+            self._next = now + CLAIM_REPEAT_PERIOD
             self.is_taken = True
             return False
-        now = self._middleware.now()
         self._granted = True
         self._since = now
         self.reason = ""
         self.is_taken = False
-        self.note(CLAIMED, self._description)
-        self._settled = now + CLAIM_SETTLING_TIME if answer.again and self._claim.follows else now
+        self.note(CLAIMED, self._requests.description)
+        self._settled = now + CLAIM_SETTLING_TIME if answer.again and self._requests.follows else now
         return now >= self._settled
 
     def lost(self) -> bool:
@@ -168,59 +133,28 @@ class JointClaim:
     @property
     def released(self) -> bool:
         """Whether every release has been answered."""
-        return self._release is None or self._release.done()
+        return self._requests.released
 
     def lapse(self) -> None:
         """Give up the claim without a request, since nothing is sent for a while; it has to be requested again."""
         self.restarted = False
-        if self._commands:
+        if self._requests.commands:
             self._granted = False
-            self._answer = None
+            self._requests.forget()
 
     def damp(self) -> None:
         """Trip the robot's emergency stop, which fades out its springs. No effect if the plugin commands no joint."""
-        if self._commands:
-            self._middleware.request(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer, CLAIM_PATIENCE)
+        self._requests.damp()
 
     def release(self) -> None:
         """Release the joints; does not wait for the answer."""
-        if self._commands and (self._granted or self._answer is not None):
-            self.note(RELEASED_EVENT, self._description)
-            self._release = self._middleware.request(
-                f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._claim.owner), Answer, CLAIM_PATIENCE
-            )
+        if self._requests.commands and (self._granted or self._requests.waits):
+            self.note(RELEASED_EVENT, self._requests.description)
+            self._requests.release()
         self.lapse()
 
-    def _request(self) -> None:
-        """Request the claim, but only after a release has been answered: it must not end the new claim."""
-        if self._middleware.now() < self._next or not self.released:
-            return
-        claim = dataclasses.replace(self._claim, positions=self._measured())
-        self._answer = self._middleware.request(
-            f"{LOWER_LEVEL}/claim", CLAIM_INTERFACE, claim, ClaimAnswer, CLAIM_PATIENCE
-        )
-
-    def _measured(self) -> tuple[float, ...]:
-        """Return where the joints are measured, in the names and numbers of the lower level."""
-        if self._position is None:
-            return ()
-        position = self._position()
-        found: dict[str, float] = {}
-        for pipe in self._pipes:
-            found.update(zip(pipe.sent.names, pipe.to_receiver("position", position[pipe.dofs]).tolist(), strict=True))
-        return tuple(found[name] for name in self._claim.joints)
-
-    def _reply(self, answer: "Future[Any]") -> ClaimAnswer:
-        try:
-            return answer.result()
-        except ServiceUnavailable:
-            logger.warning("%s commands without a claim: this lower level does not support claims", self._plugin)
-            return ClaimAnswer()
-        except MiddlewareError as error:
-            return ClaimAnswer(False, error.line, later=True)
-
     def _receive(self, message: RefusalMessage) -> None:
-        if self._middleware.now() < self._since + REFUSAL_GRACE:
+        if self._now() < self._since + REFUSAL_GRACE:
             return
         for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
             if owner == ALL_OWNERS:
@@ -228,7 +162,7 @@ class JointClaim:
                 self.restarted = True
             elif owner in self._topics:
                 self.reason = self.reason or reason
-            if owner != self._claim.owner:
+            if owner != self._requests.owner:
                 continue
             self.refused += 1
             if claim:
@@ -236,7 +170,7 @@ class JointClaim:
                 self.is_taken = True
             else:
                 self._complaint = f"the lower level refuses a command: {reason}"
-                self._throttle.warning("complaint", "%s: %s", self._plugin, self._complaint)
+                self._throttle.warning("complaint", "%s: %s", self._requests.plugin, self._complaint)
 
 
 def _bare(topic: str) -> str:

@@ -186,7 +186,7 @@ class Plugin:
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._readiness.feedbacks.read(now, self.outputs.distance)
+        self._readiness.feedbacks.read(now, self.outputs.joints.distance)
         verdict = self._readiness.judge(now, life is RUNNING)
         end = clock()
         times[READ] = end - begin
@@ -203,7 +203,7 @@ class Plugin:
             if not self.peers.complaint():
                 raise fault
             following.start()  # no node receives its commands, which the health says
-        if life is RUNNING:
+        if work.jumps is not None and life is RUNNING:
             work.jump()
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
@@ -222,9 +222,11 @@ class Plugin:
         times[GATE] = end - begin
         begin = end
         self.outputs.send(self._now())
-        work.publish()
+        for publish in work.publish:
+            publish()
         times[WRITE] = clock() - begin
-        work.log(now)
+        if work.logger is not None:
+            work.log(now)
 
     def measure_with(self, nanoseconds: Callable[[], int], times: memoryview | None = None) -> None:
         """Measure the stages of a cycle with another clock, and into memory of the caller; see `CycleTiming`."""
@@ -340,7 +342,8 @@ class Plugin:
             self.robot.update()
         if life is STARTING:
             self._start()
-        self._work.update_dynamics()
+        if self._work.dynamics is not None:
+            self._work.dynamics.update()
 
     def _wait(self) -> None:
         """Wait for what the plugin lacks, and log it if it has changed."""

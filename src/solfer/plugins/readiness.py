@@ -27,6 +27,7 @@ class Readiness:
     Attributes:
         feedbacks: Its feedbacks with their timeouts.
         taken: Called in each cycle while others have the joints.
+        stall: See `StartConditions.stall`.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class Readiness:
         self._plugin = plugin
         self._claim = claim
         self._conditions = StartConditions(plugin, self.feedbacks, middleware, claim=claim, period=period, stall=stall)
+        self.stall = self._conditions.stall
         self._logged = ""
 
     @property
@@ -54,10 +56,6 @@ class Readiness:
     def released(self) -> bool:
         """Whether the joints were released, and the lower level has confirmed it."""
         return self._claim is None or self._claim.released
-
-    def stall(self, now: float) -> float:
-        """See `StartConditions.stall`."""
-        return self._conditions.stall(now)
 
     def judge(self, now: float, running: bool) -> CycleVerdict:
         """Judge what to do in this cycle, whose messages were read `now` [s]; claim the joints when all is there."""

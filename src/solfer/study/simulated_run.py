@@ -4,7 +4,7 @@ import importlib
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,15 @@ Configuration = tuple[str, config.Configuration] | SharedConfiguration
 """A plugin and its configuration, or a shared plugin."""
 
 
+class _Options(NamedTuple):
+    """What a run is given besides its record; see `SimulatedRun`."""
+
+    seed: int
+    configurations: list[Configuration]
+    kept: tuple[str, ...]
+    gui: bool
+
+
 class SimulatedRun:
     """One run: reset it, step it, observe it; or let it run to its end.
 
@@ -81,10 +90,7 @@ class SimulatedRun:
         gui: bool = False,
     ):
         self.record = record
-        self._seed = seed
-        self._configurations = configurations_of(record, changes)
-        self._kept = tuple(columns)
-        self._gui = gui
+        self._options = _Options(seed, configurations_of(record, changes), kept=tuple(columns), gui=gui)
         self._stack = ExitStack()
         self.reset()
 
@@ -96,20 +102,19 @@ class SimulatedRun:
         self._sets: list[PluginSet] = []
         self._navigation: Navigation | None = None
         record = self.record
-        bundle = bundle_of(record.simulation, self._seed)
+        bundle = bundle_of(record.simulation, self._options.seed)
         parameters = robot_parameters(bundle)
-        self.bus = Bus(parameters, faults_of(record.simulation, self._seed))
-        self.simulation = simulation_of(record.simulation, bundle, parameters["/robot_description"], gui=self._gui)
+        self.bus = Bus(parameters, faults_of(record.simulation, self._options.seed))
+        self.simulation = simulation_of(
+            record.simulation, bundle, parameters["/robot_description"], gui=self._options.gui
+        )
         self._stack.callback(self.simulation.close)
-        self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
-        self.bus.every(STEP, self._server.cycle)
+        server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
+        self.bus.every(STEP, server.cycle)
         self.plugins: dict[str, Plugin] = {}
-        for configuration in self._configurations:
+        for configuration in self._options.configurations:
             self._add(configuration)
-        self._truth = _Truth(self)
-        logs = [PluginLog(plugin) for plugin in self.plugins.values()]
-        self._takes = [log.take for log in logs]
-        self._logs = logs
+        self._logs: list[_TruthLog | PluginLog] = [_TruthLog(self), *map(PluginLog, self.plugins.values())]
         self._begin = math.inf
         self.columns = Columns(self.sources, self._names(), self._where)
         self._pushes = sorted(record.simulation.pushes, key=lambda push: push.at)
@@ -119,7 +124,7 @@ class SimulatedRun:
     @property
     def sources(self) -> list[LogSource]:
         """All channels: those of a recording of the plugins, and those of the true robot."""
-        return [*self._truth.sources, *(source for log in self._logs for source in log.sources)]
+        return [source for log in self._logs for source in log.sources]
 
     @property
     def time(self) -> float:
@@ -250,26 +255,24 @@ class SimulatedRun:
         self.bus.check_faults()
         self._begin = self.bus.time
         self._sample()
-        course = self._course()
+        mover = self.node("navigation")
+        course = self._course(mover)
         if course is not None:
-            self._navigation = Navigation(self._mover, course, self._mover.name, rate=1.0 / RUN_PERIOD)
+            self._navigation = Navigation(mover, course, mover.name, rate=1.0 / RUN_PERIOD)
             self.bus.every(RUN_PERIOD, self._navigate)
 
     def _waiting(self) -> Plugin | None:
         return next((plugin for plugin in self.plugins.values() if not plugin.running), None)
 
-    def _course(self) -> Course | None:
-        """Make what moves the robot; None: nothing does, or a function."""
+    def _course(self, mover: MemoryMiddleware) -> Course | None:
+        """Make what moves the robot from a node; None: nothing does, or a function."""
         motion = self.record.motion
-        self._mover = MemoryMiddleware(self.bus, "navigation")
         if motion.scenario is not None:
             player = Player(read_scenario(str(motion.scenario.location)), RUN_PERIOD)
-            return ScenarioCourse(
-                self._mover, player, motion.target, odometry=motion.odometry, positions=motion.positions
-            )
+            return ScenarioCourse(mover, player, motion.target, odometry=motion.odometry, positions=motion.positions)
         if motion.references is not None:
             references = read_references(str(motion.references.location))
-            return ReferenceCourse(self._mover, references, motion.target, joints="joint_states", states="joint_states")
+            return ReferenceCourse(mover, references, motion.target, joints="joint_states", states="joint_states")
         return None
 
     def _navigate(self) -> None:
@@ -282,14 +285,13 @@ class SimulatedRun:
     def _sample(self) -> None:
         if self.bus.time < self._begin or self.is_over:
             return
-        self._truth.take()
-        for take in self._takes:
-            take(self.bus.time)
+        for log in self._logs:
+            log.take(self.bus.time)
         self.columns.sample(self.time)
 
     def _names(self) -> list[str]:
         """List the columns that are kept."""
-        names = list(self._kept)
+        names = list(self._options.kept)
         for measure in self.record.measure.values():
             for each in measure.names():
                 names += each
@@ -311,7 +313,7 @@ class SimulatedRun:
             self.failure = self.failure or f"{name}: {type(error).__name__}: {error}"
 
 
-class _Truth:
+class _TruthLog:
     """The true state of the robot, as channels `simulation/...`."""
 
     def __init__(self, run: SimulatedRun):
@@ -335,8 +337,8 @@ class _Truth:
         self._actuated = slice(6 if simulation.floating else 0, None)
         self.sources = log.sources
 
-    def take(self) -> None:
-        """Bring the numbers up to date."""
+    def take(self, time: float) -> None:
+        """Bring the numbers up to date, whatever the time [s]."""
         simulation = self._simulation
         self._model.update(simulation.q)
         self._center[:] = self._model.center_of_mass

@@ -1,45 +1,23 @@
 """Commands of pages: one page at a time drags references and drives the base."""
 
-import math
 from collections.abc import Mapping
-from concurrent.futures import Future
 from functools import partial
 
 import numpy as np
 from viser import ClientHandle, GuiButtonHandle, GuiEvent, TransformControlsEvent, TransformControlsHandle
 
-from solfer.errors import MiddlewareError, NotFinite
+from solfer.errors import NotFinite
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
-from solfer.transport import Middleware, Writer
-from solfer.transport.messages import FieldsMessage
-from solfer.transport.topics import Topics
+from solfer.transport import Middleware
 from solfer.view.drawing import name_of, wxyz
+from solfer.view.driving_pad import DrivingPad
 from solfer.view.life import PageLives
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 
 CONTROL_SILENCE = 0.5
 """Time without a sign of life of the page that commands after which everything comes to rest [s]."""
-
-RELEASE_TIME = 0.25
-"""Time after which a button of the pad counts as released [s]; while it is pressed it says so ten times a second."""
-
-TURN_BY_SPEED = 2.0
-"""Turn of the base for each metre of the pad's speed [rad/m]."""
-
-CMD_VEL = "cmd_vel"
-TWIST = "geometry_msgs/Twist"
-
-PAD_VELOCITIES = {
-    "ahead": (1.0, 0.0, 0.0),
-    "back": (-1.0, 0.0, 0.0),
-    "left": (0.0, 1.0, 0.0),
-    "right": (0.0, -1.0, 0.0),
-    "turn left": (0.0, 0.0, 1.0),
-    "turn right": (0.0, 0.0, -1.0),
-}
-"""Velocity of each button of the pad, as a share: x, y, heading."""
 
 NO_PAGE_COMMANDS = "no page commands"
 
@@ -63,27 +41,18 @@ class PageControl:
         self._viser = viser
         self._lives = PageLives(server, middleware.now)
         self._requests = requests
-        self._middleware = middleware
         self._dragged = DraggedReferences(middleware)
         self._holder: int | None = None
         self._handles: dict[str, TransformControlsHandle] = {}
         self._shown: dict[str, ShownReference] = {}
         self._frames: Mapping[str, ScenePose] = {}
         self._moved: set[str] = set()
-        self._writers: dict[str, Writer] = {}
-        self._direction = (0.0, 0.0, 0.0)
-        self._pressed = -math.inf
-        self._drives = False
-        self._topics: Future[Topics] | None = None
-        self._next = -math.inf
         gui = viser.gui
         with gui.add_folder("control"):
             self._state = gui.add_markdown(NO_PAGE_COMMANDS)
             take = gui.add_button("take control")
             give = gui.add_button("give it back")
-            self._module = gui.add_dropdown("base", ("",))
-            self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
-            pads = {name: gui.add_button(name) for name in PAD_VELOCITIES}
+            self._pad = DrivingPad(gui, requests, middleware, is_pressed_by=self._is_holder)
 
         @take.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
@@ -93,22 +62,18 @@ class PageControl:
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
             requests.submit(partial(self._give, event.client_id))
 
-        for name, button in pads.items():
-            self._connect(button, PAD_VELOCITIES[name])
-
         @viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:
             requests.submit(partial(self._give, client.client_id))
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is commanded; without a scene, None, nothing is."""
-        now = self._middleware.now()
-        self._find_modules(now)
+        self._pad.find_modules()
         if self._holder is not None and (state is None or self._lives.age(self._holder) > CONTROL_SILENCE):
             self._rest()
         if state is not None:
             self._show(state)
-        self._drive(now)
+        self._pad.drive()
         for name in self._moved & set(self._shown):
             self._dragged.drag(self._shown[name], self._name, None)
         self._dragged.publish()
@@ -124,23 +89,6 @@ class PageControl:
     def is_free(self) -> bool:
         """Whether no page commands."""
         return self._holder is None
-
-    def _find_modules(self, now: float) -> None:
-        """Look once a second which components drive the base."""
-        if self._topics is None and now >= self._next:
-            self._topics = self._middleware.topics()
-            self._next = now + 1.0
-        if self._topics is None or not self._topics.done():
-            return
-        topics = self._topics
-        self._topics = None
-        try:
-            received = topics.result().received
-        except MiddlewareError:  # it is asked again
-            return
-        modules = sorted(name.removesuffix(f"/{CMD_VEL}") for name in received if name.endswith(f"/{CMD_VEL}"))
-        if modules and tuple(modules) != tuple(self._module.options):
-            self._module.options = tuple(modules)
 
     @property
     def _name(self) -> str:
@@ -179,34 +127,9 @@ class PageControl:
         for name in self._moved & set(self._shown):
             self._dragged.release(self._shown[name], self._name)
         self._moved.clear()
-        self._pressed = -math.inf
+        self._pad.release()
         self._holder = None
         self._state.content = NO_PAGE_COMMANDS
-
-    def _connect(self, button: GuiButtonHandle, direction: tuple[float, float, float]) -> None:
-        @button.on_hold(callback_hz=10.0)
-        async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            self._requests.submit(partial(self._press, event.client_id, direction))
-
-    def _press(self, client: int | None, direction: tuple[float, float, float]) -> None:
-        if self._is_holder(client):
-            self._direction, self._pressed = direction, self._middleware.now()
-
-    def _drive(self, now: float) -> None:
-        """Publish the velocity while a button is pressed, then zero once."""
-        pressed = now - self._pressed <= RELEASE_TIME
-        module = str(self._module.value)
-        if not module or not (pressed or self._drives):
-            return
-        speed = float(self._speed.value) if pressed else 0.0
-        x, y, turn = (speed * each for each in self._direction)
-        if module not in self._writers:
-            topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
-            self._writers[module] = self._middleware.declared_writer(topic, TWIST)
-        linear = {"x": x, "y": y, "z": 0.0}
-        angular = {"x": 0.0, "y": 0.0, "z": TURN_BY_SPEED * turn}
-        self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
-        self._drives = pressed
 
     def _show(self, state: SceneState) -> None:
         """Keep the handles where the references are, but for those that are dragged."""

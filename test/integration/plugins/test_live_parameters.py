@@ -116,9 +116,11 @@ def numbers_of(component):
             yield [deflection.time, deflection.most] if deflection else []
         case InverseDynamics():
             yield from (task.numbers for task in component.tasks.values())
-            yield from (component._velocity_gains, component._roots, component._bounds.speed, component.ground.cones)
-            yield from (component.problem._limits, component.problem._most[: len(component.problem._limits)])
-            yield [component._bounds.braking, component.ground.fade, component._settle, component._return]
+            demand, problem = component._demand, component.problem
+            limits = problem._constraints.limits
+            yield from (demand.velocity_gains, demand.roots, problem.bounds.speed, component.ground.cones)
+            yield from (limits, problem._constraints.most[: len(limits)])
+            yield [problem.bounds.braking, component.ground.fade, demand.settle, component._motion.follow]
             yield from (numbers for _, _, numbers in component._gains)
             yield from (component._filter.limits, component._tolerances)
         case WheeledMotion():

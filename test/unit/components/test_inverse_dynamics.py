@@ -203,7 +203,7 @@ def test_torques_are_those_of_a_second_computation(spread, speed, scale):
         draw(component, random, spread, speed)
         cycle(component)
         problem = component.problem
-        acceleration, force, torque = second.solve(component._bounds)
+        acceleration, force, torque = second.solve(component.problem.bounds)
         assert not component.is_holding
         assert np.abs(problem.torque - torque)[6:].max() < 1e-6
         assert np.abs(problem.acceleration - acceleration).max() < 1e-6 and np.abs(problem.force - force).max() < 1e-6
@@ -234,8 +234,8 @@ def test_tasks_drift_as_their_rates_change():
     cycle(component)
     state = component.model.state
     jacobian, desired = second.tasks(state.position, state.velocity)
-    assert np.abs(component._stack.jacobian - jacobian).max() < 1e-12
-    assert np.abs(component._desired - desired).max() < 1e-8
+    assert np.abs(component._demand.stack.jacobian - jacobian).max() < 1e-12
+    assert np.abs(component._demand.tasks - desired).max() < 1e-8
 
 
 def test_it_stands_on_its_weight():

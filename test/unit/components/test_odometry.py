@@ -162,7 +162,7 @@ def test_wheels_that_climb_are_not_lifted(robot):
         assert not made.law.lifted.any()
 
     drive(made, base / SPEED + 1.0, move=climb)
-    risen = made.law.position[2] + made.law._mean_height()
+    risen = made.law.position[2] + made.law._motion.mean_height()
     assert risen == pytest.approx((0.5 * base + SPEED) * math.sin(steepest), abs=0.025)
 
 

@@ -12,6 +12,7 @@ from solfer.components.diagnostics import Statuses
 from solfer.components.filter_tags import live_filter
 from solfer.components.ground_forces.checks import ContactChecks
 from solfer.components.ground_forces.laws import ProjectedLaw, WeightedLaw
+from solfer.components.ground_forces.pushed_contacts import PushedContacts
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.touch import Touch
 from solfer.dynamics import BIAS
@@ -22,7 +23,6 @@ from solfer.interfaces.port import Port
 from solfer.model.contacts import read_contacts
 from solfer.numerics.filters import LowPass
 from solfer.points.contact.contacts import Contact, make_contact
-from solfer.points.contact.support_vertex import UP
 from solfer.robot import Robot
 
 PUBLISHED = 50.0
@@ -67,29 +67,25 @@ class GroundForces(Component):
         super().__init__(robot, tags or GroundForcesTags(), name)
         self.dynamics = True
         tags = self.tags
-        self._names = self._tracked()
-        self._contacts = [robot.contacts[name] for name in self._names]
+        names = self._tracked()
+        count = len(names)
+        self._pushed = PushedContacts(names, [robot.contacts[name] for name in names], robot.size)
         self._torque = np.zeros(robot.size)
-        self._normals = np.array([getattr(contact, "normal", UP) for contact in self._contacts])
-        count = len(self._contacts)
-        self._jacobian, (self._normal_forces, self._speeds) = np.zeros((3 * count, robot.size)), np.zeros((2, count))
-        self._forces, self._velocities, self._along = np.zeros((3, count, 3))
         self._bias_force, self._overall_force = (
             robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
         )
-        self._none = np.zeros(len(self._contacts), dtype=bool)
-        self._touching = np.ones(len(self._contacts))
+        self._none = np.zeros(count, dtype=bool)
+        self._touching = np.ones(count)
         self.law = self._make_law()
         self._filter: LowPass | None = None
         self._cycles = 0
         self._silence = 1
         self._between = 1
-        self.checks = ContactChecks(self._names, self._normals, tags.friction)
-        self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
+        self.checks = ContactChecks(names, self._pushed.normals, tags.friction)
+        self.touch = None if tags.touch is None else Touch(count, **dict(tags.touch))
         self.outputs["center_of_pressure"] = Port("position")
         self.outputs["external_wrench"] = Port("wrench")
-        self._ports = [Port("force") for _ in self._contacts]
-        self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(self._names, self._ports, strict=True)}
+        self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(names, self._pushed.ports, strict=True)}
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer the filter of torques, when contacts touch, and the friction beyond which forces are reported."""
@@ -118,16 +114,16 @@ class GroundForces(Component):
         return (
             *(
                 TopicOut(each, interface, StampedWrench, collect=functools.partial(self._wrench_now_and_then, contact))
-                for each, contact in zip(self._names, self._contacts, strict=True)
+                for each, contact in zip(self._pushed.names, self._pushed.contacts, strict=True)
             ),
             TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._report_now_and_then),
         )
 
     def start_log(self, logger: Any) -> None:
         """Declare force, normal force and touch of each contact, the push on the base, and the torques as used."""
-        names = self._names
-        logger.add("forces", self._forces, [f"{name}.{axis}" for name in names for axis in "xyz"], "N", "world")
-        logger.add("normal_forces", self._normal_forces, names, "N")
+        names = self._pushed.names
+        logger.add("forces", self._pushed.forces, [f"{name}.{axis}" for name in names for axis in "xyz"], "N", "world")
+        logger.add("normal_forces", self._pushed.normal_forces, names, "N")
         logger.add("touching", self._touching, names)
         logger.add("external_wrench", self.law.push, ("fx", "fy", "fz", "tx", "ty", "tz"), ("N",) * 3 + ("Nm",) * 3)
         logger.add("torque", self._torque, self.model.dofs)
@@ -148,18 +144,18 @@ class GroundForces(Component):
         tags = self.tags
         robot.dynamics.subscribe(BIAS)
         if tags.method == "projection":
-            return ProjectedLaw(self._contacts, self._torque)
-        return WeightedLaw(robot, self._contacts, self._torque, tags=tags)
+            return ProjectedLaw(self._pushed.contacts, self._torque)
+        return WeightedLaw(robot, self._pushed.contacts, self._torque, tags=tags)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts that the ground may push."""
-        return tuple(self._contacts)
+        return self._pushed.contacts
 
     @property
     def names(self) -> tuple[str, ...]:
         """Their names."""
-        return self._names
+        return self._pushed.names
 
     @property
     def torque(self) -> np.ndarray:
@@ -221,7 +217,7 @@ class GroundForces(Component):
         self.law.start(self.period)
         self._compute()
         if self.touch is not None:
-            self.touch.start(self._normal_forces)
+            self.touch.start(self._pushed.normal_forces)
         self._finish()
 
     def update(self) -> None:
@@ -232,36 +228,32 @@ class GroundForces(Component):
             self._filter.step(self._torque)
         self._compute()
         if self.touch is not None:
-            self.touch.update(self._normal_forces, self._speeds, self.passed)
+            self.touch.update(self._pushed.normal_forces, self._pushed.speeds, self.passed)
         self._finish()
 
     def reset(self) -> None:
         """Forget the forces."""
-        for contact in self._contacts:
+        for contact in self._pushed.contacts:
             contact.wrench[:] = 0.0
 
     def _compute(self) -> None:
         """Write what the law computes into the contacts, and note their normal forces and speeds."""
         self.model.contacts  # noqa: B018 they are updated where they are requested
-        for index, contact in enumerate(self._contacts):
-            self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
-        self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted, self.passed)
-        for index, contact in enumerate(self._contacts):
-            self._forces[index] = contact.wrench[:3]
-        np.multiply(self._forces, self._normals, out=self._along)
-        np.sum(self._along, axis=1, out=self._normal_forces)
-        np.dot(self._jacobian, self.model.state.velocity, out=self._velocities.reshape(-1))
-        np.multiply(self._velocities, self._normals, out=self._along)
-        np.sum(self._along, axis=1, out=self._speeds)
+        pushed = self._pushed
+        pushed.read_jacobians()
+        self.law.update(pushed.jacobian, self._none if self.touch is None else self.touch.lifted, self.passed)
+        pushed.read_forces(self.model.state.velocity)
 
     def _finish(self) -> None:
         """Take the forces of contacts that do not touch away, and publish what follows from them."""
-        for index, contact in enumerate(self._contacts):
+        pushed = self._pushed
+        forces = pushed.forces
+        for index, contact in enumerate(pushed.contacts):
             if self.touch is not None and not self.touch.touching[index]:
-                contact.wrench[:] = self._forces[index] = 0.0
-            self._ports[index].value[:] = self._forces[index]
-        self.checks.add(self._forces)
-        np.dot(self._forces.reshape(-1), self._jacobian, out=self._bias_force)
+                contact.wrench[:] = forces[index] = 0.0
+            pushed.ports[index].value[:] = forces[index]
+        self.checks.add(forces)
+        np.dot(forces.reshape(-1), pushed.jacobian, out=self._bias_force)
         self._bias_force -= self.model.dynamics.bias
         np.add(self._bias_force, self._torque, out=self._overall_force)
         self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value

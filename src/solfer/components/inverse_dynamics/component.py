@@ -9,10 +9,11 @@ import numpy as np
 
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.following.follower import ReferenceFollower, record_of
-from solfer.components.following.target import Target
 from solfer.components.gains import GAINS, configured_gains, live_gains
+from solfer.components.inverse_dynamics.demand import DemandedAccelerations, FedReference
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
+from solfer.components.inverse_dynamics.output import CommandedMotion, CommandedTorques
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
 from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
 from solfer.components.inverse_dynamics.watch import DynamicsWatch
@@ -38,9 +39,6 @@ than a millimetre where legs are nearly stretched."""
 HORIZON_PERIODS = 2.0
 """Least horizon of joint limits, in periods: a cycle acts one period after its measurement."""
 
-CHANGE = 0.2
-"""Time in which torques pass from the law to what holds the robot, and back [s]."""
-
 REPORTED = 1.0
 """Reports a second."""
 
@@ -60,10 +58,8 @@ class InverseDynamics(ReferenceFollower):
         name: Name of the configuration.
 
     Attributes:
-        tasks: The tasks by name.
         problem: The QP.
         ground: The contacts.
-        is_holding: Whether the last QP had no solution.
 
     Raises:
         SolferError: The tags name something that the robot does not have, or do not fit it.
@@ -82,42 +78,29 @@ class InverseDynamics(ReferenceFollower):
         robot.update()
         self._gains = configured_gains(robot, tags.gains)
         self.ground = Ground(robot, tags)
-        self._configured, self._stack = self._make_stack(robot)
-        self.tasks: dict[str, Task] = self._configured.tasks
-        self._velocity_gains, self._fed = np.zeros((2, len(self._stack.velocity)))
-        self._roots = np.zeros(len(self._stack.velocity))
-        self._rows = _rows_of(self._stack)
-        self._read_gains()
-        self._settle = tags.settle
-        self._return = tags.follow
+        self._configured, stack = self._make_stack(robot)
         self._follow(tags.stack, self._configured, tags.stack.limits.speed_scale * robot.upper_limits.velocity)
-        self._fed_rows = self._moving_rows()
-        self._before_rates = np.zeros(len(self._fed))
-        twin = robot.twin()
-        twin.state.position[:] = robot.state.position
-        twin.update()
-        shadow, stack = self._make_stack(twin)
-        self._drift = TaskDrift(stack)
-        self._looks = [
-            (shadow.references[name].value, self._configured.references[name].value)
-            for name in self._configured.references
-            if isinstance(self.tasks[name].point, LookAt)
-        ]
+        self._demand = self._make_demand(robot, stack)
         robot.dynamics.subscribe((BIAS, INERTIA))
         passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
-        self._carrying = CarryingTorques(robot.dynamics, passive)
-        self._speeds = self._driven_by_speed()
-        self.efforts = np.setdiff1d(robot.actuated, [*self._speeds, *robot.kinematics.followers.dofs])
-        self._desired, self._rates = np.zeros((2, len(self._stack.velocity)))
-        self._demanded, self._slip = np.zeros((2, self.ground.rows.rows))
-        self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
+        speeds = self._driven_by_speed()
+        self.efforts = np.setdiff1d(robot.actuated, [*speeds, *robot.kinematics.followers.dofs])
+        self._motion = CommandedMotion(robot, tags.follow)
+        self._torques = CommandedTorques(CarryingTorques(robot.dynamics, passive), speeds, robot.size)
         self._standing: list[tuple[np.ndarray, np.ndarray]] = []
-        self._left = 0.0
-        self.is_holding = False
         self._watch = DynamicsWatch(robot, self.ground, self.efforts)
         self._reason = ""
         self._fault = ""
-        self._is_smooth = False
+
+    @property
+    def tasks(self) -> dict[str, Task]:
+        """The tasks by name."""
+        return self._configured.tasks
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether the last QP had no solution."""
+        return bool(self._reason)
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`.
@@ -139,10 +122,8 @@ class InverseDynamics(ReferenceFollower):
         lower[:base], upper[:base] = -math.inf, math.inf
         speed = self._speed_limits(self.tags)
         horizon = max(limits.horizon, HORIZON_PERIODS * self.period)
-        self._bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
-        self.problem = WholeBodyProblem(
-            robot, self.ground, self._bounds, rows=len(self._desired), torque_limits=self._torque_limits(self.tags)
-        )
+        bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
+        self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=self._torque_limits(self.tags))
         self._between = max(2, round(rate / REPORTED))
         self._connect()
 
@@ -152,7 +133,7 @@ class InverseDynamics(ReferenceFollower):
         tags = self.tags
         ground = self.ground
         speeds = (
-            [LiveParameter((*limits, "speed_scale"), partial(np.copyto, self._bounds.speed), self._speed_limits)]
+            [LiveParameter((*limits, "speed_scale"), partial(np.copyto, self.problem.bounds.speed), self._speed_limits)]
             if tags.stack.limits.speeds
             else [LiveParameter((*limits, "speed_scale"))]
         )
@@ -181,20 +162,17 @@ class InverseDynamics(ReferenceFollower):
         command = self.model.command
         if not self._standing:
             self._standing = [(command[gain], command[gain].copy()) for gain in GAINS if gain in command]
-        self._position[:] = self.start_position
-        self._velocity[:] = 0.0
-        self._stack.update()
+        self._motion.start(self.start_position)
+        self._demand.stack.update()
         self._configured.start()
         self._start_references()
         self.ground.start()
         self._watch.start()
         self._fault = ""
-        self._left = 0.0
-        self.is_holding = False
         self._reason = ""
+        self._torques.start()
         self._cycles = 0
-        self._fed[:] = 0.0
-        self._is_smooth = False
+        self._demand.start()
 
     def update(self) -> None:
         """Compute one cycle."""
@@ -202,24 +180,23 @@ class InverseDynamics(ReferenceFollower):
         self._cycles += 1
         self._advance(step)
         self._prepare()
-        self._feed(step)
-        self._demand(step)
+        demand = self._demand
+        state = self.model.state
+        demand.feed(step)
+        self.problem.bounds.update(state.position, state.velocity)
+        self.ground.update(step)
+        demand.update(state, self.ground)
         if not self.is_holding:
-            self._fault = self._watch.update(step, self.problem.force, self._slip)
-        is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._desired, self._demanded)
+            self._fault = self._watch.update(step, self.problem.force, demand.slip)
+        is_solved = not self._fault and self.problem.solve(demand.stack.jacobian, demand.tasks, demand.contacts)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
         if is_solved:
-            np.copyto(self._torque, self.problem.torque)
-            self._integrate(step)
+            np.copyto(self._torques.value, self.problem.torque)
+            self._motion.advance(self.problem.acceleration, step)
         else:
-            self._hold()
-        if self._left > 0.0:
-            self._left = max(self._left - step, 0.0)
-            u = 1.0 - self._left / CHANGE
-            self._torque -= self._before
-            self._torque *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))
-            self._torque += self._before
+            self._torques.hold(self.ground.rows.jacobian)
+        self._torques.blend(step)
         for target in self._list:
             target.measure()
         self._judge()
@@ -227,12 +204,14 @@ class InverseDynamics(ReferenceFollower):
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`."""
         super().move_world(move)
-        self._is_smooth = False
+        self._demand.is_smooth = False
 
     def send(self) -> None:
         """Write torques, and positions and velocities beside them."""
         command = self.model.command
-        command.torque[:], command.position[:], command.velocity[:] = self._torque, self._position, self._velocity
+        command.torque[:] = self._torques.value
+        command.position[:] = self._motion.position
+        command.velocity[:] = self._motion.velocity
         if self.is_holding:
             for values, numbers in self._standing:
                 np.copyto(values, numbers)
@@ -242,7 +221,7 @@ class InverseDynamics(ReferenceFollower):
 
     def stop(self) -> None:
         """Hold the joints where they are commanded."""
-        self._velocity[:] = 0.0
+        self._motion.velocity[:] = 0.0
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/lift` beside those of references."""
@@ -282,7 +261,7 @@ class InverseDynamics(ReferenceFollower):
         ]
         self.log_references(logger)
         logger.add("acceleration", problem.acceleration, dofs)
-        logger.add("torque", self._torque, dofs, "Nm")
+        logger.add("torque", self._torques.value, dofs, "Nm")
         logger.add("forces", problem.force, forces, "N")
         logger.add("active", problem.active, problem.names)
 
@@ -294,18 +273,37 @@ class InverseDynamics(ReferenceFollower):
                 task.weight *= SECOND_LEVEL
         return configured, Stack(configured.levels)
 
-    def _read_gains(self) -> None:
-        """Write the gains of all rows."""
-        for task in self._stack.tasks:
-            rows = self._rows[task.name]
-            self._velocity_gains[rows] = _velocity_gain(cast(DynamicTaskRecord, record_of(self.tags.stack, task.name)))
-            self._roots[rows] = np.sqrt(task.weight)
+    def _make_demand(self, robot: Robot, stack: Stack) -> DemandedAccelerations:
+        """Make what the tasks demand, with the gains of all rows; the drift is that of a twin of the robot."""
+        tags = self.tags
+        twin = robot.twin()
+        twin.state.position[:] = robot.state.position
+        twin.update()
+        shadow, shadow_stack = self._make_stack(twin)
+        aims = [
+            (shadow.references[name].value, reference.value)
+            for name, reference in self._configured.references.items()
+            if isinstance(self.tasks[name].point, LookAt)
+        ]
+        fed = [
+            FedReference(task.name, task.velocity, self.targets.get(task.name))
+            for task in stack.tasks
+            if isinstance(record_of(tags.stack, task.name).reference, ReferenceRecord)
+        ]
+        demand = DemandedAccelerations(
+            stack, TaskDrift(shadow_stack), aims, fed, contact_rows=self.ground.rows.rows, settle=tags.settle
+        )
+        for task in stack.tasks:
+            rows = demand.rows[task.name]
+            demand.velocity_gains[rows] = _velocity_gain(cast(DynamicTaskRecord, record_of(tags.stack, task.name)))
+            demand.roots[rows] = np.sqrt(task.weight)
+        return demand
 
     def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
         """See `ReferenceFollower._take_number`; a second level weighs less."""
         if key == "weight":
             numbers = numbers * (1.0 if task in self._configured.levels[0] else SECOND_LEVEL)
-            self._roots[self._rows[task.name]] = np.sqrt(numbers)
+            self._demand.roots[self._demand.rows[task.name]] = np.sqrt(numbers)
         super()._take_number(task, key, numbers)
 
     def _gains_of(self, name: str, tags: InverseDynamicsTags) -> np.ndarray:
@@ -322,7 +320,7 @@ class InverseDynamics(ReferenceFollower):
         self._take_numbers(self._configured, name, "gain", numbers=numbers[0])
         first = 0
         for task in self._configured.members(name):
-            self._velocity_gains[self._rows[task.name]] = numbers[1, first : first + task.rows]
+            self._demand.velocity_gains[self._demand.rows[task.name]] = numbers[1, first : first + task.rows]
             first += task.rows
 
     def _speed_limits(self, tags: InverseDynamicsTags) -> np.ndarray:
@@ -350,37 +348,14 @@ class InverseDynamics(ReferenceFollower):
             )
 
     def _take_braking(self, braking: np.ndarray) -> None:
-        self._bounds.braking = float(braking)
+        self.problem.bounds.braking = float(braking)
 
     def _take_settling(self, settle: np.ndarray) -> None:
-        self._settle = float(settle)
+        self._demand.settle = float(settle)
 
     def _take_times(self, tags: InverseDynamicsTags) -> None:
         self.ground.fade = tags.fade
-        self._return = tags.follow
-
-    def _moving_rows(self) -> tuple[tuple[slice, np.ndarray, Target | None], ...]:
-        """Return rows, velocity and target of each task whose reference the configuration generates."""
-        row = 0
-        found = list[tuple[slice, np.ndarray, Target | None]]()
-        for task in self._stack.tasks:
-            if isinstance(record_of(self.tags.stack, task.name).reference, ReferenceRecord):
-                found.append((slice(row, row + task.rows), task.velocity, self.targets.get(task.name)))
-            row += task.rows
-        return tuple(found)
-
-    def _feed(self, step: float) -> None:
-        """Write the accelerations of references that are generated; those of others are too rough."""
-        for rows, velocity, target in self._fed_rows:
-            fed = self._fed[rows]
-            before = self._before_rates[rows]
-            if target is not None and not target.is_generated:
-                fed[:] = 0.0
-            elif self._is_smooth:
-                np.subtract(velocity, before, out=fed)
-                fed /= step
-            before[:] = velocity
-        self._is_smooth = True
+        self._motion.follow = tags.follow
 
     def _obstacles(self, _task: Task) -> str:
         """See `ReferenceFollower._obstacles`."""
@@ -399,56 +374,11 @@ class InverseDynamics(ReferenceFollower):
         except UnknownName as error:
             raise error.at(self.tags.where("speed_driven")) from None
 
-    def _demand(self, step: float) -> None:
-        """Write the accelerations that tasks and contacts demand."""
-        state = self.model.state
-        stack = self._stack
-        ground = self.ground
-        self._bounds.update(state.position, state.velocity)
-        ground.update(step)
-        stack.update()
-        for look, aim in self._looks:
-            look[:] = aim
-        self._drift.update(state.position, state.velocity)
-        np.dot(stack.jacobian, state.velocity, out=self._rates)
-        np.subtract(stack.velocity, self._rates, out=self._desired)
-        self._desired *= self._velocity_gains
-        np.multiply(self._roots, self._fed, out=self._rates)
-        self._desired += self._rates
-        self._desired -= self._drift.value
-        np.dot(ground.rows.jacobian, state.velocity, out=self._slip)
-        np.multiply(self._slip, -self._settle, out=self._demanded)
-        self._demanded -= ground.rows.offset
-
-    def _integrate(self, step: float) -> None:
-        """Advance positions and velocities beside the torques, which return to the measured ones."""
-        state = self.model.state
-        share = step / (self._return + step)
-        np.multiply(self.problem.acceleration, step, out=self._step)
-        self._velocity += self._step
-        np.subtract(state.velocity, self._velocity, out=self._step)
-        self._step *= share
-        self._velocity += self._step
-        np.multiply(self._velocity, step, out=self._step)
-        self._position += self._step
-        np.subtract(state.position, self._position, out=self._step)
-        self._step *= share
-        self._position += self._step
-        np.maximum(self._position, self.model.lower_limits.position, out=self._position)
-        np.minimum(self._position, self.model.upper_limits.position, out=self._position)
-
-    def _hold(self) -> None:
-        """Carry the robot where it is."""
-        np.copyto(self._torque, self._carrying.update(self.ground.rows.jacobian))
-        self._torque[self._speeds] = 0.0
-
     def _switch(self, is_holding: bool) -> None:
         """Begin to hold the robot where it is, or go on with the tasks."""
-        self.is_holding = is_holding
-        self._before[:] = self._torque if self._cycles > 1 else self.model.state.torque
-        self._left = CHANGE
-        self._position[:] = self.model.state.position
-        self._velocity[:] = 0.0
+        state = self.model.state
+        self._torques.change(self._torques.value if self._cycles > 1 else state.torque)
+        self._motion.start(state.position)
         if self._fault:
             self._reason = self._fault
             log.error("%s: %s; it holds until it is started again", self.name, self._reason)
@@ -456,6 +386,7 @@ class InverseDynamics(ReferenceFollower):
             self._reason = f"the QP has no solution: {self.problem.violated}"
             self._throttle.warning(self._reason, "%s: %s; it holds", self.name, self._reason)
         else:
+            self._reason = ""
             self._watch.start()
 
     def _report_now_and_then(self) -> Statuses | None:
@@ -476,12 +407,6 @@ class InverseDynamics(ReferenceFollower):
                 ),
             )
         )
-
-
-def _rows_of(stack: Stack) -> dict[str, slice]:
-    """Return the rows of each task, by its name."""
-    ends = np.cumsum([task.rows for task in stack.tasks]).tolist()
-    return {task.name: slice(end - task.rows, end) for task, end in zip(stack.tasks, ends, strict=True)}
 
 
 def _as_tag(numbers: np.ndarray) -> float | tuple[float, ...]:

@@ -20,12 +20,12 @@ from solfer.components.odometry.messages import (
     stamped_pose,
     transform,
 )
+from solfer.components.odometry.pose_covariances import PoseCovariances
 from solfer.components.odometry.streams import Streams
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
 from solfer.interfaces.declaration import Accepted, LiveParameter, Parameter, Service, TopicIn, TopicOut
-from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
@@ -42,6 +42,23 @@ FRAME = "odom"
 
 PUBLISHED = 50.0
 """Rate at which the pose is published with its covariance, at most [Hz]."""
+
+
+class PublishingTurns:
+    """Turns of something that is published once in several cycles, the last of which is its turn.
+
+    Attributes:
+        between: Cycles from one turn to the next.
+    """
+
+    def __init__(self) -> None:
+        self.between = 1
+        self._left = 0
+
+    def is_next(self) -> bool:
+        """Count a cycle; return whether it is a turn."""
+        self._left = (self._left or self.between) - 1
+        return not self._left
 
 
 class Odometry(Component):
@@ -80,17 +97,12 @@ class Odometry(Component):
         self._pose, self._rates = np.zeros((2, 6))
         self._rotation = np.eye(3)
         self._position = np.zeros(3)
-        self._silence = 1
-        self._left = self._reports_left = 0
+        self._pose_turns = PublishingTurns()
+        self._report_turns = PublishingTurns()
         self._throttle = Throttle(log)
         self._child = robot.kinematics.base_link or ""
         if self.tags.method == "filter":
-            made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
-            self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
-            self._heading_twist, self._half, self._axes = np.zeros((3, 6, 6))
-            self._turn = np.zeros((3, 3))
-            self._deviations = np.zeros(6)
-            self._variances = np.einsum("ii->i", self._covariance)
+            self._covariances = PoseCovariances(robot.command)
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`.
@@ -99,7 +111,8 @@ class Odometry(Component):
             ConfigError: A filter's cut-off is not below half of the rate.
         """
         super().set_rate(rate)
-        self._silence = max(1, round(rate / PUBLISHED))
+        self._pose_turns.between = max(1, round(rate / PUBLISHED))
+        self._report_turns.between = round(self._pose_turns.between * PUBLISHED)
         tags = self.tags
         self.law.filter = None if tags.filter is None else tags.filter.low_pass(3, rate)
         self.law.smoothing = None if tags.velocity is None else tags.velocity.low_pass(4, rate)
@@ -143,7 +156,7 @@ class Odometry(Component):
         command.position[:6] = self._pose
         command.velocity[:6] = self._rates
         if isinstance(self.law, FilteredOdometry):
-            self._write_covariances(self.law)
+            self._covariances.write(self.law, self._rotation)
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/set_base`."""
@@ -177,22 +190,20 @@ class Odometry(Component):
         logger.add("base", self._pose, axes, ("m",) * 3 + ("rad",) * 3, FRAME)
         logger.add("base_rates", self._rates, axes, ("m/s",) * 3 + ("rad/s",) * 3, FRAME)
         if isinstance(self.law, FilteredOdometry):
-            logger.add("deviation", self._deviations, axes, ("m",) * 3 + ("rad",) * 3, FRAME)
+            logger.add("deviation", self._covariances.deviations, axes, ("m",) * 3 + ("rad",) * 3, FRAME)
             logger.add("innovation", self.law.kalman.innovations, places, "m/s")
             logger.add("rolling", self.law.kalman.rolling, self._wheels.names)
 
     def log(self, logger: Any, time: float) -> None:
         """See `Component.log`: standard deviations of the pose."""
         if isinstance(self.law, FilteredOdometry):
-            np.sqrt(self._variances, out=self._deviations)
+            self._covariances.find_deviations()
 
     def _pose_now_and_then(self) -> object:
-        self._left = (self._left or self._silence) - 1
-        return None if self._left else self.uncertain_pose()
+        return self.uncertain_pose() if self._pose_turns.is_next() else None
 
     def _state_now_and_then(self) -> object:
-        self._reports_left = (self._reports_left or round(self._silence * PUBLISHED)) - 1
-        return None if self._reports_left else self.wheel_states()
+        return self.wheel_states() if self._report_turns.is_next() else None
 
     def _place(self) -> object:
         quaternion = quaternion_from_rotation(self._rotation)
@@ -241,7 +252,7 @@ class Odometry(Component):
     def uncertain_pose(self) -> object:
         """Return the pose of the base's origin, in the frame `odom`, and its covariance, as they were sent last."""
         quaternion = quaternion_from_rotation(self._rotation)
-        return stamped_pose(FRAME, self._position, quaternion, covariance=self._covariance)
+        return stamped_pose(FRAME, self._position, quaternion, covariance=self._covariances.pose)
 
     def set_base(self, request: SetBase) -> Accepted:
         """Put the base somewhere else on the ground, from the next cycle on.
@@ -255,14 +266,6 @@ class Odometry(Component):
             )
         self.law.place(request.x, request.y, request.yaw)
         return Accepted()
-
-    def _write_covariances(self, law: FilteredOdometry) -> None:
-        """Write the covariances of pose and twist into the desired State; that of the twist in the base's axes."""
-        law.write_covariance(self._covariance, self._heading_twist)
-        filter_kernel.turn_rotation(self._rotation, -law.heading, self._turn)
-        self._axes[:3, :3] = self._axes[3:, 3:] = self._turn
-        np.matmul(self._axes.T, self._heading_twist, out=self._half)
-        np.matmul(self._half, self._axes, out=self._twist_covariance)
 
     def _write(self) -> None:
         """Write where the base is now into the measured State; its angles go on without jumps by whole turns."""

@@ -15,6 +15,64 @@ from solfer.robot import Robot
 GROUND_NORMAL = np.array((0.0, 0.0, 1.0))
 
 
+class TiltedWheels:
+    """The wheels with the tilt of the base, without its heading.
+
+    Args:
+        robot: The Robot.
+        wheels: Its wheels.
+
+    Attributes:
+        centers: Their centres from the base, shape (k, 3) [m]; live.
+    """
+
+    def __init__(self, robot: Robot, wheels: Wheels):
+        self._robot = robot
+        self._links = wheels.links
+        self._radii = wheels.radii
+        self._dofs = np.array([robot.kinematics.attachment(link).columns[-1] for link in wheels.links])
+        self._before = np.zeros(len(wheels))
+        self.centers = np.zeros((len(wheels), 3))
+
+    def update(self, turn: np.ndarray) -> None:
+        """Find centres, axes and velocities by the Robot's kinematics, turned by a rotation, shape (3, 3)."""
+        kinematics = self._robot.kinematics
+        origin = kinematics.position(kinematics.base_link or "")
+        self.centers[:] = [turn @ (kinematics.position(link) - origin) for link in self._links]
+        self._axes = [turn @ kinematics.rotation(link)[:, 2] for link in self._links]
+        joints = self._robot.state.velocity[6:]
+        moving = [kinematics.jacobian(link)[:, 6:] @ joints for link in self._links]
+        self._moving = [np.concatenate((turn @ each[:3], turn @ each[3:])) for each in moving]
+
+    def start(self) -> None:
+        """Let displacements begin where the wheels are."""
+        self._before[:] = self._robot.state.position[self._dofs]
+
+    def displacements(self) -> list[np.ndarray]:
+        """Return how far each wheel has rolled along the ground since the last call, shape (3,) each [m]."""
+        turned = self._robot.state.position[self._dofs]
+        found = []
+        for index, (axis, radius) in enumerate(zip(self._axes, self._radii, strict=True)):
+            along = cross(axis, GROUND_NORMAL)
+            along *= radius * (turned[index] - self._before[index]) / np.linalg.norm(along)
+            found.append(along)
+        self._before[:] = turned
+        return found
+
+    def rows(self, tilting: np.ndarray, axis: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return w and u of each wheel, which measures v + rate w = u of the base's velocity v, shape (3,) each.
+
+        Args:
+            tilting: Angular velocity of the base without its turn, shape (3,) [rad/s].
+            axis: Axis of that turn, shape (3,).
+        """
+        found = []
+        for center, moving, radius in zip(self.centers, self._moving, self._radii, strict=True):
+            rolled = cross(tilting + moving[3:], radius * GROUND_NORMAL)
+            found.append((cross(axis, center), rolled - cross(tilting, center) - moving[:3]))
+        return found
+
+
 class GeometricOdometry:
     """The base's pose by the steps of the wheels, each of which measures a pose, and by the IMU's tilt.
 
@@ -45,20 +103,14 @@ class GeometricOdometry:
             raise ComponentError(
                 f"one wheel of '{robot.name}' measures no turn", expected="two, or the method `filter`"
             )
-        self._robot = robot
         self._base = base
-        self._radii = wheels.radii
-        self._links = wheels.links
-        self._state = robot.state
-        self._dofs = np.array([robot.kinematics.attachment(link).columns[-1] for link in wheels.links])
-        self._pairs = list(itertools.combinations(range(len(wheels)), 2))
+        self._wheels = TiltedWheels(robot, wheels)
         self.position, self.velocity, self.angular = np.zeros((3, 3))
-        self.candidates, self._places, self._centers = np.zeros((3, len(wheels), 3))
+        self.candidates, self._places = np.zeros((2, len(wheels), 3))
         self.heading = self._turn = self._rate = 0.0
         self._known = np.eye(3)
-        self._rates = np.zeros(6)
-        self._before = np.zeros(len(wheels))
         self._measured = np.zeros(3)
+        self._tilted = np.eye(3)
         self.filter: LowPass | None = None
         self.smoothing: LowPass | None = None
 
@@ -73,9 +125,9 @@ class GeometricOdometry:
             if low_pass is not None:
                 low_pass.reset()
         self._tilt()
-        self._find_wheels()
-        self._places[:] = [about_vertical(center, self._turn) for center in self._centers]
-        self._before[:] = self._state.position[self._dofs]
+        self._wheels.update(self._tilted @ self._base.rotation.T)
+        self._wheels.start()
+        self._places[:] = [about_vertical(center, self._turn) for center in self._wheels.centers]
         self._solve(1.0)
         self._finish()
 
@@ -91,33 +143,19 @@ class GeometricOdometry:
     def update(self, period: float, measured: bool) -> None:
         """Follow what has been measured within a cycle of `period` [s]."""
         self._base.read(measured)
-        self._find_wheels()
+        wheels = self._wheels
+        wheels.update(self._tilted @ self._base.rotation.T)
         self._turn += self._rate * period
-        turned = self._state.position[self._dofs]
-        for index, (axis, radius) in enumerate(zip(self._axes, self._radii, strict=True)):
-            along = cross(axis, GROUND_NORMAL)
-            along *= radius * (turned[index] - self._before[index]) / np.linalg.norm(along)
-            center = about_vertical(self._centers[index], self._turn)
+        for index, along in enumerate(wheels.displacements()):
+            center = about_vertical(wheels.centers[index], self._turn)
             self._places[index] += about_vertical(along, self._turn)
             self.candidates[index] = self._places[index] - center
-        self._before[:] = turned
         self.position[:] = middle(self.candidates)
-        for index, center in enumerate(self._centers):
+        for index, center in enumerate(wheels.centers):
             self._places[index] = self.position + about_vertical(center, self._turn)
         self._solve(period)
         self._tilt()
         self._finish()
-
-    def _find_wheels(self) -> None:
-        """Find centres and axes of the wheels with the tilt of the base, without its heading."""
-        kinematics = self._robot.kinematics
-        origin = kinematics.position(kinematics.base_link or "")
-        turn = self._tilted @ self._base.rotation.T
-        self._centers[:] = [turn @ (kinematics.position(link) - origin) for link in self._links]
-        self._axes = [turn @ kinematics.rotation(link)[:, 2] for link in self._links]
-        joints = self._state.velocity[6:]
-        moving = [kinematics.jacobian(link)[:, 6:] @ joints for link in self._links]
-        self._moving = [np.concatenate((turn @ each[:3], turn @ each[3:])) for each in moving]
 
     def _tilt(self) -> None:
         """Take the tilt of the base from the IMU, without its heading."""
@@ -134,11 +172,8 @@ class GeometricOdometry:
             self._measured = turned
         tilting = self._measured * (1.0, 1.0, 0.0)
         axis = self._tilted[:, 2]
-        rows = []
-        for center, moving, radius in zip(self._centers, self._moving, self._radii, strict=True):
-            rolled = cross(tilting + moving[3:], radius * GROUND_NORMAL)
-            rows.append((cross(axis, center), rolled - cross(tilting, center) - moving[:3]))
-        solved = middle(np.array([_solution(rows[i], rows[j]) for i, j in self._pairs]))
+        rows = self._wheels.rows(tilting, axis)
+        solved = middle(np.array([_solution(one, other) for one, other in itertools.combinations(rows, 2)]))
         if self.smoothing is not None:
             self.smoothing.step(solved)
         self._rate = float(solved[3])

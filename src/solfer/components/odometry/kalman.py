@@ -51,6 +51,31 @@ class ImuSample(NamedTuple):
 NO_SAMPLE = ImuSample()
 
 
+class FilterVariances(NamedTuple):
+    """Squares of the deviations and densities that `WheelInertialFilter` is given, see there."""
+
+    acceleration: float
+    noise: float
+    bias: float
+    walk: float
+    radius: float
+    tilt: float
+
+
+class FilterBuffers(NamedTuple):
+    """What the kernels of a step write besides its results, in the order in which they take it.
+
+    Attributes:
+        transition: Transition of the state, shape (n, n).
+        process_noise: Covariance of its noise, shape (n, n).
+        half: Half of a product of three matrices, shape (n, n).
+    """
+
+    transition: np.ndarray
+    process_noise: np.ndarray
+    half: np.ndarray
+
+
 class WheelInertialFilter:
     """Pose, velocity and errors of the sensors of a base on wheels, with their covariance.
 
@@ -103,12 +128,9 @@ class WheelInertialFilter:
         self, count: int, acceleration: float, noise: float, bias: float, walk: float, radius: float, tilt: float = 0.0
     ):
         size = STATE_RADIUS + count
-        self._acceleration = acceleration**2
-        self._noise = noise**2
-        self._bias = bias**2
-        self._walk = walk**2
-        self._radius = radius**2
-        self._tilt = tilt**2
+        self._variances = FilterVariances(
+            acceleration**2, noise**2, bias**2, walk=walk**2, radius=radius**2, tilt=tilt**2
+        )
         self.covariance = np.zeros((size, size))
         self.state = np.zeros(size)
         self.correction = self.state[: STATE_HEADING + 1]
@@ -121,7 +143,7 @@ class WheelInertialFilter:
         self.innovations = np.zeros((count, 3))
         self.slide = SLIDE**2
         self._rows = np.zeros((count, 3, size))
-        self._transition, self._process_noise, self._half = np.zeros((3, size, size))
+        self._buffers = FilterBuffers(*np.zeros((3, size, size)))
         self.start()
 
     def start(self) -> None:
@@ -129,12 +151,13 @@ class WheelInertialFilter:
         self.state[:] = 0.0
         self.rolling[:] = 1.0
         self.slide = SLIDE**2
+        given = self._variances
         variances = np.zeros(len(self.state))
         variances[STATE_VELOCITY:GYRO_BIAS] = KALMAN_REST_ERROR**2
-        variances[GYRO_BIAS : GYRO_BIAS + 3] = self._bias
-        variances[STATE_RADIUS:] = self._radius
-        if self._tilt:
-            variances[STATE_TILT:SLOPE] = self._tilt
+        variances[GYRO_BIAS : GYRO_BIAS + 3] = given.bias
+        variances[STATE_RADIUS:] = given.radius
+        if given.tilt:
+            variances[STATE_TILT:SLOPE] = given.tilt
             variances[SLOPE:STATE_RADIUS] = KALMAN_UNEVENNESS**2
         self.covariance[:] = np.diag(variances)
 
@@ -189,20 +212,21 @@ class WheelInertialFilter:
             sample: Sample of the IMU in the interval.
         """
         tilt_turn, imu_time = sample
+        given = self._variances
         scrub = -math.expm1(-period / SCRUB_TIME)
         slope = -math.expm1(-rolled / PATCH)
-        estimates_tilt = self._tilt > 0.0 and imu_time > 0.0
+        estimates_tilt = given.tilt > 0.0 and imu_time > 0.0
         variances = (
-            self._acceleration * period * period,
+            given.acceleration * period * period,
             (SCRUB_SHARE * rolled / period) ** 2 * scrub * (2.0 - scrub),
-            self._noise / period + shaken,
-            self._noise * imu_time + shaken * imu_time * imu_time,
+            given.noise / period + shaken,
+            given.noise * imu_time + shaken * imu_time * imu_time,
             KALMAN_UNEVENNESS**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
         )
         kernel.predict(
             self.covariance, self.state, self.axes, _ORIGIN if arm is None else arm, heading, (turn, tilt_turn),
             imu_time if estimates_tilt else 0.0, (1.0 - scrub, 1.0 - slope if estimates_tilt else 1.0), variances,
-            self._transition, self._process_noise, self._half,
+            *self._buffers,
         )  # fmt: skip
 
     def lean(self, turn: float, x: float, y: float) -> None:
@@ -213,7 +237,7 @@ class WheelInertialFilter:
             x: That difference about the axis x of H [rad].
             y: The same about y [rad].
         """
-        if not self._tilt:
+        if not self._variances.tilt:
             return
         cosine = math.cos(turn)
         sine = math.sin(turn)
@@ -223,17 +247,17 @@ class WheelInertialFilter:
 
     def settle_tilt(self, time: float) -> None:
         """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
-        if self._tilt:
-            variance = 2.0 * TILT_TIME_CONSTANT / time * self._tilt
+        if self._variances.tilt:
+            variance = 2.0 * TILT_TIME_CONSTANT / time * self._variances.tilt
             for which in (STATE_TILT, STATE_TILT + 1):
-                kernel.measure(self.covariance, self.state, which, 0.0, variance, self._half)
+                kernel.measure(self.covariance, self.state, which, 0.0, variance, self._buffers.half)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
         """Measure the bias about the base's x and y by the gyroscope of a robot at rest, in B, shape (3,) [rad/s]."""
+        variance = self._variances.noise / time
         for axis in range(2):
-            kernel.measure(
-                self.covariance, self.state, GYRO_BIAS + axis, float(angular[axis]), self._noise / time, self._half
-            )
+            measured = float(angular[axis])
+            kernel.measure(self.covariance, self.state, GYRO_BIAS + axis, measured, variance, self._buffers.half)
 
     def level(self, x: float, y: float) -> bool:
         """Measure the tilt by the plane through the contacts, which is turned about x and y of H by the IMU [rad].
@@ -241,7 +265,9 @@ class WheelInertialFilter:
         Returns:
             Whether it passes for level ground.
         """
-        return not self._tilt or bool(kernel.level(self.covariance, self.state, x, y, PLANE**2, self._half))
+        return not self._variances.tilt or bool(
+            kernel.level(self.covariance, self.state, x, y, PLANE**2, self._buffers.half)
+        )
 
     def allow_scrubbing(self, variance: float) -> None:
         """Let scrubbing have at least a variance [rad^2/s^2]."""
@@ -269,7 +295,7 @@ class WheelInertialFilter:
         """
         kernel.correct(
             self.covariance, self.state, self._rows, speeds, arms, rate, share, self._vertical, variances, inliers,
-            self.rolling, self.innovations, self._half,
+            self.rolling, self.innovations, self._buffers.half,
         )  # fmt: skip
 
     def integrate(self, heading: float, period: float, imu_time: float, unknown: float) -> None:
@@ -282,15 +308,15 @@ class WheelInertialFilter:
             unknown: Variance of the turn besides [rad^2].
         """
         x, y, _ = self.velocity.tolist()
-        variances = (self.slide * math.hypot(x, y) * period, unknown, self._walk * period)
+        variances = (self.slide * math.hypot(x, y) * period, unknown, self._variances.walk * period)
         kernel.integrate(
             self.covariance, self._vertical, heading, self.velocity, period, imu_time, variances,
-            self._transition, self._process_noise, self._half,
+            *self._buffers,
         )  # fmt: skip
 
     def settle_height(self, deviation: float) -> None:
         """Measure the height, which is as expected, with a standard deviation [m]."""
-        kernel.condition(self.covariance, 2, deviation * deviation, self._half)
+        kernel.condition(self.covariance, 2, deviation * deviation, self._buffers.half)
 
     def write_covariances(
         self, heading: float, arm: np.ndarray, period: float, pose: np.ndarray, twist: np.ndarray
@@ -304,7 +330,7 @@ class WheelInertialFilter:
             pose: Of position and turns, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        kernel.write_covariances(self.covariance, heading, arm, self._noise / period, pose, twist)
+        kernel.write_covariances(self.covariance, heading, arm, self._variances.noise / period, pose, twist)
 
 
 _ORIGIN = np.zeros(3)

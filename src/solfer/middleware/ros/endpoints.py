@@ -205,8 +205,7 @@ class RosReader(Reader):
         kept: int = 0,
         in_lockstep: bool = False,
     ):
-        self._newest: Arrival | None = None
-        self._taken: Arrival | None = None
+        self._all = RosPublisher("")
         self._now = now
         self._lock = threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
@@ -227,7 +226,7 @@ class RosReader(Reader):
 
     def _store(self, arrival: Arrival) -> None:
         publisher = self._by_name.get(arrival.sender) or self._add(arrival.sender)
-        self._newest = publisher.newest = arrival
+        self._all.newest = publisher.newest = arrival
         publisher.arrival = arrival.time
         if self._backlog is not None:
             self._backlog.put(arrival.sender, (arrival, publisher))
@@ -250,11 +249,7 @@ class RosReader(Reader):
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
-        newest = self._newest
-        if newest is not self._taken:
-            self._taken = newest
-            return self._receive(newest)
-        return NONE if self.message is None else OLD
+        return self.read_from(self._all)
 
     def update(self) -> Sequence[Publisher]:
         """See `Reader.update`."""

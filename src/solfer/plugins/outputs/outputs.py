@@ -37,6 +37,7 @@ class Outputs:
         commanding: Those that command the lower level.
         blend: See above.
         following: See above.
+        joints: What is sent to joints.
         start_position: Where joints are at a start, shape (robot.size,) [rad, m]; live.
     """
 
@@ -64,7 +65,7 @@ class Outputs:
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
-        self._joints = SentJoints(joints, self._moves, period)
+        self.joints = SentJoints(joints, self._moves, period)
         # joints that go to other plugins have no gate, but nobody shall follow what is not a number
         self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
         self.following = following
@@ -73,11 +74,6 @@ class Outputs:
     def _moves(self, pipe: JointCommandPipe) -> bool:
         """Return whether joints move by what a pipe sends, if only through another plugin."""
         return not self._idle and bool(np.isin(pipe.dofs, self._robot.actuated).any())
-
-    @property
-    def distance(self) -> float:
-        """Sum over all cycles of the largest commanded step of a joint [rad, m]."""
-        return self._joints.distance
 
     @property
     def claims(self) -> frozenset[Claim]:
@@ -97,7 +93,7 @@ class Outputs:
     def start(self) -> None:
         """Start where the joints are, without earlier commands; to be called before the component starts."""
         self._find_start()
-        self._joints.is_sent = False
+        self.joints.is_sent = False
         self.blend.start(self.start_position)
         if self.following is not None:
             self.following.start()
@@ -108,7 +104,7 @@ class Outputs:
 
     def forget(self) -> None:
         """Forget what was sent last: others move the joints now, or the robot is in another state."""
-        self._joints.forget()
+        self.joints.forget()
 
     def collect(self) -> None:
         """Collect the commands of the component, check them and blend them in.
@@ -127,7 +123,7 @@ class Outputs:
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        self._joints.keep()
+        self.joints.keep()
         for pipe, _ in self.controllers:
             pipe.send(stamp)
 
@@ -135,18 +131,18 @@ class Outputs:
         """Collect and send, but with all velocities at zero."""
         self._robot.command.velocity[:] = 0.0
         self.collect()
-        self._joints.stop()
+        self.joints.stop()
         self.send(stamp)
 
     def hold(self, stamp: float) -> None:
         """Send the last positions and efforts of the joints again with zero velocity; nothing if none was sent yet."""
-        if not self._joints.is_sent:
+        if not self.joints.is_sent:
             return
         self._robot.command.velocity[:] = 0.0
         for pipe in self._others:
             pipe.collect()
-        self._joints.restore()
-        self._joints.stop()
+        self.joints.restore()
+        self.joints.stop()
         self.send(stamp)
 
     def counts(self) -> dict[str, float | str]:
@@ -177,7 +173,7 @@ class Outputs:
         again with each further start.
         """
         self.start_position[:] = self._robot.state.position
-        self._joints.follow(self.start_position)
+        self.joints.follow(self.start_position)
 
 
 def _refuse(pipe: JointCommandPipe) -> None:

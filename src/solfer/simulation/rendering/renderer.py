@@ -19,7 +19,7 @@ from solfer.simulation.world.world import FLAT_WORLD, Pose, World
 RENDERER_FIELD_OF_VIEW = 40.0  # [deg], vertical
 RENDERER_MARGIN = 1.6  # what is seen, over the extent of the robot
 RENDERER_SAMPLES = 2  # rays along each side of a pixel
-NEAREST, FARTHEST = 0.05, 50.0  # what is drawn, from the camera [m]
+NEAR_PLANE, FAR_PLANE = 0.05, 50.0  # what is drawn, from the camera [m]
 HAZE = (1.2, 2.0)
 """Distances at which the floor begins to fade, and has faded into the sky, over that of the robot."""
 
@@ -81,7 +81,7 @@ class Renderer:
         self._move_floor(centre)
         distance = RENDERER_MARGIN * size / 2.0 / math.tan(math.radians(RENDERER_FIELD_OF_VIEW / 2.0))
         view = bullet.computeViewMatrixFromYawPitchRoll(centre, distance, yaw, pitch, 0.0, 2)
-        lens = bullet.computeProjectionMatrixFOV(RENDERER_FIELD_OF_VIEW, width / height, NEAREST, FARTHEST)
+        lens = bullet.computeProjectionMatrixFOV(RENDERER_FIELD_OF_VIEW, width / height, NEAR_PLANE, FAR_PLANE)
         picture = bullet.getCameraImage(
             width,
             height,
@@ -99,7 +99,7 @@ class Renderer:
         )
         colours = np.array(picture[2], dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
         depth = np.reshape(picture[3], (height, width))
-        away = NEAREST * FARTHEST / (FARTHEST - (FARTHEST - NEAREST) * depth) / distance
+        away = NEAR_PLANE * FAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth) / distance
         haze = np.clip((away - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
         haze[np.reshape(picture[4], (height, width)) < 0] = 1.0
         share = np.linspace(1.0, 0.0, height)[:, None, None]

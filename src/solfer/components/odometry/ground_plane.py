@@ -1,0 +1,112 @@
+"""The ground below the wheels: its height, its slope, and the wheels that are lifted from it."""
+
+import math
+
+import numpy as np
+
+from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.height_map import HeightMap
+from solfer.components.odometry.kalman import WheelInertialFilter
+from solfer.components.odometry.wheel_motion import WheelMotion
+from solfer.points.contact.support_vertex import UP
+
+GROUND_HEIGHT_STD = 0.005
+"""Standard deviation of the height of level ground [m]."""
+
+TILT_INTERVAL = 10
+"""Measurements from one of the tilt by the ground to the next: grounds and IMUs err for longer."""
+
+
+class GroundPlane:
+    """The ground by the contacts of the wheels.
+
+    Args:
+        motion: The wheels.
+        kalman: The filter, which it corrects.
+        level: Slope up to which ground counts as level.
+
+    Attributes:
+        map: Heights of the ground.
+        slope: Slope of the plane through the contacts, shape (2,); live.
+        rise: Rise of each wheel above the others, shape (k,) [m]; live.
+        lifted: Which wheels are lifted, shape (k,); live.
+    """
+
+    def __init__(self, motion: WheelMotion, kalman: WheelInertialFilter, level: float):
+        count = len(motion.weights)
+        self._motion = motion
+        self._kalman = kalman
+        self._level = level
+        self.map = HeightMap(np.array(motion.wheels.radii))
+        self.slope = np.zeros(2)
+        self.rise = np.zeros(count)
+        self.lifted = np.zeros(count, dtype=bool)
+        self._floor = math.nan
+        self._floor_variance = 0.0
+        self._looks = 0
+        self._since_look = 0.0
+
+    def start(self) -> None:
+        """Begin on level ground, which all wheels touch."""
+        self.rise[:] = 0.0
+        self.lifted[:] = False
+        self._looks = 0
+        self._since_look = 0.0
+
+    def start_map(self) -> None:
+        """Begin with a floor where the wheels are on level ground, and measure the tilt by it."""
+        self.map.start(0.0 if self._motion.wheels.is_level else math.nan)
+        self._floor = self.map.floor
+        self._floor_variance = 0.0
+        self._measure_tilt()
+
+    def settle(self, time: float, period: float) -> None:
+        """Measure the height on a floor as well as the floor's height was known first.
+
+        Args:
+            time: Time in which that comes into effect [s].
+            period: Time since the last measurement [s].
+        """
+        variance = float(self._kalman.covariance[2, 2])
+        if not self.map.level:
+            return
+        if self.map.floor != self._floor:
+            self._floor = self.map.floor
+            self._floor_variance = variance
+        if variance > self._floor_variance + GROUND_HEIGHT_STD * GROUND_HEIGHT_STD:
+            self._kalman.settle_height(GROUND_HEIGHT_STD * math.sqrt(time / period))
+
+    def update(self, fresh: bool, period: float) -> None:
+        """Find the normal of the ground; level ground measures the error of the tilt.
+
+        Args:
+            fresh: Whether the IMU has measured the tilt.
+            period: Time since the last measurement [s].
+        """
+        wheels = self._motion.wheels
+        found = bool(self._level) and filter_kernel.plane(self._motion.weights, wheels.arms, self.slope)
+        if found:
+            a, b = self.slope.tolist()
+            if math.hypot(a, b) > self._level * (1.0 if wheels.is_level else 0.7):
+                wheels.set_normal(-a, -b, 1.0)
+            elif not wheels.is_level:
+                wheels.set_normal(*UP)
+        if not fresh:
+            return
+        self._looks += 1
+        self._since_look += period
+        if self._looks >= TILT_INTERVAL:
+            self._kalman.settle_tilt(self._since_look)
+            self._looks = 0
+            self._since_look = 0.0
+            if found:
+                self._measure_tilt()
+
+    def _measure_tilt(self) -> None:
+        """Measure the tilt by the plane through the contacts, if that can be level."""
+        motion = self._motion
+        if not (self.map.level and filter_kernel.plane(motion.weights, motion.wheels.arms, self.slope)):
+            return
+        x, y = self._kalman.tilt.tolist()
+        a, b = self.slope.tolist()
+        self._kalman.level(x + b, y - a)

@@ -1,0 +1,73 @@
+"""How wheels and base move between two measurements of the joints."""
+
+import numpy as np
+
+from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.wheels import Wheels
+
+
+class WheelMotion:
+    """What the steps of the joints measure of the base; vectors are in the heading frame.
+
+    Args:
+        wheels: The wheels k.
+
+    Attributes:
+        wheels: See above.
+        step: Step of each joint, shape (n,) [rad].
+        displacements: Displacement of the base by each wheel, without a turn about the vertical, shape (k, 3) [m].
+        speeds: These by time, shape (k, 3) [m/s].
+        arms: From the base's origin to the contacts, mean of both measurements, shape (k, 3) [m].
+        arm: Mean of these, shape (3,) [m].
+        tilting: Displacement of the mean of the contacts by the base's tilting, shape (3,) [m].
+        weights: Weight of each wheel if it touches, shape (k,).
+        trusted: The same if it also rolls, shape (k,).
+        spreads: Spread of each wheel's innovations, shape (k,).
+        variances: Variance of each wheel's speed, shape (k,) [m^2/s^2].
+    """
+
+    def __init__(self, wheels: Wheels):
+        count = len(wheels)
+        self.wheels = wheels
+        self.weights, self.trusted, self.spreads, self.variances = np.zeros((4, count))
+        self.displacements, self.speeds, self.arms, self._arms_before = np.zeros((4, count, 3))
+        self._jacobian_before = np.zeros_like(wheels.jacobian)
+        self.step, self._joints_before = np.zeros((2, wheels.joints))
+        self.arm, self.tilting = np.zeros((2, 3))
+
+    def find_step(self) -> None:
+        """Compute the steps of the joints since the last `remember`."""
+        np.subtract(self.wheels.position, self._joints_before, out=self.step)
+
+    def weigh(self, lifted: np.ndarray, touch: float | None) -> None:
+        """Weigh the wheels: those that are lifted do not count, unless fewer than two would be left.
+
+        Args:
+            lifted: Which wheels are lifted by how they move, shape (k,).
+            touch: Force from which a wheel touches [N]; then its force is its weight. None: `lifted` counts.
+        """
+        if touch is None:
+            np.logical_not(lifted, out=self.weights)
+        else:
+            np.copyto(self.weights, self.wheels.forces)
+            self.weights *= self.weights > touch
+        if np.count_nonzero(self.weights) < 2:
+            self.weights[:] = 1.0
+
+    def measure(self, turned: np.ndarray) -> None:
+        """Compute the displacements by a turn of the base, shape (3,) [rad]."""
+        wheels = self.wheels
+        filter_kernel.measure_displacements(
+            wheels.jacobian, self._jacobian_before, wheels.arms, self._arms_before, self.step, turned,
+            self.weights, self.displacements, self.arms, self.arm, self.tilting,
+        )  # fmt: skip
+
+    def mean_height(self) -> float:
+        """Return the height of the contacts above the base's origin, mean of the wheels that touch [m]."""
+        return float(self.weights @ self.wheels.arms[:, 2]) / float(self.weights.sum())
+
+    def remember(self) -> None:
+        """Let the next step begin here."""
+        self._joints_before[:] = self.wheels.position
+        self._jacobian_before[:] = self.wheels.jacobian
+        self._arms_before[:] = self.wheels.arms
