@@ -19,7 +19,7 @@ from solfer.transport.fixed_rate import FixedRateLoop
 
 REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
 sys.path.append(str(REPOSITORY / "test"))
-from support.paper.one_schedule import FIELDS, PLUGINS_RATE, RATE, InMemory, Outside, check_equal  # noqa: E402
+from support.paper.one_schedule import COURSE_RATE, FIELDS, PLUGINS_RATE, InMemory, Outside, check_equal  # noqa: E402
 
 DURATION = float(os.environ.get("SOLFER_FIGURE_5_SECONDS", "4"))
 """Simulated time that is compared [s]."""
@@ -55,7 +55,7 @@ class Figure5LockstepTest(unittest.TestCase):
         """The transport must not change the control: every command of the course is compared, step by step."""
         with closing(RosMiddleware(RosNode("driver", sys.argv))) as middleware:
             sent, outside = Sent(), Outside(middleware)
-            FixedRateLoop(middleware, RATE).run(
+            FixedRateLoop(middleware, COURSE_RATE).run(
                 outside.cycle, lambda: middleware.running() and middleware.now() < DURATION
             )
             cycles = round(DURATION * PLUGINS_RATE)

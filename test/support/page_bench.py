@@ -34,7 +34,7 @@ class PageBench:
         self.moved = self.node.queue("hands/left/reference", "geometry_msgs/PoseStamped")
         self.driven = self.node.queue("hands/cmd_vel", "geometry_msgs/Twist")
         self.gain = "2"
-        self.takes = ""
+        self.takes = self.refusal = ""
         self.offer("hands/get_parameters", GetParameters, ParametersReply, lambda _: self.parameters)
         self.offer("hands/set_parameters", SetParameters, Accepted, self.note)
         self.offer("lower_level/emergency_stop", NoFields, Answer, self.note)
@@ -58,6 +58,8 @@ class PageBench:
 
     def note(self, request):
         self.asked.append(request)
+        if isinstance(request, SetParameters) and self.refusal:
+            return Accepted(False, self.refusal)
         if isinstance(request, SetParameters):
             self.gain = self.takes or request.values[0]
         return Answer() if isinstance(request, NoFields) else Accepted()

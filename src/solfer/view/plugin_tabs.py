@@ -151,8 +151,8 @@ class _PluginTab:
     def _set(self, client: int | None, name: str, text: str) -> None:
         if self._control is not None and self._control.may_command(client):
             request = SetParameters((name,), (text,))
-            self._requests.call(f"{self._name}/{SET_PARAMETERS}", SETTING, request, Accepted)
-            self._parameters.forget(self._name)
+            service = f"{self._name}/{SET_PARAMETERS}"
+            self._requests.call(service, SETTING, request, Accepted, lambda _: self._parameters.forget(self._name))
 
 
 def _number(text: str) -> float:

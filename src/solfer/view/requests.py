@@ -41,7 +41,7 @@ class PageRequests:
     def call(
         self, service: str, interface: str, request: Any, reply: type, done: Callable[[Any], None] = lambda _: None
     ) -> None:
-        """Call a service; what it refuses is shown. `done` gets the reply, in the loop; from the loop alone."""
+        """Call a service, from the loop alone; a refusal is shown. `done` gets the reply, or None, in the loop."""
         answer = self.middleware.request(self.middleware.resolve(service), interface, request, reply, SERVICE_PATIENCE)
         self._answers.append((answer, service, done))
 
@@ -74,5 +74,5 @@ class PageRequests:
                 raise MiddlewareError(reply.message)
         except SolferError as error:
             self.show(f"{service}: {described(error, lines=True)}")
-            return
+            reply = None
         done(reply)

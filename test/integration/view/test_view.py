@@ -32,7 +32,7 @@ def test_a_study_drives_and_is_tuned_on_the_page(repository):
         page.click("take control")
         page.until(lambda: re.search(r"page \d+ commands", page.content), "control")
         with opened_page(address) as other:
-            label = "stack.tasks.BASE.gain [1/s]"
+            label = "steerings.reactif.tracking [1/s]"
             page.until(lambda: label in page.labels, "parameters")
             other.until(lambda: label in other.labels, "parameters")
             gain = 0.5 * other.gui[other.find(label)]["value"]

@@ -9,7 +9,7 @@ import pytest
 from support.plugins.fleet import Fleet, loaded, still
 from support.recording.sine import tree
 
-from solfer.cli.completion import candidates
+from solfer.cli.completion import finder
 from solfer.cli.main import main, parser
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
@@ -165,9 +165,14 @@ def test_a_file_that_cannot_take_a_value_stays(component, tmp_path, capsys, text
 
 
 def test_words_are_completed(component):
-    assert candidates(parser(), f"params set --namespace {LAYER} ".split(" ")) == ["first"]
-    assert candidates(parser(), f"params get --namespace {LAYER} first ga".split(" ")) == ["gain"]
-    assert "list" in candidates(parser(), ["params", ""])
+    for line, offered in (
+        (f"params set --namespace {LAYER} ", "first"),
+        (f"params get --namespace {LAYER} first ga", "gain"),
+        ("params ", "list"),
+    ):
+        *before, word = line.split(" ")
+        found = finder(parser())._get_completions(["solfer", *before], word, "", None)
+        assert offered in [each.rstrip() for each in found]
 
 
 def test_a_plugin_that_is_gone_is_no_plugin(component, capsys, tmp_path):

@@ -103,6 +103,16 @@ def test_parameters_change_from_the_page_that_commands(bench):
     assert bench.asked == [SetParameters(("gain",), ("4.0",))]
 
 
+def test_a_slider_goes_back_where_its_number_is_refused(bench):
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    command(bench)
+    bench.refusal = "too fast"
+    client = bench.clients[0]
+    client.change("gain [1/s]", 4.0)
+    bench.until(lambda: client.gui[client.find("gain [1/s]")].get("value") == 2.0 and client.notes)
+    assert "too fast" in client.notes[-1]
+
+
 def test_a_slider_shows_what_counts(bench):
     """The plugin takes over another number than the one that was requested: all pages show that."""
     bench.until(lambda: has(bench, "gain [1/s]"))
