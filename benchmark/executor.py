@@ -16,8 +16,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Collection
-from contextlib import ExitStack, closing, suppress
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 import yaml
@@ -102,6 +102,24 @@ def wait_for_robot(name: str) -> None:
                 return
             time.sleep(0.1)
     raise SystemExit("the simulator does not describe its robot")
+
+
+@contextmanager
+def simulated_layer(layer: Path, environment: Mapping[str, str]) -> Iterator[tuple[Namespace, list[subprocess.Popen]]]:
+    """Run a real-time layer beside CENTAURO in PyBullet; yields its namespace, and its processes, which end with it."""
+    namespace = Namespace(f"benchmark-{os.getpid()}")
+    processes: list[subprocess.Popen] = []
+    robot, world = CONFIG / "robots" / "centauro" / "robot.yaml", CONFIG / "worlds" / "flat.yaml"
+    try:
+        for node, *arguments in (("xbot_simulator", "--robot", robot, "--world", world), ("xbot", layer)):
+            command = [sys.executable, REPOSITORY / "nodes" / node, *arguments, "--namespace", namespace.name]
+            processes.append(subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL))
+            wait_for_robot(namespace.name)
+        wait_for_all(namespace, processes)
+        yield namespace, processes
+    finally:
+        end(processes)
+        shutil.rmtree(namespace.folder, ignore_errors=True)
 
 
 def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> RuntimeStatistics:

@@ -7,7 +7,6 @@ until the reply is there, too. Exit code 1: half of the changes take longer than
 """
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,11 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from executor import BEGIN, CONFIG, REPOSITORY, end, wait_for_all, wait_for_robot
+from executor import BEGIN, CONFIG, REPOSITORY, end, simulated_layer
 from form import Figures, parser_of
 
 from solfer.interfaces.declaration import Accepted
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.supervision import supervise
 from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters
@@ -77,16 +75,7 @@ def measure_layer(changes: int, figures: Figures) -> bool:
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         _, layer, environment = prepare(folder)
-        namespace = Namespace(f"benchmark-{os.getpid()}")
-        stack.callback(shutil.rmtree, namespace.folder, ignore_errors=True)
-        processes: list[subprocess.Popen] = []
-        stack.callback(end, processes)
-        robot, world = CONFIG / "robots" / "centauro" / "robot.yaml", CONFIG / "worlds" / "flat.yaml"
-        for node, *arguments in (("xbot_simulator", "--robot", robot, "--world", world), ("xbot", layer)):
-            command = [sys.executable, REPOSITORY / "nodes" / node, *arguments, "--namespace", namespace.name]
-            processes.append(subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL))
-            wait_for_robot(namespace.name)
-        wait_for_all(namespace, processes)
+        namespace, _ = stack.enter_context(simulated_layer(layer, environment))
         client = stack.enter_context(closing(XbotMiddleware(namespace, "client")))
 
         def ask(request: SetParameters) -> bool:

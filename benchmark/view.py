@@ -1,22 +1,21 @@
 #!/usr/bin/env python3
 """Measures what a page in the browser costs: its process, and the periods that a real-time layer leaves out beside it.
 
-Run with `./run exec python benchmark/view.py [--seconds S] [--json]`. `joint_states` runs at 500 Hz beside CENTAURO in
-PyBullet, first without a page, then with one that a client receives and does not draw. Exit code 1: the page takes more
-than 15 % of a core, or more than 5 further periods are left out in 30 s.
+Run with `./run exec python benchmark/view.py [--seconds S] [--json]`. The plugins of Fig. 5 run at 500 Hz beside
+CENTAURO in PyBullet, first without a page, then with one that a client receives and does not draw. Exit code 1: the
+page takes more than 15 % of a core, or more than 5 further periods are left out in 30 s.
 """
 
 import os
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from executor import CONFIG, REPOSITORY, end, wait_for_all, wait_for_robot
+from executor import CONFIG, REPOSITORY, simulated_layer
 from form import Figures, parser_of
 
 from solfer.middleware.shared_memory.memory.namespace import Namespace
@@ -26,7 +25,6 @@ from solfer.supervision import supervise
 sys.path.insert(0, str(REPOSITORY / "test"))
 from support.page import opened_page  # noqa: E402
 
-RATE = 500
 SHARE, LEFT_OUT = 0.15, 5
 """Largest share of a core, and largest number of further periods that are left out in 30 s."""
 
@@ -69,23 +67,10 @@ def main() -> int:
     options = parser.parse_args()
     figures = Figures(options.json)
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        layer = folder / "layer.yaml"
-        layer.write_text(
-            f"XBotRTPlugins: {{plugins: [joint_states]}}\nmwoibn: {{config_file: {CONFIG / 'centauro.yaml'}}}\n"
-            f"executor: {{rate: {RATE}, start: [joint_states], blend: 0.2}}\n"
-        )
-        namespace = Namespace(f"benchmark-{os.getpid()}")
-        stack.callback(shutil.rmtree, namespace.folder, ignore_errors=True)
-        processes: list[subprocess.Popen] = []
-        stack.callback(end, processes)
-        robot, world = CONFIG / "robots" / "centauro" / "robot.yaml", CONFIG / "worlds" / "flat.yaml"
-        for node, *arguments in (("xbot_simulator", "--robot", robot, "--world", world), ("xbot", layer)):
-            command = [sys.executable, REPOSITORY / "nodes" / node, *arguments, "--namespace", namespace.name]
-            environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-            processes.append(subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL))
-            wait_for_robot(namespace.name)
-        wait_for_all(namespace, processes)
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+        layer = CONFIG / "figures" / "figure_5.yaml"
+        namespace, processes = stack.enter_context(simulated_layer(layer, environment))
+        time.sleep(SETTLES)
         before = skipped(namespace)
         time.sleep(options.seconds)
         without = skipped(namespace) - before

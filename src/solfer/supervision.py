@@ -103,7 +103,7 @@ def _keep(program: int, requests: int, grace: float | None) -> NoReturn:
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
     kept = os.dup2(requests, 3)
-    os.closerange(4, os.sysconf("SC_OPEN_MAX"))  # whoever reads the caller's output sees its end
+    os.closerange(4, os.sysconf("SC_OPEN_MAX"))  # readers of the caller's output see its end
     status = None
     others_end = end = float("inf")
     while status is None and time.monotonic() < end:

@@ -43,7 +43,7 @@ class ComplianceCompensation(Component):
         self._deflection = np.zeros(robot.size)
 
     def init(self) -> None:
-        """Start with the joints that nobody else moves where they are."""
+        """Start with the joints that no other plugin moves where they are."""
         self._desired_positions.start()
 
     def update(self) -> None:

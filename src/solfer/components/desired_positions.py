@@ -9,7 +9,7 @@ class DesiredPositions:
     """Positions in the desired State as the pipes of a configuration write them there, in whole or in parts.
 
     A component that commands others than those that it received, and found its own numbers there in a cycle without a
-    message, would add its change again in each cycle. Here each DoF keeps what was received last. DoFs of which nobody
+    message, would add its change again in each cycle. Here each DoF keeps what was received last. DoFs that no message
     wants anything stay where they are at a start.
 
     Args:

@@ -43,7 +43,7 @@ class GravityCompensation(Component):
     """Carries a robot on its contacts by joint torques, and merges what others want of its parts.
 
     The torques are `CarryingTorques` of the Robot's state, measured or, offline, desired. Positions and velocities of
-    the desired State are those that the pipes of the configuration write there; joints of which nobody wants anything
+    the desired State are those that the pipes of the configuration write there; joints without any desired value
     stay where they are at the start. Contacts are lifted and put down again by a service; torques then change within
     the time `fade`.
     """
@@ -87,7 +87,7 @@ class GravityCompensation(Component):
         return {name: contacts[name] for name in contacts.names if contacts[name] in tracked}
 
     def init(self) -> None:
-        """Start with the joints that nobody else moves where they are."""
+        """Start with the joints that no other plugin moves where they are."""
         self._desired_positions.start()
         self._left = 0.0
 

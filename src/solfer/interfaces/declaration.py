@@ -80,7 +80,7 @@ class TopicIn:
         name: Its name, see above.
         interface: `package/Type` of its messages, with a header or without one.
         message: Dataclass of a message.
-        handler: Gets every message, in the order of arrival. A `SolferError` that it raises is logged: nobody waits.
+        handler: Gets every message, in the order of arrival. A `SolferError` that it raises is logged: no sender waits.
         stream: Topics of a component with the same stream have one sender at a time: the first, until it has been
             silent for 0.5 s. Messages of others are ignored, and both are named. Empty: every sender counts.
     """

@@ -1,4 +1,4 @@
-"""Looks at the calls of a method from outside, so that it costs nothing while nobody looks."""
+"""Looks at the calls of a method from outside, so that it costs nothing without an observer."""
 
 from collections.abc import Callable
 from typing import Any

@@ -56,7 +56,7 @@ class Source:
         return share
 
     def restart(self) -> None:
-        """Begin again if nobody goes on with what was received before."""
+        """Begin again if no other reader goes on with what was received before."""
         recent = self.turns.number - 1
         if not any(share.received and share.turn >= recent for share in self._shares):
             self.pipe.restart()
@@ -269,7 +269,7 @@ class WrittenReader(Reader):
         return NEW
 
     def update(self) -> tuple[Publisher, ...]:
-        """See `Reader.update`; nobody publishes to it."""
+        """See `Reader.update`; no publisher writes to it."""
         return ()
 
     def read_from(self, publisher: Publisher) -> MessageStatus:

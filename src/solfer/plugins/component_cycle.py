@@ -16,7 +16,7 @@ class ComponentCycle:
         component: The component.
         robot_time: Its time.
         jumps: Finds jumps of the base; None: it has no references in the world.
-        guard: Keeps what it does to its Robot, if it fails, away from others; None: nobody shares it.
+        guard: Keeps what it does to its Robot, if it fails, away from others; None: it is not shared.
         publish: Publish what it declares.
 
     Attributes:

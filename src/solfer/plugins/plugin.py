@@ -59,7 +59,7 @@ class PluginParts:
         stall: Lateness of its own loop at which it begins again [s]; see `StartConditions`.
         limits: When its loop is overloaded; None: the defaults.
         jumps: Finds jumps of the base; None: its component has no references in the world.
-        guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
+        guard: Keeps what the component does to its Robot, if it fails, away from others; None: it is not shared.
         publish: Publish what the component declares, after each of its cycles.
         documents: Returns what a recording of it shall have besides numbers.
         requests: Notes what happens, and what others ask of the component; None: it declares nothing.
@@ -105,7 +105,7 @@ class Plugin:
             nothing, RUNNING, STOPPED or CLOSED. That of a plugin that is started and stopped is
             `life.managed_plugin.ManagedPlugin.state`.
         peers: See above; the loop calls its `look` about once a second, outside of `cycle`.
-        tuning: Changes its live parameters; whoever runs its cycles calls `log` now and then, outside of them.
+        tuning: Changes its live parameters; its loop calls `log` now and then, outside of the cycles.
         timing: Times of the stages of the newest cycle.
         overload: Whether its loop is overloaded.
     """

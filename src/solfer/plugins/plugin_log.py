@@ -97,7 +97,7 @@ class PluginLog:
         self.sources: tuple[LogSource, ...] = tuple(log.sources)
 
     def take(self, now: float) -> None:
-        """Bring the numbers up to date that nobody keeps in an array, at the time `now` [s] of the plugin's clock."""
+        """Bring the numbers up to date that no array keeps, at the time `now` [s] of the plugin's clock."""
         self._words[:] = self._plugin.timing.times
         life = self._life
         ages = self._ages

@@ -15,7 +15,7 @@ class RequestNotes:
     """Notes requests, messages of declared topics and goals when they are carried out, in the order of the cycle.
 
     Attributes:
-        enabled: Whether somebody takes the notes.
+        enabled: Whether notes are recorded.
         notes: What happened since they were taken last: kind and text of an event. That of a request has name and
             fields, as JSON.
     """

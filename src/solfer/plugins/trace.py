@@ -1,4 +1,4 @@
-"""A trace of what plugins read, compute and publish in each cycle, in order; it costs nothing while nobody traces."""
+"""A trace of what plugins read, compute and publish in each cycle, in order; it costs nothing while it is off."""
 
 import logging
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A recording, as whoever writes it and whoever reads it see it."""
+"""A recording, as its writers and its readers see it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -104,7 +104,7 @@ class _Reader:
         channels, gaps = self._channels()
         finished = self._texts.get(END)
         if finished is None:
-            self._missing.append("the end: whoever wrote it was killed, or had no room; later rows are not there")
+            self._missing.append("the end: its writer was killed, or had no room; later rows are not there")
         return Recording(
             channels,
             sorted(self._events, key=lambda event: event.time),

@@ -42,7 +42,7 @@ class Replay:
         unrepeated: Requests that could not be repeated, with the reason; the recording does not have them whole, or
             the component does not offer them.
         commands: What it sent, by the name of the channel behind `<plugin>/`.
-        work: Runs a cycle of the plugin; whoever measures it takes its place.
+        work: Runs a cycle of the plugin; a measurement takes its place.
     """
 
     plugin: Plugin

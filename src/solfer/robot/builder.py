@@ -60,7 +60,7 @@ def build(
         outside: The middleware, for parameters, orders of topics and joints of controllers.
         beside: The Robot of another component, described alike, of which this one becomes a companion.
         faults: Receives the errors instead of an exception, as long as there is a Robot at all, with which to look for
-            others. After the first one nobody outside is asked: the Robot's own order replaces all others.
+            others. After the first one no order is requested outside: the Robot's own order replaces all others.
 
     Raises:
         SolferError: Something that the configuration names is missing, or does not fit the robot.

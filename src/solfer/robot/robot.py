@@ -300,7 +300,7 @@ class Robot:
 
         Returns:
             How often, for `kinematics`, each of the points that every Robot has, and each element of the dynamics;
-            elements of dynamics that nobody has requested are left out.
+            elements of dynamics that were not requested are left out.
         """
         measured = self._measured
         counts = {"kinematics": measured.updates, **measured.points.computed}

@@ -105,7 +105,7 @@ def test_a_killed_layer_leaves_its_last_seconds(layer, tmp_path, capsys):
         follower.kill()
         follower.wait()
         killed = read(tmp_path / "killed.mcap")
-        assert (np.diff(cycles(killed)) == 1).all() and "whoever wrote it was killed" in killed.missing[-1]
+        assert (np.diff(cycles(killed)) == 1).all() and "its writer was killed" in killed.missing[-1]
         follower = recorder(robot, tmp_path / "whole.mcap", "--seconds", "1000")
         following(follower, tmp_path / "whole.mcap", 100)
         robot.drive(SPEED)

@@ -98,7 +98,7 @@ class WheelInertialFilter:
 
         w = (1 - e) (v + (u s / T - (b_z + n) s / T + c) z x r)
 
-    The plane through the contacts measures t + g. Position and heading of the state are corrections, which whoever
+    The plane through the contacts measures t + g. Position and heading of the state are corrections, which the one that
     integrates the pose takes over and sets to zero. Wheels do not correct the position, and nothing corrects the radii,
     whose common error is not observable: they are considered (Schmidt-Kalman). Source: M. Bloesch et al., "State
     estimation for legged robots", RSS 2012, with wheels that roll in place of feet that stand.

@@ -161,7 +161,7 @@ class Claims:
         return tuple(self._ids)
 
     def unclaimed(self, controller: str, mode: str, indices: np.ndarray) -> np.ndarray:
-        """Select those of a controller's joints at `indices` of which nobody has claimed the field `mode`."""
+        """Select those of a controller's joints at `indices` whose field `mode` is not claimed."""
         return indices[self._owners[controller][MODES[mode], indices] == UNCLAIMED]
 
     def describe(self, controller: str) -> str:

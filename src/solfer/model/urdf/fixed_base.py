@@ -1,4 +1,4 @@
-"""Robots whose base nobody has decided about: it stays where it is, which only those with a fixed base want."""
+"""Robots without a decision about their base: it stays where it is, right only for a fixed base."""
 
 import logging
 

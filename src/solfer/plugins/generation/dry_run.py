@@ -172,13 +172,13 @@ class DryMiddleware(Middleware):
         return dict.fromkeys(self.controller_joints(controller, timeout, where), (0.0, 0.0))
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
-        """See `Middleware.call`; nobody answers."""
+        """See `Middleware.call`; there is no reply."""
         raise MiddlewareError(
             f"the service '{name}' is asked for while the plugin is made", expected="a call in `init`"
         )
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
-        """See `Middleware.request`; nobody answers."""
+        """See `Middleware.request`; there is no reply."""
         return Future()
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:

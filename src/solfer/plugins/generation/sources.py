@@ -1,4 +1,4 @@
-"""Finds feedbacks of a topic that nobody publishes, and that is close to one that somebody does."""
+"""Finds feedbacks of a topic without a publisher whose name is close to that of one with a publisher."""
 
 import re
 from collections.abc import Iterable, Iterator

@@ -76,7 +76,7 @@ class ManagedPlugin:
             self._try(self.plugin.restart, PluginState.STARTING)
 
     def stop(self, reason: str = "") -> None:
-        """Bring the robot to rest, and release the joints; `reason`: why, where nobody has requested it."""
+        """Bring the robot to rest, and release the joints; `reason`: why, without a request."""
         self._before = ()
         self._try(self.plugin.stop, PluginState.STOPPING, reason)
 

@@ -66,7 +66,7 @@ class Outputs:
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
         self.joints = SentJoints(joints, self._moves, period)
-        # joints that go to other plugins have no gate, but nobody shall follow what is not a number
+        # joints that go to other plugins have no gate, but none of them shall follow what is not a number
         self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
         self.following = following
         self.start_position = np.array(robot.state.position)

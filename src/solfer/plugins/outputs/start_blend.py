@@ -174,7 +174,7 @@ class _Positions(_Limited):
 
 
 class _Efforts(_Limited):
-    """Efforts, which take over what springs carry; where nobody commands any, or they are not measured, zero."""
+    """Efforts, which take over what springs carry; zero where none is commanded, or they are not measured."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
         super().__init__(name, values, pipe, robot=robot, known=known)

@@ -31,7 +31,7 @@ class RecordDrain:
         span: Times of the first and the last of them [s].
 
     Raises:
-        MiddlewareError: Nobody records there.
+        MiddlewareError: There is no recorder.
     """
 
     def __init__(self, folder: Path):

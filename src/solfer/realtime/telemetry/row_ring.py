@@ -52,7 +52,7 @@ append = cached("void(int64, int64)", _append)
 
 
 class RowRing:
-    """The writing end of a `Ring` that overwrites; whoever reads it uses `Ring`.
+    """The writing end of a `Ring` that overwrites; its readers use `Ring`.
 
     To gather a row here and not in `Ring.values`, without a word of Python in between, takes a third of the time where
     the processor has to fetch code and numbers again, as in a loop that sleeps between its cycles.
