@@ -192,7 +192,7 @@ def test_a_killed_recorder_leaves_all_whole_chunks(tmp_path):
     position = found["arm/position"].values
     assert len(position) > 500 and found.lost == 0
     np.testing.assert_array_equal(position[:, 0], np.arange(1, len(position) + 1))
-    assert "whoever wrote it was killed" in found.missing[-1] and found.attachments
+    assert "its writer was killed" in found.missing[-1] and found.attachments
 
 
 def drain_on_a_full_disk(folder, published):
