@@ -10,7 +10,7 @@ from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.component_cycle import ComponentCycle
-from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
+from solfer.plugins.cycle_timing import CycleTiming, Stage
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
@@ -168,29 +168,21 @@ class Plugin:
             OutOfLimits: The component would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
-        timing = self.timing
         now = self._now()
-        # the clock is read here, not by a method of it: a cycle does so seven times
-        times = timing.times
-        clock = timing.nanoseconds
-        times[:] = NO_TIMES
-        begin = clock()
+        mark = self.timing.mark
+        self.timing.start()
         gap = self._readiness.stall(now)
         if gap and (self.life is STARTING or self.life is RUNNING):
             self.overload.advance(gap)
             self._awake(now)
         self.inbox.apply()
-        end = clock()
-        times[CALLS] = end - begin
-        begin = end
+        mark(CALLS)
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
         self._readiness.feedbacks.read(now, self.outputs.joints.distance)
         verdict = self._readiness.judge(now, life is RUNNING)
-        end = clock()
-        times[READ] = end - begin
-        begin = end
+        mark(READ)
         if verdict is not WORK:
             self._obey(verdict, now)
             return
@@ -207,24 +199,18 @@ class Plugin:
             work.jump()
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
-        end = clock()
-        times[ROBOT] = end - begin
-        begin = end
+        mark(ROBOT)
         work.work()
-        end = clock()
-        times[COMPONENT] = end - begin
-        begin = end
+        mark(COMPONENT)
         if component.modify:
             # its pipes publish joints that follow others; who reads the State next computes what it needs
             self.robot.follow()
         self.outputs.collect()
-        end = clock()
-        times[GATE] = end - begin
-        begin = end
+        mark(GATE)
         self.outputs.send(self._now())
         for publish in work.publish:
             publish()
-        times[WRITE] = clock() - begin
+        mark(WRITE)
         if work.logger is not None:
             work.log(now)
 
