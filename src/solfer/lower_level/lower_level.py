@@ -111,12 +111,24 @@ class LowerLevel:
         target = self.controller(controller)
         if message.names and self._base.issuperset(message.names):
             return
+        owner = message.claimant
         try:
-            self._accept(target, message)
+            if self.emergency or self.safeguard.reason:
+                self.claims.bar(owner, self.emergency.reason or self.safeguard.reason)
+                self._check_suspended(f"command of '{owner}'")
+            if not target.running:
+                raise Suspended(f"controller '{controller}' is stopped", where=f"command of '{owner}'", expected=STARTS)
+            indices, given = target.check(message)
+            names = tuple(message.names)
+            modes = tuple(given)
+            if not self.claims.renew(owner, controller, names, modes):
+                self.claims.claim_by_command(owner, names, ClaimedJoints(controller, indices, modes))
+                self._warn_distance(target, owner, indices, given=given)
         except CommandRefused as error:
             error = self._without_drive(message, error)
-            self.refusals.note(message.claimant, error)
+            self.refusals.note(owner, error)
             raise error from None
+        target.apply(indices, given)
 
     def claim(
         self,
@@ -258,21 +270,6 @@ class LowerLevel:
         self.emergency.advance(dt)
         self.drives.update(q, v, dt, self.emergency.factor)
         return self.drives.torque, self.drives.speed
-
-    def _accept(self, target: LowerLevelController, message: JointMessage) -> None:
-        owner = message.claimant
-        if self.emergency or self.safeguard.reason:
-            self.claims.bar(owner, self.emergency.reason or self.safeguard.reason)
-            self._check_suspended(f"command of '{owner}'")
-        if not target.running:
-            raise Suspended(f"controller '{target.name}' is stopped", where=f"command of '{owner}'", expected=STARTS)
-        indices, given = target.check(message)
-        names = tuple(message.names)
-        modes = tuple(given)
-        if not self.claims.renew(owner, target.name, names, modes):
-            self.claims.claim_by_command(owner, names, ClaimedJoints(target.name, indices, modes))
-            self._warn_distance(target, owner, indices, given=given)
-        target.apply(indices, given)
 
     def _without_drive(self, message: JointMessage, error: CommandRefused) -> CommandRefused:
         """Return a better error about a command for a joint without a drive; of other commands the given one."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.unit.cart import accept
 
 from solfer.lower_level import ImpedanceController, JointLimits
 from solfer.lower_level.laws.catch_up import CatchUp
@@ -28,7 +29,7 @@ class Joint:
 
     def command(self, position):
         """Send a position."""
-        self.controller.accept(JointMessage(("joint",), position=np.array([position])))
+        accept(self.controller, JointMessage(("joint",), position=np.array([position])))
 
     def run(self, steps):
         """Let milliseconds pass."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.unit.cart import accept
 
 from solfer.errors import CommandRefused, NotFinite, SizeMismatch
 from solfer.lower_level import ImpedanceController, JointLimits, VelocityController
@@ -53,7 +54,7 @@ def test_a_start_holds_with_the_default_gains(springs):
 
 
 def test_joints_are_mapped_by_name(springs):
-    springs.accept(JointMessage(("ankle", "hip"), position=np.array([2.0, -0.5]), stiffness=np.array([7.0, 8.0])))
+    accept(springs, JointMessage(("ankle", "hip"), position=np.array([2.0, -0.5]), stiffness=np.array([7.0, 8.0])))
     np.testing.assert_array_equal(springs.position, [-0.5, 0.2, 2.0])
     for _ in range(250):
         springs.advance(0.001)
@@ -88,23 +89,23 @@ def test_a_wrong_command_is_refused_whole(springs, message, published):
     before = numbers(springs)
     message.sender = "/ik"
     with pytest.raises(CommandRefused) as refusal:
-        springs.accept(message)
+        accept(springs, message)
     for text in (*published, "/ik", "legs"):
         assert text in str(refusal.value)
     np.testing.assert_array_equal(numbers(springs), before)
 
 
 def test_a_limit_itself_is_accepted(springs):
-    springs.accept(JointMessage(("hip", "knee"), position=np.array([-1.0, 0.5]), velocity=np.array([2.0, -4.0])))
+    accept(springs, JointMessage(("hip", "knee"), position=np.array([-1.0, 0.5]), velocity=np.array([2.0, -4.0])))
     np.testing.assert_array_equal(springs.position, [-1.0, 0.5, 0.3])
 
 
 def test_the_springs_keep_to_the_joints_speed_limits(springs):
     """Both after a jump of the command and behind a stream that is faster than the joint."""
-    springs.accept(JointMessage(("hip",), position=np.array([1.0])))
+    accept(springs, JointMessage(("hip",), position=np.array([1.0])))
     path = [springs.target.copy()]
     for step in range(1000):
-        springs.accept(JointMessage(("knee",), position=np.array([max(-2.0, 0.2 - 0.006 * step)])))
+        accept(springs, JointMessage(("knee",), position=np.array([max(-2.0, 0.2 - 0.006 * step)])))
         springs.advance(DT)
         path.append(springs.target.copy())
     speed = np.abs(np.diff(path, axis=0)).max(axis=0) / DT
@@ -115,7 +116,7 @@ def test_the_springs_keep_to_the_joints_speed_limits(springs):
 
 
 def test_a_velocity_expires_and_a_position_does_not(springs):
-    springs.accept(JointMessage(("hip",), position=np.array([0.5]), velocity=np.array([1.0]), effort=np.array([3.0])))
+    accept(springs, JointMessage(("hip",), position=np.array([0.5]), velocity=np.array([1.0]), effort=np.array([3.0])))
     for _ in range(499):
         springs.advance(DT)
     assert springs.velocity[0] == 1.0
@@ -125,10 +126,10 @@ def test_a_velocity_expires_and_a_position_does_not(springs):
 
 
 def test_each_wheel_needs_its_own_commands(wheels):
-    wheels.accept(JointMessage(JOINTS, velocity=np.array([1.0, 2.0, 3.0])))
+    accept(wheels, JointMessage(JOINTS, velocity=np.array([1.0, 2.0, 3.0])))
     for _ in range(400):
         wheels.advance(DT)
-    wheels.accept(JointMessage(("ankle",), velocity=np.array([4.0])))
+    accept(wheels, JointMessage(("ankle",), velocity=np.array([4.0])))
     for _ in range(400):
         wheels.advance(DT)
     np.testing.assert_array_equal(wheels.velocity, [0.0, 0.0, 4.0])
@@ -138,7 +139,7 @@ def test_each_wheel_needs_its_own_commands(wheels):
 def test_a_velocity_controller_accepts_velocities_only(wheels, field):
     message = JointMessage(("hip",), velocity=np.array([1.0]), **{field: np.zeros(1)})
     with pytest.raises(CommandRefused, match=f"does not accept '{field}'"):
-        wheels.accept(message)
+        accept(wheels, message)
     assert not wheels.velocity.any()
 
 

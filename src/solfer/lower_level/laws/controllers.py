@@ -15,7 +15,7 @@ from solfer.lower_level.laws.command_check import CommandCheck
 from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
 from solfer.numerics.rotations import whole_turns
-from solfer.transport.messages import JOINT_FIELDS, JointMessage
+from solfer.transport.messages import JOINT_FIELDS
 
 CONTROLLER_TIMEOUT = 0.5  # [s]
 RAMP = 0.5
@@ -42,6 +42,7 @@ class LowerLevelController(abc.ABC):
         dofs: Their DoFs in the model.
         running: False while it is stopped and holds; then `LowerLevel` refuses commands.
         velocity: Commanded velocities, shape (len(joints),) [rad/s, m/s].
+        check: Checks a command, for `apply`; see `CommandCheck.check`.
     """
 
     TYPE: ClassVar[str]
@@ -54,24 +55,8 @@ class LowerLevelController(abc.ABC):
         self.dofs = limits.dofs
         self.running = True
         self.velocity = np.zeros(len(self.joints))
-        self._check = CommandCheck(name, limits, self.FIELDS)
+        self.check = CommandCheck(name, limits, self.FIELDS).check
         self._watchdog = CommandTimeout(len(self.joints), timeout)
-
-    def accept(self, message: JointMessage) -> None:
-        """Check and apply a command.
-
-        Raises:
-            CommandRefused: The command is wrong; nothing of it was applied.
-        """
-        self.apply(*self.check(message))
-
-    def check(self, message: JointMessage) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Check a command; see `CommandCheck.check`.
-
-        Raises:
-            CommandRefused: The command is wrong.
-        """
-        return self._check.check(message)
 
     def restore(self, field: str, joints: np.ndarray) -> None:  # noqa: B027 wheels have none
         """Let a gain of joints, indices, return to its default, and a feed-forward torque to zero."""
@@ -91,13 +76,9 @@ class LowerLevelController(abc.ABC):
 
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
         """Apply a checked command; joints and fields that it does not name stay as they are."""
-        for field, numbers in given.items():
-            self._set(field, indices, numbers)
         if "velocity" in given:
+            self.velocity[indices] = given["velocity"]
             self._watchdog.renew(indices)
-
-    def _set(self, field: str, indices: np.ndarray, numbers: np.ndarray) -> None:
-        getattr(self, field)[indices] = numbers
 
     def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
         """Find the joint that a command moves furthest ("": none), and its distance from the held position [rad, m]."""
@@ -192,19 +173,16 @@ class ImpedanceController(LowerLevelController):
         """See `LowerLevelController.apply`; a commanded gain comes into force by a ramp."""
         super().apply(indices, given)
         if "position" in given:
+            position = given["position"]
+            # joints without ends may be counted on another turn
+            self.position[indices] = position + whole_turns(self.position[indices] - position, self._turns[indices])
             self._catch_up.renew(indices)
         if "effort" in given:
+            self.effort[indices] = given["effort"]
             self._leftover.stop(indices)
-
-    def _set(self, field: str, indices: np.ndarray, numbers: np.ndarray) -> None:
-        ramp = self._ramps.get(field)
-        if field == "position":
-            # joints without ends may be counted on another turn
-            numbers = numbers + whole_turns(self.position[indices] - numbers, self._turns[indices])
-        if ramp is None:
-            super()._set(field, indices, numbers)
-        else:
-            ramp.command(indices, numbers)
+        for field, ramp in self._ramps.items():
+            if field in given:
+                ramp.command(indices, given[field])
 
     def restore(self, field: str, joints: np.ndarray) -> None:
         """Ramp a gain of joints, indices, back to the default within RAMP, or a feed-forward torque to zero."""

@@ -16,7 +16,7 @@ from solfer.transport.endpoints import Queue
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
 from solfer.transport.lower_level import ALL_OWNERS, LOWER_LEVEL, REFUSALS_TOPIC
-from solfer.transport.messages import JOINT_FIELDS, REFUSALS, JointMessage, RefusalMessage
+from solfer.transport.messages import JOINT_FIELDS, REFUSALS, RefusalMessage
 from solfer.transport.middleware import Middleware
 
 REFUSALS_PERIOD = 0.02
@@ -70,7 +70,10 @@ class LowerLevelServer:
             if len(messages) > self.most:
                 self.most = len(messages)
             for message in messages:
-                self._accept(controller, message)
+                try:
+                    self._lower_level.accept(controller, message)
+                except CommandRefused as error:
+                    self._throttle.warning(f"{controller} {message.claimant}", "refused: %s", error)
         self._publish_refusals()
 
     def report(self) -> None:
@@ -99,12 +102,6 @@ class LowerLevelServer:
         for service in services:
             submit = self._inbox.submit_urgently if service.urgent else self._inbox.submit
             self._middleware.serve(owner, (dataclasses.replace(service, largest=largest),), submit)
-
-    def _accept(self, controller: str, message: JointMessage) -> None:
-        try:
-            self._lower_level.accept(controller, message)
-        except CommandRefused as error:
-            self._throttle.warning(f"{controller} {message.claimant}", "refused: %s", error)
 
     def _publish_refusals(self) -> None:
         now = self._middleware.now()
