@@ -12,8 +12,8 @@ DENSE = Path(__file__)
 
 
 @part
-def cholesky(matrix):
-    """Write the lower factor of a matrix into its lower triangle; return whether it is positive definite."""
+def cholesky(matrix, least=0.0):
+    """Write the lower factor of a matrix into its lower triangle; return whether all its pivots are above `least`."""
     for i in range(len(matrix)):
         for j in range(i + 1):
             left = matrix[i, j]
@@ -21,7 +21,7 @@ def cholesky(matrix):
                 left -= matrix[i, k] * matrix[j, k]
             if i > j:
                 matrix[i, j] = left / matrix[j, j]
-            elif left > 0.0:
+            elif left > least:
                 matrix[i, i] = math.sqrt(left)
             else:  # also not a number
                 return False
@@ -42,7 +42,6 @@ def forward(factor, vector):
 def backward(factor, vector):
     """Solve L^T x = b in place."""
     for i in range(len(vector) - 1, -1, -1):
-        left = vector[i]
-        for k in range(i + 1, len(vector)):
-            left -= factor[k, i] * vector[k]
-        vector[i] = left / factor[i, i]
+        vector[i] /= factor[i, i]
+        for k in range(i):  # along a row, which lies together in memory
+            vector[k] -= factor[i, k] * vector[i]

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from solfer.numerics.compilation import REORDERED, cached, part
+from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
 ROW_TOLERANCE = 1e-12
 """Share of a row's length below which its remainder beside other rows counts as zero: rounding errors and no more."""
@@ -119,19 +120,16 @@ def _factorise(numbers, start, end, projected, factor):
 @part
 def _advance(start, end, projected, basis, factor, residual, step, out):
     """Add the step J'^T (L L^T)^-1 (r - J dq)."""
+    rows = end - start
+    matrix = factor[:rows, :rows]
+    solved = residual[:rows]
+    forward(matrix, solved)
+    backward(matrix, solved)
     cols = projected.shape[1]
     step[:] = 0.0
-    for i in range(end - start):
-        entry = residual[i]
-        for j in range(i):
-            entry -= factor[i, j] * residual[j]
-        residual[i] = entry / factor[i, i]
-    for i in range(end - start - 1, -1, -1):
-        residual[i] /= factor[i, i]
-        for j in range(i):
-            residual[j] -= factor[i, j] * residual[i]
+    for i in range(rows - 1, -1, -1):
         for k in range(cols):
-            step[k] += residual[i] * projected[start + i, k]
+            step[k] += solved[i] * projected[start + i, k]
     # rows that contradict each other have large parts in the step, which cancel out; their rounding errors do not
     _remove(step, basis, 0, start)
     for k in range(cols):
@@ -246,20 +244,10 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
             right[j] += share * left
             for k in range(j + 1):
                 square[j, k] += share * row[k]
-    for i in range(count):
-        for j in range(i + 1):
-            entry = square[i, j]
-            for k in range(j):
-                entry -= square[i, k] * square[j, k]
-            square[i, j] = math.sqrt(entry) if i == j else entry / square[j, j]
-        entry = right[i]
-        for j in range(i):
-            entry -= square[i, j] * right[j]
-        right[i] = entry / square[i, i]
-    for i in range(count - 1, -1, -1):
-        right[i] /= square[i, i]
-        for j in range(i):
-            right[j] -= square[i, j] * right[i]
+    matrix = square[:count, :count]
+    cholesky(matrix)
+    forward(matrix, right)
+    backward(matrix, right)
     for k in range(cols):
         entry = out[k]
         for j in range(count):
@@ -396,6 +384,7 @@ descend = cached(
     f"{_VECTOR})",
     _descend,
     REORDERED,
+    sources=[DENSE],
 )
 count_kept = cached(
     f"int64({_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",

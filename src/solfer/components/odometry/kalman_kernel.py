@@ -3,6 +3,7 @@
 import math
 
 from solfer.numerics.compilation import cached, part
+from solfer.numerics.dense import DENSE, cholesky, forward
 
 STATE_POSITION = 0
 STATE_HEADING = 3
@@ -220,19 +221,15 @@ def likelihood(covariance, rows, innovation, variance, spread, mapped):
             for k in range(size):
                 total += mapped[k] * rows[j, k]
             spread[i, j] = total
+    if not cholesky(spread[:3]):
+        return 0.0
+    whitened = spread[3, :3]
+    whitened[:] = innovation
+    forward(spread, whitened)
     distance = 0.0
     root = 1.0
-    for i in range(3):  # Cholesky: |L| and L^-1 times the innovation
-        for j in range(i + 1):
-            entry = spread[i, j]
-            for k in range(j):
-                entry -= spread[i, k] * spread[j, k]
-            spread[i, j] = math.sqrt(entry) if i == j else entry / spread[j, j]
-        entry = innovation[i]
-        for k in range(i):
-            entry -= spread[i, k] * spread[3, k]
-        spread[3, i] = entry / spread[i, i]
-        distance += spread[3, i] * spread[3, i]
+    for i in range(3):
+        distance += whitened[i] * whitened[i]
         root *= spread[i, i]
     return math.exp(-0.5 * min(distance, 700.0)) / (math.sqrt(2.0 * math.pi) ** 3 * root)
 
@@ -386,7 +383,9 @@ _PAIR = "UniTuple(float64, 2)"
 predict = cached(
     f"void({_M}, {_V}, {_M}, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5), {_M}, {_M}, {_M})", _predict
 )
-correct = cached(f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, {_B}, {_V}, {_M}, {_M})", _correct)
+correct = cached(
+    f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, {_B}, {_V}, {_M}, {_M})", _correct, sources=[DENSE]
+)
 integrate = cached(f"void({_M}, {_V}, {_F}, {_V}, {_F}, {_F}, UniTuple(float64, 3), {_M}, {_M}, {_M})", _integrate)
 level = cached(f"boolean({_M}, {_V}, {_F}, {_F}, {_F}, {_M})", _level)
 measure = cached(f"boolean({_M}, {_V}, int64, {_F}, {_F}, {_M})", _measure)

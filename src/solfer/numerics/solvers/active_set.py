@@ -15,6 +15,7 @@ import numpy as np
 
 from solfer.errors import SizeMismatch
 from solfer.numerics.compilation import REORDERED, cached, part
+from solfer.numerics.dense import DENSE, cholesky
 from solfer.numerics.solvers import residuals
 from solfer.numerics.solvers.residuals import (
     add_normal,
@@ -55,17 +56,11 @@ def _factorise(hessian, gradient, shift, factor, turned, x):
     largest = 0.0
     for i in range(size):
         largest = max(largest, hessian[i, i])
-    for i in range(size):
-        for j in range(i + 1):
-            entry = hessian[i, j] + (shift if i == j else 0.0)
-            for k in range(j):
-                entry -= factor[i, k] * factor[j, k]
-            if i > j:
-                factor[i, j] = entry / factor[j, j]
-            elif entry > ACTIVE_SET_FLATNESS * largest:
-                factor[i, i] = math.sqrt(entry)
-            else:
-                return False
+        for j in range(i):
+            factor[i, j] = hessian[i, j]
+        factor[i, i] = hessian[i, i] + shift
+    if not cholesky(factor, ACTIVE_SET_FLATNESS * largest):
+        return False
     # these are the rows of L^-1
     for i in range(size):
         turned[i] = 0.0
@@ -391,7 +386,7 @@ def solve(
 
 
 _compiled = cached(
-    f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED, sources=[Path(residuals.__file__)]
+    f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED, sources=[DENSE, Path(residuals.__file__)]
 )
 
 
