@@ -15,7 +15,7 @@ from solfer.model import State
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
-from solfer.pipes.shared_feedback import SharedFeedbackPipe
+from solfer.pipes.sharing.cached_feedback import CachedFeedbackPipe
 from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.plugin import Plugin
@@ -111,7 +111,7 @@ class PluginLog:
 
     def _add_feedback(self, log: Logger, feedback: FeedbackPipe, age: np.ndarray) -> None:
         """Declare what a pipe has received last: numbers as the Robot has them, before a filter."""
-        pipe = feedback.source.pipe if isinstance(feedback, SharedFeedbackPipe) else feedback
+        pipe = feedback.source.pipe if isinstance(feedback, CachedFeedbackPipe) else feedback
         robot = self._plugin.robot
         inputs = self._plugin.component.inputs
         if isinstance(pipe, StateFeedbackPipe):

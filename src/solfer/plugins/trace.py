@@ -8,7 +8,8 @@ from typing import Any
 
 from solfer.model.observation import End, observed
 from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe
-from solfer.pipes.shared_feedback import SharedFeedbackPipe, WrittenFeedbackPipe
+from solfer.pipes.sharing.cached_feedback import CachedFeedbackPipe
+from solfer.pipes.sharing.local_topic import LocalFeedbackPipe
 from solfer.plugins.plugin import Plugin
 from solfer.transport.endpoints import NEW, MessageStatus
 
@@ -87,8 +88,8 @@ class CycleTrace:
             robot = self._robot_of(plugin)
             self._ends.append(observed(plugin, "cycle", before=partial(self._begin, plugin, plugin is plugins[0])))
             for feedback in plugin.feedbacks:
-                pipe = feedback.source.pipe if isinstance(feedback, SharedFeedbackPipe) else feedback
-                if not isinstance(pipe, WrittenFeedbackPipe) and not any(pipe is each for each in traced):
+                pipe = feedback.source.pipe if isinstance(feedback, CachedFeedbackPipe) else feedback
+                if not isinstance(pipe, LocalFeedbackPipe) and not any(pipe is each for each in traced):
                     traced.append(pipe)
                     self._ends.append(observed(pipe, "run", partial(self._read, robot, pipe)))
             self._ends += self._observed_component(plugin, robot)

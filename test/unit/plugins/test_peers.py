@@ -9,7 +9,7 @@ from support.unit.joint_pipes import RATE, make_robot, published, received
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.pipes.shared_feedback import NotedWriter, Written, WrittenReader
+from solfer.pipes.sharing.local_topic import LocalReader, LocalTopic, LocalWriter
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.shared.member import SpaceMember
 from solfer.plugins.shared.space import SharedSpace, SharedTopic
@@ -142,13 +142,14 @@ def test_what_nobody_receives_is_warned_about(looking, caplog):
 
 
 def test_what_is_written_into_a_shared_robot_is_heard(looking):
-    written = Written(looking.node.now)
-    writer = NotedWriter(looking.node.writer("wanted", KIND), written)
+    written = LocalTopic("cart")
+    writer = LocalWriter(looking.node.writer("wanted", KIND), written, looking.node.now)
     assert not writer.is_received
-    WrittenReader("wanted", written)
+    LocalReader("wanted", written, looking.node.now)
     assert writer.is_received
     space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
-    shared = NotedWriter(SpaceMember("cart", space, looking.node).writer("wanted", KIND), Written(looking.node.now))
+    member = SpaceMember("cart", space, looking.node)
+    shared = LocalWriter(member.writer("wanted", KIND), LocalTopic("cart"), member.now)
     assert not shared.is_received
     SpaceMember("other", space, looking.other).reader("wanted", KIND)
     assert shared.is_received

@@ -10,7 +10,8 @@ from typing import Any
 from solfer.config import Configuration, ControllerRecord, FeedbackRecord
 from solfer.config.kinds.contact import ContactTags
 from solfer.pipes import CommandPipe, FeedbackPipe, PipeContext, StateFeedbackPipe, factory
-from solfer.pipes.shared_feedback import NotedWriter, Source, Turns, Written, WrittenFeedbackPipe, WrittenReader
+from solfer.pipes.sharing.cached_feedback import CachedFeedback, CycleCount
+from solfer.pipes.sharing.local_topic import LocalFeedbackPipe, LocalReader, LocalTopic, LocalWriter
 from solfer.plugins.generation.robot_groups import (
     MeasuredSources,
     Number,
@@ -40,12 +41,12 @@ class SharedRobot:
         guarded: See above.
     """
 
-    def __init__(self, group: Sequence[Configuration], turns: Turns, guarded: bool):
+    def __init__(self, group: Sequence[Configuration], turns: CycleCount, guarded: bool):
         self.first: Robot | None = None
         self.guarded = guarded
         self._group, self._turns, self._sources = group, turns, MeasuredSources(group)
-        self._read: list[tuple[dict[str, Any], Source]] = []
-        self._written: dict[Writing, Written] = {}
+        self._read: list[tuple[dict[str, Any], CachedFeedback]] = []
+        self._written: dict[Writing, LocalTopic] = {}
 
     def join(self, robot: Robot) -> None:
         """Add the Robot of a plugin: the first one, or a companion of it."""
@@ -59,13 +60,15 @@ class SharedRobot:
         """
         writing = writing_of(record, configuration, self._group)
         if writing is not None:
-            written = self._note_of(writing, context.middleware.now)
-            return WrittenFeedbackPipe(record.name, WrittenReader(record.source or "", written), record.initialize)
+            reader = LocalReader(record.source or "", self._topic(writing), context.middleware.now)
+            return LocalFeedbackPipe(record.name, reader, record.initialize)
         key = origin(record, configuration) | extent(record) | {"order": _order(record, context.robot)}
         source = next((source for settings, source in self._read if settings == key), None)
         if source is None:
             longest = longest_history(record, configuration, self._group)
-            source = Source(factory.feedback(record.model_copy(update={"history": longest}), context), self._turns)
+            source = CachedFeedback(
+                factory.feedback(record.model_copy(update={"history": longest}), context), self._turns
+            )
             self._read.append((key, source))
         self._sources.add(record, configuration, _numbers(source.pipe, record, context.robot))
         return source.share(record)
@@ -75,10 +78,10 @@ class SharedRobot:
         writing = Writing(plugin, record.name)
         readers = ((each, feedback) for each in self._group for feedback in each.feedbacks)
         if any(writing_of(feedback, each, self._group) == writing for each, feedback in readers):
-            pipe.writer = NotedWriter(pipe.writer, self._note_of(writing, now))
+            pipe.writer = LocalWriter(pipe.writer, self._topic(writing), now)
 
-    def _note_of(self, writing: Writing, now: Callable[[], float]) -> Written:
-        return self._written.setdefault(writing, Written(now))
+    def _topic(self, writing: Writing) -> LocalTopic:
+        return self._written.setdefault(writing, LocalTopic(writing.plugin))
 
 
 class Sharing:
@@ -93,7 +96,7 @@ class Sharing:
     """
 
     def __init__(self, configurations: Sequence[Configuration], together: Sequence[str] | None = None):
-        self.turns, groups = Turns(), robot_groups(configurations, together)
+        self.turns, groups = CycleCount(), robot_groups(configurations, together)
         alone = {each.module.name for each, shared in zip(configurations, together or (), strict=False) if not shared}
         self._robots: dict[str, SharedRobot] = {}
         for group in groups:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from solfer.config import Configuration
 from solfer.errors import SolferError, raise_all
 from solfer.pipes import CommandPipe, FeedbackPipe
-from solfer.plugins.shared.space import SharedTopic, SpaceChannel, SpaceReader
+from solfer.plugins.shared.space import SharedTopic, SpaceChannel
 from solfer.transport.messages import canonical
 
 
@@ -41,8 +41,8 @@ def check_ends(feedbacks: Iterable[tuple[FeedbackPipe, str]], commands: Sequence
     senders = {id(channel): pipe for pipe in commands if (channel := getattr(pipe.writer, "channel", None)) is not None}
     errors: list[SolferError] = []
     for pipe, where in feedbacks:
-        if isinstance(pipe.reader, SpaceReader):
-            channel = pipe.reader.channel
+        channel = getattr(pipe.reader, "channel", None)
+        if isinstance(channel, SpaceChannel):
             try:
                 _check_end(pipe, channel, senders.get(id(channel)))
             except SolferError as error:

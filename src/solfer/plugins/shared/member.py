@@ -5,7 +5,9 @@ from concurrent.futures import Future
 from typing import Any
 
 from solfer.interfaces.declaration import Service
-from solfer.plugins.shared.space import OthersReader, SharedSpace, SharedTopic, SpaceReader, SpaceWriter
+from solfer.pipes.sharing.local_topic import LocalReader, LocalWriter
+from solfer.pipes.sharing.others_reader import OthersReader
+from solfer.plugins.shared.space import SharedSpace, SharedTopic
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import TYPES, canonical
@@ -78,8 +80,7 @@ class SpaceMember(Middleware):
         message = canonical(message)
         channel = self._space.published_to(self.component, resolved, message)
         if channel is not None:
-            channel.is_received = True
-            return SpaceReader(topic, channel, self.now)
+            return LocalReader(topic, channel, self.now)
         outside = self._outside.reader(topic, message, kept)
         own = self._space.published_by(self.component, resolved, message)
         return outside if own is None else OthersReader(outside, self._senders())
@@ -104,7 +105,7 @@ class SpaceMember(Middleware):
         """See `Middleware.writer`; the shared space has the message, too."""
         outside = self._outside.writer(topic, message)
         channel = self._space.published_by(self.component, self.resolve(topic), message)
-        return outside if channel is None else SpaceWriter(outside, channel, self.now)
+        return outside if channel is None else LocalWriter(outside, channel, self.now)
 
     def declared_writer(self, topic: str, message: str) -> Writer:
         """See `Middleware.declared_writer`; pipes of the components behind this one get its messages at once."""

@@ -6,7 +6,7 @@ from support.unit.joint_pipes import dofs, make_robot, received
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.pipes.shared_feedback import Source, Turns
+from solfer.pipes.sharing.cached_feedback import CachedFeedback, CycleCount
 from solfer.transport import JointMessage, MessageStatus
 
 
@@ -25,7 +25,7 @@ def make_pipe(robot, **changes):
 def test_patience_is_that_of_the_source(monkeypatch):
     told, pipe = [], make_pipe(make_robot())
     monkeypatch.setattr(pipe, "be_patient", lambda *patience: told.append(patience))
-    source = Source(pipe, Turns())
+    source = CachedFeedback(pipe, CycleCount())
     for patience in ((0.7, 9), (0.5, 10)):  # the most patient plugin counts
         source.share(record()).be_patient(*patience)
     assert told == [(0.7, 9), (0.7, 10)]
@@ -33,9 +33,9 @@ def test_patience_is_that_of_the_source(monkeypatch):
 
 def test_a_restart_needs_every_part_again():
     """Joints come in separate messages: one part of an earlier message must not complete a new start."""
-    robot, turns = make_robot(), Turns()
+    robot, turns = make_robot(), CycleCount()
     pipe = make_pipe(robot)
-    source = Source(pipe, turns)
+    source = CachedFeedback(pipe, turns)
     state = robot.state.window()
     shared, other = source.share(record()), source.share(record())
 

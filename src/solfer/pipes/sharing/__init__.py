@@ -1,0 +1,1 @@
+"""Ends of pipes whose other end is in the same process."""
