@@ -11,7 +11,7 @@ class Number:
     Args:
         low: Smallest value.
         high: Largest value.
-        unit: Unit, for messages.
+        unit: Unit, for messages; empty: it has none.
         kind: `float`, or `int` for a whole number.
         zero: Whether zero is allowed, too.
     """
@@ -22,7 +22,7 @@ class Number:
         self._kind = kind
         self._zero = zero
         what = f"{'0, or ' if zero else ''}{'a whole number' if kind is int else 'a number'}"
-        self.expected = f"{what} from {low:g} to {high:g} [{unit}]"
+        self.expected = f"{what} from {low:g} to {high:g}{unit and f' [{unit}]'}"
 
     def __call__(self, text: str) -> float:
         """Parse a number.
