@@ -10,7 +10,7 @@ import numpy as np
 
 from solfer import config
 from solfer.config import SharedConfiguration, load, load_shared, module_names
-from solfer.config.loading.layering import Layers
+from solfer.config.loading.layers import Layers
 from solfer.config.records.modules import is_shared
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems

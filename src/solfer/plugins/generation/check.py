@@ -7,7 +7,7 @@ from typing import Any
 
 from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load, read
 from solfer.config.loading.configuration import own_tags
-from solfer.config.loading.layering import ModulePlacement
+from solfer.config.loading.layers import ModulePlacement
 from solfer.config.yaml.files import is_file, opened
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.search import Folders

@@ -4,8 +4,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 
 from solfer.config import CheckReport, Problems, SharedPlugin
-from solfer.config.loading.rt_layer import read_layer
-from solfer.config.loading.shared import ListedPlugin, check_group, loaded
+from solfer.config.loading.lists import ListedPlugin, check_group, read_layer
 from solfer.config.records.middlewares import RT
 from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.search import Folders
@@ -81,8 +80,9 @@ def _add(report: CheckReport, found: CheckReport, entry: ListedPlugin, registry:
         report.problems.unknown(entry.mark, "plugin", entry.plugin, registry.known)
     report.problems.absorb(found.problems)
     for configuration in found.configurations.values():
-        report.configurations[entry.name] = entry.named(configuration)
-        yield loaded(entry, configuration)
+        loaded = entry.loaded(configuration)
+        report.configurations[entry.name] = loaded.configuration
+        yield loaded
 
 
 def _put(problems: Problems, errors: Iterable[SolferError], file: str | os.PathLike) -> None:

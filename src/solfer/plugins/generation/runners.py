@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from solfer.config import CheckReport, Configuration
-from solfer.config.loading.rt_layer import is_layer, read_layer
-from solfer.config.loading.shared import Naming
+from solfer.config.loading.lists import Naming, is_layer, read_layer
 from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE
 from solfer.config.yaml.files import YamlFile
 from solfer.config.yaml.nodes import Mark
