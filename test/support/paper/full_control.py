@@ -11,8 +11,7 @@ from solfer.demo.waving import CIRCLE_FRAME, CIRCLE_HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
 from solfer.navigation import Navigation, ScenarioCourse
-from solfer.plugins import PluginSet, Registry, generate
-from solfer.plugins.shared import generate_shared
+from solfer.plugins import PluginSet, Registry, generate, generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorTelemetry
 from solfer.scenarios import Player, Scenario

@@ -11,8 +11,7 @@ from solfer.components.joint_states import JointStates
 from solfer.config import load_shared
 from solfer.config.loading.lists import read_layer
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import PluginSet, Registry
-from solfer.plugins.shared import generate_shared
+from solfer.plugins import PluginSet, Registry, generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.transport.lower_level import Answer, answered

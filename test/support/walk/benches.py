@@ -18,8 +18,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.numerics.rotations import quaternion_product
-from solfer.plugins import Plugin, Registry, generate
-from solfer.plugins.shared import budget_of
+from solfer.plugins import Plugin, Registry, budget_of, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
 from solfer.realtime.schedule import ScheduleRequest

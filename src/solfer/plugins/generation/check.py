@@ -1,33 +1,32 @@
-"""Checks a whole main configuration: its grammar, the names of its robot, and a dry run of each plugin."""
+"""Checks a whole main configuration: its grammar, the names of its robot, and the generation of each plugin."""
 
 import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load, read
+from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load
 from solfer.config.loading.configuration import own_tags
 from solfer.config.loading.layers import ModulePlacement
-from solfer.config.yaml.files import is_file, opened
+from solfer.config.yaml.files import opened
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.search import Folders
-from solfer.errors import SolferError, nearest, raise_all, repeats
-from solfer.model.actuators import ActuatorsRecord
-from solfer.plugins.generation.dry_run import UnknownComponent, dry_run
-from solfer.plugins.generation.generator import Generator
+from solfer.errors import SolferError, raise_all, repeats
+from solfer.plugins.generation.dry_run import DryMiddleware
+from solfer.plugins.generation.generator import Generator, UnknownComponent
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.runners import note_runners
-from solfer.plugins.generation.sources import COMMAND_TOPIC, check_sources, sinks_of
+from solfer.plugins.generation.sources import check_topics, sinks_of
+from solfer.plugins.generation.together import SharedGenerator, find_generator
 from solfer.plugins.generation.unbuilt import importable_beside
-from solfer.plugins.shared.dry_run import dry_run_together
-from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
+from solfer.robot.file_checks import check_actuators, checked_files
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.plausibility import check_plausibility
-from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
-from solfer.robot.sources import is_robot_read, require_robot
+from solfer.robot.shipped import RobotFiles
 
-_WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
+_ASSUMED_RATE = 100.0
+"""Rate of a plugin whose own has a mistake [Hz]."""
 
 
 def check_file(  # noqa: PLR0913 for users: what replaces values of the file, by its name
@@ -142,13 +141,19 @@ def check_together(
         start: Names of those that start by themselves; None: all.
     """
     found = Problems()
-    files = {each.name: _files(each.configuration, found, robot) for each in listed}
+    files = {each.name: checked_files(each.configuration, found, robot) for each in listed}
     known = {name: each for name, each in files.items() if each is not None}
     if listed and len(known) == len(listed):
         generators = [_generator_of(each, registry, report.problems, found=found) for each in listed]
         whole = not report.errors and not found
-        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole=whole, start=start)
-        _put(errors, listed[0], report.problems, found=found)
+        outside = {each.name: DryMiddleware(each.configuration, known[each.name], whole) for each in listed}
+        generation = SharedGenerator(
+            listed,
+            generators,
+            lambda each: outside[each.module.name],
+            known=lambda each: outside[each.module.name].configuration,
+        )
+        _note(generation.check(whole, start), listed[0].configuration.tree.head, report.problems, found=found)
     report.problems.absorb(found)
 
 
@@ -158,15 +163,16 @@ def _generator_of(listed: SharedPlugin, registry: Registry, before: Problems, fo
         return find_generator(listed, registry)
     except SolferError as error:
         if listed.configuration.module.class_ is not None:
-            _put([error], listed, before, found=found)
+            _note([error], listed.configuration.tree.head, before, found=found)
         return UnknownComponent
 
 
-def _put(errors: Iterable[SolferError], listed: SharedPlugin, before: Problems, found: Problems) -> None:
-    """Note errors, in the list if they have no place; those that were noted before are left out."""
+def _note(errors: Iterable[SolferError], mark: Mark, before: Problems, found: Problems) -> None:
+    """Note errors, at `mark` if they have no place; those that were noted before are left out."""
     for error in errors:
         if not repeats(error, (*before.errors, *found.errors)):
-            found.put(Mark.read(error.where) or listed.configuration.tree.head, error)
+            place = Mark.read(error.where) or mark
+            found.put(place, error.at(str(place)))
 
 
 def _check_listed(report: CheckReport, registry: Registry) -> None:
@@ -196,7 +202,7 @@ def _check_module(
     if generator is not None and record is None and generator.known:
         for _, tag in own_tags(part.module).items():
             found.warn(tag.head, "has no effect: the component has no tags of its own")
-    files = _files(configuration, found, robot)
+    files = checked_files(configuration, found, robot)
     if files is not None:
         names = files.names()
         check_names(configuration, names, found, tags=tags, dofs=part.dofs)
@@ -205,13 +211,14 @@ def _check_module(
         calibrations = [record for name, record in configuration.calibrations.items() if name in used]
         check_plausibility(files, (tags, *calibrations), found)
     check_contacts(configuration, found)
-    check_sources(configuration, files, sinks, problems=found)
+    check_topics(configuration, files, sinks, problems=found)
     if files is None:
-        _check_actuators(configuration, found)
+        check_actuators(configuration, found)
     else:
-        _check_sinks(configuration, files, found)
-        errors = dry_run(part, generator or UnknownComponent, files, whole=whole and not found)
-        _note(errors, part, report.problems, found=found)
+        whole = whole and not found
+        outside = DryMiddleware(part.assumed(_ASSUMED_RATE), files, whole)
+        errors = (generator or UnknownComponent)(outside.configuration, outside).check(whole)
+        _note(errors, part.place(), report.problems, found=found)
     report.problems.absorb(found)
     return generator is not None
 
@@ -220,90 +227,10 @@ def _read_tags(configuration: Configuration, record: type[Record], before: Probl
     """Read the component's own tags; an unknown key that is known to be another one, misspelt, is not noted again."""
     problems = Problems()
     tags = configuration.read_tags(record, problems)
-    for error in problems.errors:
-        if not repeats(error, before.errors):
-            found.put(Mark.read(error.where) or configuration.tree.head, error)
+    _note(problems.errors, configuration.tree.head, before, found=found)
     for notice in problems.notices:
         found.warn(*notice)
     return tags
-
-
-def _note(errors: Iterable[SolferError], part: Part, before: Problems, found: Problems) -> None:
-    """Note the errors of a dry run, at the module if they have no place; those that were noted before are left out."""
-    for error in errors:
-        if not repeats(error, (*before.errors, *found.errors)):
-            mark = Mark.read(error.where) or part.place()
-            found.put(mark, error.at(str(mark)))
-
-
-def _files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:
-    """Find the files of the robot; None if there are none, or if they are wrong."""
-    urdf = configuration.tree.nearest((configuration.section, "source", "urdf")).head
-    if _lacks_files(configuration):
-        return None
-    try:
-        files = robot or robot_files(configuration)
-        if files is not None:
-            files.names()
-            return files
-    except SolferError as error:
-        problems.put(urdf, error.at(str(urdf)))
-        return None
-    if _check_robot(configuration, problems):
-        return None
-    name = configuration.tree.get("robot", "name")
-    close = nearest(str(name.value), robots_beside(configuration.file)) if name else ()
-    if name is not None and close:
-        problems.warn(name.mark, f"{_WITHOUT_ROBOT}; did you mean {' or '.join(close)}?")
-    else:
-        problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
-    return None
-
-
-def _lacks_files(configuration: Configuration) -> bool:
-    """Whether a file of the model or its groups is not there, which was reported when the configuration was read."""
-    sources = configuration.sources
-    named = (sources.urdf, sources.srdf) if sources is not None else ()
-    paths = [source.location for source in named if source is not None and source.location is not None]
-    return not all(is_file(path) for path in paths)
-
-
-def _check_robot(configuration: Configuration, problems: Problems) -> bool:
-    """Check that the files of actuators and contacts know the robot; return whether one does not."""
-    sources = configuration.sources
-    for source in (sources.actuators, sources.contacts) if sources is not None and is_robot_read(configuration) else ():
-        if source is not None and source.location is not None and is_file(source.location):
-            try:
-                require_robot(configuration, source.location)
-            except SolferError as error:
-                problems.put(source.place(), error.at(str(source.place())))
-                return True
-    return False
-
-
-def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Problems) -> None:
-    """Warn of commands to a controller of the robot on a topic that it does not receive."""
-    known = {controller.name for controller in files.controllers}
-    for record in configuration.controllers:
-        if record.lower_level and record.leads_to in known and record.sink not in (None, COMMAND_TOPIC):
-            what = f"the controller '{record.leads_to}' receives '{record.leads_to}{COMMAND_TOPIC}', not"
-            problems.warn(record.place("sink"), f"{what} '{record.leads_to}{record.sink}'")
-
-
-def _check_actuators(configuration: Configuration, problems: Problems) -> None:
-    """Check that the file of the actuators knows the robot, whose joints are not known."""
-    source = configuration.sources.actuators if configuration.sources else None
-    robot = configuration.robot
-    if source is None or source.file is None or robot is None or not robot.actuators.read:
-        return
-    if not is_robot_read(configuration):
-        return
-    try:
-        require_robot(configuration, source.location)
-        read(source.location, ActuatorsRecord, (robot.name,))
-    except SolferError as error:
-        mark = source.place()
-        problems.put(mark, error.at(str(mark)))
 
 
 def _generator(

@@ -10,7 +10,7 @@ from solfer.interfaces.declaration import Service
 from solfer.simulation.delay_line import DelayLine
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.throttle import Throttle
-from solfer.transport.endpoints import Queue, Writer
+from solfer.transport.endpoints import NullWriter, Queue, Writer
 from solfer.transport.lower_level import CLAIM_INTERFACE
 from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message, copied
 from solfer.transport.middleware import CONTROLLER_GAINS, JOINT_NAMES, Middleware, Submit
@@ -61,7 +61,7 @@ class Wiring:
     def writer(self, topic: str, message: str) -> Writer:
         """Return a writer of measurements, which are delayed."""
         if topic in self._truth:
-            return _NullWriter(topic)
+            return NullWriter(topic)
         encode = self._encoders.measured if message in JOINT_MESSAGES else copied
         writer = _LateWriter(self, self._outside.writer(topic, message), encode, line=DelayLine(self._measurement))
         self._writers.append(writer)
@@ -94,16 +94,6 @@ class Wiring:
             return _renamed(reply, ("joints",), lambda text: " ".join(map(encoders.name, text.split())))
 
         return dataclasses.replace(service, handler=handler)
-
-
-class _NullWriter(Writer):
-    """A topic that is not published."""
-
-    def __init__(self, topic: str):
-        self.topic = topic
-
-    def write(self, message: Message) -> None:
-        """See `Writer.write`; nothing is sent."""
 
 
 class _LateWriter(Writer):

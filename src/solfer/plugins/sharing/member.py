@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from solfer.interfaces.declaration import Service
-from solfer.plugins.shared.space import OthersReader, SharedSpace, SharedTopic, SpaceReader, SpaceWriter
+from solfer.plugins.sharing.space import OthersReader, SharedSpace, SharedTopic, SpaceReader, SpaceWriter
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import TYPES, canonical

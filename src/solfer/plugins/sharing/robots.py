@@ -11,7 +11,7 @@ from solfer.config import Configuration, ControllerRecord, FeedbackRecord
 from solfer.config.kinds.contact import ContactTags
 from solfer.pipes import CommandPipe, FeedbackPipe, PipeContext, StateFeedbackPipe, factory
 from solfer.pipes.shared_feedback import NotedWriter, Source, Turns, Written, WrittenFeedbackPipe, WrittenReader
-from solfer.plugins.generation.robot_groups import (
+from solfer.plugins.sharing.groups import (
     MeasuredSources,
     Number,
     Writing,
