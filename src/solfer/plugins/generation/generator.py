@@ -157,10 +157,10 @@ class Generator:
 
     def make_robot(self) -> Robot:
         """Build the Robot that the configuration describes."""
-        if self._shared is None:
-            return build(self.configuration, self.middleware, faults=self.faults)
-        robot = build(self.configuration, self.middleware, self._shared.first, faults=self.faults)
-        self._shared.join(robot)
+        shared = self._shared
+        robot = build(self.configuration, self.middleware, shared.first if shared else None, faults=self.faults)
+        if shared is not None and shared.first is None:
+            shared.first = robot
         return robot
 
     def make_component(self, robot: Robot) -> Component:

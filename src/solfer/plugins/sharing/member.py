@@ -1,6 +1,6 @@
 """The middleware of one component of a shared plugin: the shared space first, then that of the process."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
@@ -82,7 +82,7 @@ class SpaceMember(Middleware):
             return SpaceReader(topic, channel, self.now)
         outside = self._outside.reader(topic, message, kept)
         own = self._space.published_by(self.component, resolved, message)
-        return outside if own is None else OthersReader(outside, self._senders())
+        return outside if own is None else OthersReader(outside, (self._outside.name,))
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
         """See `Middleware.queue`; pipes have none, so that the shared space has none either."""
@@ -157,6 +157,3 @@ class SpaceMember(Middleware):
 
     def close(self) -> None:
         """See `Middleware.close`: the process closes its own."""
-
-    def _senders(self) -> Collection[str]:
-        return (self._outside.name,)

@@ -47,10 +47,6 @@ class SharedRobot:
         self._read: list[tuple[dict[str, Any], Source]] = []
         self._written: dict[Writing, Written] = {}
 
-    def join(self, robot: Robot) -> None:
-        """Add the Robot of a plugin: the first one, or a companion of it."""
-        self.first = self.first or robot
-
     def feedback(self, record: FeedbackRecord, configuration: Configuration, context: PipeContext) -> FeedbackPipe:
         """Make a plugin's pipe for a feedback that measures the Robot; see `factory.feedback`.
 
