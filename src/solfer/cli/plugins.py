@@ -13,7 +13,7 @@ from solfer.interfaces.declaration import Action, Declaration, Parameter, Servic
 from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
-from solfer.plugins.generation.robot_groups import conflicts, robot_groups
+from solfer.plugins.sharing.groups import conflicts, robot_groups
 from solfer.robot import robot_files
 
 _LOG = logging.getLogger(__name__)

@@ -27,7 +27,7 @@ class ReplayMiddleware(DryMiddleware):
         super().__init__(configuration, files)
         self.time = float(rows.times[0])
         self._rows = rows
-        self._recorded = dict(_descriptions(configuration, rows))
+        self._recorded = dict(_descriptions(self.configuration, rows))
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -70,7 +70,7 @@ class ReplayMiddleware(DryMiddleware):
 
     def _pipes(self, controller: str) -> list[str]:
         """Return the names of the pipes to a controller."""
-        return [record.name for record in self._configuration.controllers if record.leads_to == controller]
+        return [record.name for record in self.configuration.controllers if record.leads_to == controller]
 
 
 def _descriptions(configuration: Configuration, rows: RecordedRows) -> Mapping[str, str]:

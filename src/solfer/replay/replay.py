@@ -10,7 +10,6 @@ from solfer.config import Configuration
 from solfer.errors import RecordingError, SolferError
 from solfer.numerics.rotations import whole_turns
 from solfer.pipes.joint.pipes import JointCommandPipe
-from solfer.plugins.generation.dry_run import known_without_robot
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.plugin_log import PluginLog
@@ -172,9 +171,8 @@ def make(configuration: Configuration, generator: type[Generator], files: RobotF
         SolferError: The plugin cannot be made, or the recording lacks something that it receives.
         SolferErrors: Several mistakes.
     """
-    known = known_without_robot(configuration, files, True)
-    middleware = ReplayMiddleware(known, files, rows)
-    made = replaying(generator, rows)(known, middleware)
+    middleware = ReplayMiddleware(configuration, files, rows)
+    made = replaying(generator, rows)(middleware.configuration, middleware)
     plugin = made.plugin()
     if rows.has_time:
         life = rows.recording[f"{rows.plugin}/{LIFE}"]

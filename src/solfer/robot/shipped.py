@@ -2,15 +2,16 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from solfer.config import Configuration, Problems, SourceRecord
-from solfer.config.yaml.files import is_file, located, read_node
+from solfer.config.yaml.files import is_file, located, read_node, read_text
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.packages import shipped_folder
 from solfer.errors import ConfigError, SolferError, UnknownName
-from solfer.model import Description
+from solfer.model import Description, Kinematics, Semantics
+from solfer.model.urdf.cut import cut
 from solfer.robot.defaults import ALL
 from solfer.robot.names import RobotNames
 
@@ -78,6 +79,44 @@ class RobotFiles:
             SolferError: A file cannot be read, or does not contain a robot.
         """
         return _names(self)
+
+    def kinematics(self) -> Kinematics:
+        """Read links and joints, and the base that its bundle decides."""
+        return _kinematics(read_text(str(self.urdf)), self.floating_base)
+
+    def part(self, part: Cut) -> str:
+        """Return the URDF of a part."""
+        return _cut(read_text(str(self.urdf)), part.link, part.keep)
+
+    def driven(self, controller: ControllerGroups | None) -> tuple[str, ...]:
+        """Return the joints of a lower-level controller; None: all that move."""
+        kinematics = self.kinematics()
+        moving = kinematics.dofs[0 if kinematics.base is None else 6 :]
+        if controller is None:
+            return moving
+        left_out = self._members(controller.without, moving) if controller.without else ()
+        members = self._members(controller.group, moving)
+        return tuple(joint for joint in moving if joint in members and joint not in left_out)
+
+    def _members(self, group: str, moving: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the joints of a group; all that move where it is not known."""
+        known = {} if self.srdf is None else _semantics(read_text(str(self.srdf)), read_text(str(self.urdf))).groups
+        return known[group].joints if group != ALL and group in known else moving
+
+
+@lru_cache(maxsize=4)
+def _kinematics(urdf: str, floating_base: bool | None) -> Kinematics:
+    return Kinematics(Description.from_text(urdf, "URDF"), floating_base)
+
+
+@lru_cache(maxsize=4)
+def _semantics(srdf: str, urdf: str) -> Semantics:
+    return Semantics.from_text(srdf, Description.from_text(urdf, "URDF"))
+
+
+@lru_cache(maxsize=8)
+def _cut(urdf: str, link: str, keep: str) -> str:
+    return cut(Description.from_text(urdf, "URDF"), link, keep)
 
 
 @cache

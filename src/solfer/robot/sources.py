@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from solfer.config import Configuration, Record, TextRecord
-from solfer.config.loading.reading import misspelt_key
+from solfer.config.loading.load import misspelt_key
 from solfer.config.records.record import parse
 from solfer.config.yaml.compose import compose
 from solfer.config.yaml.files import opened

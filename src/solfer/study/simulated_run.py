@@ -10,17 +10,16 @@ import numpy as np
 
 from solfer import config
 from solfer.config import SharedConfiguration, load, load_shared, module_names
-from solfer.config.loading.layering import Layers
+from solfer.config.loading.layers import Layers
 from solfer.config.records.modules import is_shared
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import ComponentError, ConfigError, SolferError, SolferErrors
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.navigation import Course, Navigation, ReferenceCourse, ScenarioCourse, read_references
-from solfer.plugins import Plugin, PluginSet, Registry, generate
+from solfer.plugins import Plugin, PluginSet, Registry, generate, generate_shared
 from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.plugin_log import PluginLog
-from solfer.plugins.shared import generate_shared
 from solfer.recording.log import Logger, LogSource
 from solfer.robot.shipped import RobotFiles
 from solfer.scenarios import Player, read_scenario

@@ -149,8 +149,37 @@ class Writer(abc.ABC):
         """Send a message; its numbers are copied, so that the caller may reuse it. Does not block."""
 
 
-class NullWriter(Writer):
-    """Sends nothing, and does not announce the topic.
+class NullReader(Reader):
+    """Receives nothing.
+
+    Args:
+        topic: Name of the topic.
+        message: Its message.
+    """
+
+    def __init__(self, topic: str, message: str):
+        self.topic = topic
+        self.carries = message
+
+    def read(self) -> MessageStatus:
+        """See `Reader.read`."""
+        return NONE
+
+    def update(self) -> Sequence[Publisher]:
+        """See `Reader.update`."""
+        return ()
+
+    def read_from(self, publisher: Publisher) -> MessageStatus:
+        """See `Reader.read_from`."""
+        return NONE
+
+    def age(self) -> float:
+        """See `Reader.age`."""
+        return math.inf
+
+
+class NullQueue(Queue):
+    """Receives nothing.
 
     Args:
         topic: Name of the topic.
@@ -158,6 +187,23 @@ class NullWriter(Writer):
 
     def __init__(self, topic: str):
         self.topic = topic
+
+    def drain(self) -> list[Any]:
+        """See `Queue.drain`."""
+        return []
+
+
+class NullWriter(Writer):
+    """Sends nothing, and does not announce the topic.
+
+    Args:
+        topic: Name of the topic.
+        message: Its message; empty: it is on no topic.
+    """
+
+    def __init__(self, topic: str, message: str = ""):
+        self.topic = topic
+        self.carries = message
 
     def write(self, message: Message) -> None:
         """Drop the message; see `Writer.write`."""

@@ -11,7 +11,7 @@ from support.modules import forget
 from support.processes import SOURCES
 from support.realtime.executor_plugins import Layer
 
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.plugins import Registry, generate, load_checked
 
 OTHERS = ("PYTEST_ADDOPTS", "PYTEST_CURRENT_TEST")
@@ -63,8 +63,9 @@ class FileLayer(Layer):
     """An executor with the plugins of the file of an RT layer."""
 
     def _made(self, file):
-        ((plugin, configuration),) = read_layer(file).configurations(load=load_checked)
-        generator = Registry().find(plugin, configuration.module.class_)
+        (listed,) = read_layer(file).load(load=load_checked)
+        configuration = listed.configuration
+        generator = Registry().find(listed.plugin, configuration.module.class_)
         return generate(configuration, self.node(configuration.module.name), generator)
 
 

@@ -10,7 +10,7 @@ from support.integration.bridged import BridgedWorld
 from support.integration.world import CONFIG
 
 from solfer.components.move_joints import MoveJoints
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorTelemetry
@@ -25,13 +25,13 @@ class Layers:
     def __init__(self, folder):
         registry = Registry()
         layer = read_layer(CONFIG / "xbot_shared_control.yaml", registry.configuration)
-        configurations = layer.configurations()
-        self.world = BridgedWorld(folder, [configuration for _, configuration in configurations])
+        listed = layer.load()
+        self.world = BridgedWorld(folder, [each.configuration for each in listed])
         nodes, plugins = [], []
-        for name, configuration in configurations:
-            nodes.append(self.world.node(name))
-            generator = registry.find(name, configuration.module.class_)
-            plugins.append(generate(configuration, nodes[-1], generator))
+        for each in listed:
+            nodes.append(self.world.node(each.plugin))
+            generator = registry.find(each.plugin, each.configuration.module.class_)
+            plugins.append(generate(each.configuration, nodes[-1], generator))
         bus = self.world.bus
         self.executor = Executor(
             plugins,

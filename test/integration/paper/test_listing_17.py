@@ -9,8 +9,7 @@ from support.paper.full_control import Driven, Layer
 
 from solfer.config import load_shared
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import PluginSet, PluginState, Registry
-from solfer.plugins.shared import generate_shared
+from solfer.plugins import PluginSet, PluginState, Registry, generate_shared
 from solfer.transport.messages import FieldsMessage
 
 LISTED = ["upper_body_ik", "odometry", "ground_forces", "gravity_compensation", "wheeled_motion"]

@@ -6,7 +6,7 @@ from support.plugins.plugin import configuration
 
 from solfer.components import Component, Service
 from solfer.config import load
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.errors import MiddlewareError, SolferError, singles
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, check_file, generate, load_checked
@@ -156,5 +156,5 @@ def test_an_rt_layer_reports_all_of_its_plugins(tmp_path):
     plugins = "XBotRTPlugins: {plugins: ['joint_states::test', 'lower_body', 'lower_bod']}"
     layer.write_text(f"{plugins}\nmwoibn: {{config_file: {path}}}\n")
     with pytest.raises(SolferError) as caught:
-        read_layer(layer).configurations(load=load_checked)
+        read_layer(layer).load(load=load_checked)
     assert all(words in str(caught.value) for words in ("'weels'", "'ful'", "'lower_bod'"))

@@ -10,8 +10,7 @@ from support.integration.world import CONFIG, ROBOT, World
 from solfer import Robot
 from solfer.config import load_shared
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import PluginSet, PluginState, Registry
-from solfer.plugins.shared import generate_shared
+from solfer.plugins import PluginSet, PluginState, Registry, generate_shared
 from solfer.scene import LiveScene
 
 

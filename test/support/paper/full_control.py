@@ -6,13 +6,12 @@ from support.integration.world import CONFIG, World
 from support.simulation.hardware_plugin import mocked
 
 from solfer.config import load, load_shared
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.demo.waving import CIRCLE_FRAME, CIRCLE_HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
 from solfer.navigation import Navigation, ScenarioCourse
-from solfer.plugins import PluginSet, Registry, generate
-from solfer.plugins.shared import generate_shared
+from solfer.plugins import PluginSet, Registry, generate, generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorTelemetry
 from solfer.scenarios import Player, Scenario

@@ -13,15 +13,14 @@ from support.integration.bridged import BridgedWorld
 from support.integration.world import CONFIG, STEP, World
 
 from solfer.config import load, load_shared
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.demo.driving import COURSE_RATE
 from solfer.demo.waving import Waving
 from solfer.middleware.bridge.bridge import BRIDGE_PERIOD as BRIDGED
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.navigation import Navigation, ScenarioCourse
-from solfer.plugins import PluginSet, Registry, generate
+from solfer.plugins import PluginSet, Registry, generate, generate_shared
 from solfer.plugins.outputs.start_blend import SHORTEST
-from solfer.plugins.shared import generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.scenarios import Player, read_scenario

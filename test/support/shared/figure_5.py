@@ -10,9 +10,8 @@ from solfer.components import Component
 from solfer.config import load_shared
 from solfer.dynamics import BIAS
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import PluginSet, Registry
+from solfer.plugins import PluginSet, Registry, generate_shared
 from solfer.plugins.life.budget import BudgetRules
-from solfer.plugins.shared import generate_shared
 from solfer.simulation import Rates, Simulation, SimulationServer
 from solfer.simulation.robot_body.placement import StartPlacement
 

@@ -10,8 +10,7 @@ from support.walk.files import SRDF, URDF
 
 from solfer.components import Component
 from solfer.config import Configuration, load
-from solfer.config.loading.rt_layer import read_layer
-from solfer.config.loading.shared import load_shared
+from solfer.config.loading.lists import load_shared, read_layer
 from solfer.interfaces.port import Port
 from solfer.lower_level import LowerLevelServer
 from solfer.middleware.bridge.routes import routes
@@ -19,8 +18,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.numerics.rotations import quaternion_product
-from solfer.plugins import Plugin, Registry, generate
-from solfer.plugins.shared import budget_of
+from solfer.plugins import Plugin, Registry, budget_of, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
 from solfer.realtime.schedule import ScheduleRequest
@@ -274,10 +272,11 @@ def layer(folder: Path, file: str = "layer.yaml") -> str:
     """Make the executor of an RT layer with its plugins, as the node does, and digest it and what it asks for."""
     read = read_layer(folder / file)
     plugins, others = [], []
-    for name, configuration in read.configurations():
+    for listed in read.load():
+        configuration = listed.configuration
         others.append(Others(folder))
         middleware = MemoryMiddleware(others[-1].bus, configuration.module.name)
-        plugins.append(generate(configuration, middleware, Registry().find(name, configuration.module.class_)))
+        plugins.append(generate(configuration, middleware, Registry().find(listed.plugin, configuration.module.class_)))
     rules = ExecutorRules(*(getattr(read.executor, name) for name in ("blend", "budget", "overruns", "grace")))
     memory = folder / "memory"
     memory.mkdir(exist_ok=True)

@@ -21,7 +21,7 @@ from support.unit.mutations import damaged, mutated, shipped
 
 from solfer.cli.main import main as solfer
 from solfer.config import Configuration, load, module_names, read
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.errors import SolferError
 from solfer.middleware.memory import read_faults
 from solfer.model.actuators import ActuatorsRecord
@@ -128,10 +128,10 @@ def uses(folder, file):
     if name.startswith("transport/"):
         return [lambda: read_faults(file)]
     if name.startswith("xbot"):
-        return [lambda: read_layer(file, Registry().configuration).configurations()]
+        return [lambda: read_layer(file, Registry().configuration).load()]
     check = [lambda: solfer(["check", str(main), "--json"]), lambda: solfer(["check", str(main), "--system", "HW"])]
     if not name.startswith("robots/"):
-        return [*check, lambda: read_layer(folder / "xbot.yaml", Registry().configuration).configurations()]
+        return [*check, lambda: read_layer(folder / "xbot.yaml", Registry().configuration).load()]
     return [*check[:1], lambda: robot(folder), lambda: hardware(folder)]
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.errors import ConfigError, SolferError
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
@@ -13,8 +13,9 @@ CONFIG = Path(__file__).resolve().parents[3] / "config"
 @pytest.mark.parametrize(("file", "rate"), [("xbot.yaml", 500.0), ("xbot_1kHz.yaml", 1000.0)])
 def test_the_shipped_layers_run_joint_states_on_xbot(file, rate):
     layer = read_layer(CONFIG / file)
-    ((plugin, configuration),) = layer.configurations()
-    assert (plugin, configuration.name, configuration.rate) == ("joint_states", "joint_states", rate)
+    (listed,) = layer.load()
+    configuration = listed.configuration
+    assert (listed.plugin, configuration.name, configuration.rate) == ("joint_states", "joint_states", rate)
     assert (configuration.middleware, configuration.module.layer) == ("XBOT", "RT")
     assert layer.executor.overruns == 20 and layer.executor.grace == 100
 
@@ -38,12 +39,12 @@ mwoibn: {config_file: CENTAURO}
 """,
         )
     )
-    found = layer.configurations(system="HW")
-    assert [(plugin, each.name) for plugin, each in found] == [
+    found = layer.load(system="HW")
+    assert [(each.plugin, each.configuration.name) for each in found] == [
         ("joint_states", "joint_states"),
         ("other", "joint_lower"),
     ]
-    assert {each.system for _, each in found} == {"HW"}
+    assert {each.configuration.system for each in found} == {"HW"}
 
 
 @pytest.mark.parametrize(
@@ -73,7 +74,7 @@ def test_mistakes_have_their_places(tmp_path, text, words):
 def test_a_plugin_without_a_configuration_is_named(tmp_path):
     layer = read_layer(written(tmp_path, "XBotRTPlugins: {plugins: [joint_state]}\nmwoibn: {config_file: CENTAURO}"))
     with pytest.raises(SolferError, match="joint_state") as error:
-        layer.configurations()
+        layer.load()
     assert not isinstance(error.value, ConfigError) and "joint_states" in str(error.value)
 
 

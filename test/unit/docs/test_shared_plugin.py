@@ -15,10 +15,9 @@ from support.unit.cart import URDF
 
 from solfer.cli.main import main
 from solfer.config import load_shared
-from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.lists import read_layer
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins import Generator, PluginState, Registry
-from solfer.plugins.shared import generate_shared
+from solfer.plugins import Generator, PluginState, Registry, generate_shared
 
 FORCE = "geometry_msgs/Vector3Stamped"
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, dofs, make_robot, published, received
 
-from solfer.config.loading.calibration import CalibrationRecord
+from solfer.config.records.calibration import CalibrationRecord
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.transport import JointMessage

@@ -11,8 +11,8 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.pipes.sharing.local_topic import LocalReader, LocalTopic, LocalWriter
 from solfer.plugins.peers import Peer, Peers
-from solfer.plugins.shared.member import SpaceMember
-from solfer.plugins.shared.space import SharedSpace, SharedTopic
+from solfer.plugins.sharing.member import SpaceMember
+from solfer.plugins.sharing.space import SharedSpace, SharedTopic
 
 KIND = "solfer/JointCommand"
 

@@ -13,11 +13,11 @@ from solfer.errors import SolferError
 from solfer.interfaces.declaration import Service
 from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.registry import load_class
-from solfer.plugins.generation.robot_groups import _two_sources
 from solfer.plugins.life.switchboard import find_conflicts
 from solfer.plugins.outputs.outputs import _refuse
 from solfer.plugins.plugin_log import _declared
-from solfer.plugins.shared.space import SharedTopic, _rivals
+from solfer.plugins.sharing.groups import _two_sources
+from solfer.plugins.sharing.space import SharedTopic, _rivals
 from solfer.robot.shipped import robot_files
 
 

@@ -19,7 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--run", dest="study", metavar="STUDY", help="simulate the plugins of a study in memory, with its motion"
     )
     parser.add_argument(
-        "--port", type=Number(0, 65535, "", int), default=8080, help="port, or the next free one (default: 8080; 0: any)"
+        "--port",
+        type=Number(0, 65535, "", int),
+        default=8080,
+        help="port, or the next free one (default: 8080; 0: any)",
     )
     parser.add_argument(
         "--foxglove",

@@ -1,1 +1,5 @@
-"""Loading of modules from a main configuration: layers, sets of pipes, checks."""
+"""Steps from the files to a plugin's configuration, each in a module of its own.
+
+`layers` merges the files; `library` reads pipes and calibrations by name; `configuration` is what comes out, and
+`effective` writes it as YAML; `load` reads one module, `lists` those of a shared plugin or an RT layer, `check` all.
+"""

@@ -1,16 +1,20 @@
-"""Checks of a whole main configuration: every module, and the parts that no module uses."""
+"""Checks of a whole main configuration: every module, and the parts that no module uses: these may be incomplete."""
 
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from solfer.config.loading.configuration import Configuration, Part
-from solfer.config.loading.layering import AS_CONFIGURED, Layers, ModulePlacement
-from solfer.config.loading.reading import Reading, Used
-from solfer.config.loading.shared import Naming, SharedConfiguration, read_shared
-from solfer.config.loading.unused import check_rest
-from solfer.config.records.modules import is_shared
-from solfer.config.yaml.nodes import Mark
+from solfer.config.loading.layers import AS_CONFIGURED, Layers, ModulePlacement
+from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION, Library, named_records
+from solfer.config.loading.lists import Naming, SharedConfiguration, read_shared
+from solfer.config.loading.load import NOT_CONFIGURATIONS, Reading, Used, misspelt_key
+from solfer.config.records.calibration import CalibrationRecord
+from solfer.config.records.middlewares import MIDDLEWARES
+from solfer.config.records.modules import MainRecord, RobotRecord, is_shared
+from solfer.config.records.record import parse
+from solfer.config.records.sources import MappingRecord, SourceRecord
+from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Notice, Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError
@@ -81,22 +85,15 @@ def check(
     report.modules = layers.names if modules is None else tuple(dict.fromkeys(modules))
     used: Used = set()
     for name in report.modules:
-        _check_module(report, layers, os.fspath(file), name=name, default=default, used=used, placement=placement)
+        _check_module(report, layers, name, default=default, used=used, placement=placement)
     if modules is None:
         for tree in layers.variants(report.problems):
-            check_rest(tree, used, report.problems)
+            _check_rest(tree, used, report.problems)
     return report
 
 
 def _check_module(
-    report: CheckReport,
-    layers: Layers,
-    file: str,
-    name: str,
-    *,
-    default: Naming,
-    used: Used,
-    placement: ModulePlacement,
+    report: CheckReport, layers: Layers, name: str, *, default: Naming, used: Used, placement: ModulePlacement
 ) -> None:
     found = Problems()
     try:
@@ -105,13 +102,70 @@ def _check_module(
         report.problems.put(layers.main.nearest(("modules", name)).head, error)
         return
     if is_shared(name, node):
-        group = read_shared(layers, file, name, default=default, problems=found)
+        group = read_shared(layers, name, default, found)
         if group is not None:
             report.shared[name] = group
     else:
-        reading = Reading(layers.tree(name, found, placement), found)
-        report.parts[name] = part = reading.part(file, name)
+        reading = Reading(layers, name, found, placement)
+        report.parts[name] = part = reading.part()
         used |= reading.used
         if not found:
             report.configurations[name] = part.configuration
     report.problems.absorb(found)
+
+
+def _check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
+    """Check robot configurations, sets, pipes, maps, calibrations and sources of a merged tree.
+
+    Args:
+        tree: The value of the root key.
+        used: Pipes that modules use; these are checked with the modules, for the middleware that is chosen.
+        problems: Receives the findings.
+    """
+    parse(tree, MainRecord, problems)
+    named_records(tree.get("calibration"), CalibrationRecord, problems)
+    chosen = tree.get("middleware")
+    for middleware, kind in MIDDLEWARES.items():
+        section = tree.get(kind.section)
+        is_chosen = chosen is not None and chosen.value == middleware
+        if is_chosen:
+            _check_lists(tree, middleware, problems)
+        named_records(section and section.get("mapping"), MappingRecord, problems)
+        source = section and section.get("source")
+        if source is not None:
+            parse(source, SourceRecord, problems)
+        for direction in (FEEDBACK_SECTION, CONTROLLER):
+            _check_pipes(tree, middleware, direction, used=used if is_chosen else None, problems=problems)
+
+
+def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
+    """Check robot configurations, and the pipes that they and the sets name."""
+    libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK_SECTION, CONTROLLER)}
+    for direction, library in libraries.items():
+        sets = tree.get(f"{direction}s")
+        for _, node in sets.items() if sets else ():
+            library.check_list(library.list_of(node))
+    robots = tree.get("robot")
+    misspelt = misspelt_key(tree)
+    for name, node in robots.items() if robots else ():
+        if misspelt is not None and misspelt.where == str(node.head):
+            problems.put(node.head, misspelt)
+            continue
+        if name in NOT_CONFIGURATIONS or parse(node, RobotRecord, problems, name="", configuration=name) is None:
+            continue
+        chosen = node.get("feedback", "layer")
+        if chosen is None:
+            libraries[FEEDBACK_SECTION].check_list(node.get("feedback", "list"))
+        else:
+            libraries[FEEDBACK_SECTION].find_set(chosen)
+
+
+def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | None, problems: Problems) -> None:
+    """Check each pipe, or without `used`, for a middleware that is not chosen, each pipe that its section names."""
+    generic = tree.get(direction)
+    special = tree.get(MIDDLEWARES[middleware].section, direction)
+    for part in (special,) if used is None else (generic, special):
+        for name, node in part.items() if part else ():
+            found = Problems(complete=False)
+            Library(tree, middleware, direction, problems=found).pipe(name, node.head)
+            problems.absorb(found, notices=(direction, name) not in (used or ()))

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.effective import EffectiveValue, as_yaml, entries, pruned
+from solfer.config.records.calibration import CalibrationRecord
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.modules import ContactsChoice, ModuleRecord, ReadRecord, RobotRecord
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord

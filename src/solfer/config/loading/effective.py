@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from solfer.config.loading.layering import ROOT
+from solfer.config.loading.layers import ROOT
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.yaml.nodes import Key, Mark, Scalar, YamlNode
 from solfer.config.yaml.scalars import resolve

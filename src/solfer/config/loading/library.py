@@ -1,9 +1,10 @@
-"""Pipes by name: sets of them, and the generic part merged with the middleware's part."""
+"""Pipes and calibrations by name: sets of pipes, and the generic part merged with the middleware's part."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from solfer.config.kinds.table import record_of
+from solfer.config.records.calibration import CalibrationRecord
 from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareKind
 from solfer.config.records.pipes import AnyPipeRecord, ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import RecordType, parse
@@ -41,19 +42,16 @@ class Library:
 
     def of_set(self, chosen: YamlNode) -> tuple[Any, ...]:
         """Return the pipes of the set that `chosen` names."""
-        node = self.list_of(self._set(chosen))
+        node = self.list_of(self.find_set(chosen))
         return () if node is None else self.of_list(node)
-
-    def check_set(self, chosen: YamlNode) -> None:
-        """Note an error if there is no set of the name `chosen`."""
-        self._set(chosen)
 
     def check_list(self, node: YamlNode | None) -> None:
         """Check the names in a list of pipes, if there is one."""
         for _ in self._listed(node) if node is not None else ():
             continue
 
-    def _set(self, chosen: YamlNode) -> YamlNode | None:
+    def find_set(self, chosen: YamlNode) -> YamlNode | None:
+        """Return the set that `chosen` names; None, with an error, if there is none."""
         sets = self._tree.get(self._sets)
         known = dict(sets.items()) if sets else {}
         if chosen.value not in known:
@@ -165,3 +163,56 @@ def named_records(node: YamlNode | None, record: type[RecordType], problems: Pro
         if parsed is not None:
             found[name] = parsed
     return found
+
+
+def read_calibrations(
+    tree: YamlNode, pipes: Iterable[AnyPipeRecord], problems: Problems
+) -> dict[str, CalibrationRecord]:
+    """Read all calibrations; those that `pipes` name have to exist, and belong to the hardware's pipes."""
+    section = tree.get("calibration")
+    calibrations = named_records(section, CalibrationRecord, problems)
+    for calibration in calibrations.values():
+        _check_names(calibration, problems)
+    known = [name for name, _ in section.items()] if section else []
+    pipes = tuple(pipes)
+    for pipe in pipes:
+        if pipe.calibration is None:
+            continue
+        if pipe.calibration not in known:
+            problems.unknown(pipe.place("calibration"), "calibration", pipe.calibration, known)
+        what = _not_hardware(pipe)
+        if what:
+            problems.add(pipe.place("calibration"), f"the pipe '{pipe.name}' {what}", "no calibration here")
+    _check_all_or_none(pipes, problems)
+    return calibrations
+
+
+def _check_all_or_none(pipes: tuple[AnyPipeRecord, ...], problems: Problems) -> None:
+    """Check that a plugin that commands calibrated joints receives them calibrated, and vice versa."""
+    commands = [pipe for pipe in pipes if isinstance(pipe, ControllerRecord) and pipe.lower_level]
+    received = [pipe for pipe in pipes if isinstance(pipe, FeedbackRecord) and not _not_hardware(pipe)]
+    receives_calibrated = any(pipe.calibration for pipe in received)
+    if receives_calibrated or any(pipe.calibration for pipe in commands):
+        faulty = [pipe for pipe in commands if not pipe.calibration] + ([] if receives_calibrated else received)
+        for pipe in faulty:
+            what = f"the pipe '{pipe.name}' has no calibration, but others to and from the hardware have one"
+            problems.add(pipe.place(), what, "the key 'calibration' in all of them, or in none")
+
+
+def _check_names(calibration: CalibrationRecord, problems: Problems) -> None:
+    owners: dict[str, str] = {}
+    for joint, record in calibration.joints.items():
+        name = calibration.hardware(joint)
+        owner = owners.setdefault(name, joint)
+        if owner != joint:
+            what = f"the hardware's joint '{name}' stands for '{owner}' and for '{joint}'"
+            problems.add(record.place("name"), what, "a name of its own for each joint")
+
+
+def _not_hardware(pipe: AnyPipeRecord) -> str:
+    """Return why the other end of a pipe is not the robot's hardware; empty if it is."""
+    if not pipe.content.joints:
+        return "carries no joints"
+    if isinstance(pipe, ControllerRecord):
+        return "" if pipe.lower_level else "goes to other plugins"
+    return "" if pipe.function in ("state", "motor") else "carries references of other plugins"

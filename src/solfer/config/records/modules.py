@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from solfer.config.records.bounds import COUNT, DURATION, PATIENCE
+from solfer.config.records.bounds import COUNT, DURATION, PATIENCE, RATE
 from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareName
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord
@@ -148,6 +148,13 @@ class FeedbackChoice(Record):
 
     layer: str | None = Field(default=None, description="a named set of `feedbacks`")
     list: tuple[str, ...] | None = Field(default=None, description="the pipes, in the order in which they are read")
+
+
+class RobotHead(Record):
+    """Keys that all robot configurations share."""
+
+    name: str = Field(default="", description="name of the robot, top key of its actuators and contacts")
+    rate: float = Field(**RATE, description="rate of the control cycle [Hz], usually in the layer's file")
 
 
 class RobotRecord(Record):

@@ -4,11 +4,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from solfer.config.kinds.table import KINDS
-from solfer.config.loading.calibration import CalibrationRecord
-from solfer.config.loading.layering import ROOT
-from solfer.config.loading.reading import RobotHead
+from solfer.config.loading.layers import ROOT
+from solfer.config.records.calibration import CalibrationRecord
 from solfer.config.records.middlewares import SECTIONS
-from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
+from solfer.config.records.modules import MainRecord, ModuleRecord, RobotHead, RobotRecord, SharedRecord
 from solfer.config.records.pipes import CONTROLLER_ALIASES, ControllerRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord

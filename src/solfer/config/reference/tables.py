@@ -8,14 +8,13 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from solfer.config.kinds.table import KINDS
-from solfer.config.loading.calibration import CalibrationRecord
-from solfer.config.loading.reading import RobotHead
-from solfer.config.loading.rt_layer import ExecutorRecord, RtPluginsRecord
+from solfer.config.records.calibration import CalibrationRecord
 from solfer.config.records.live import is_live
 from solfer.config.records.middlewares import SECTIONS
-from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
+from solfer.config.records.modules import MainRecord, ModuleRecord, RobotHead, RobotRecord, SharedRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, KindRecords
 from solfer.config.records.record import Record
+from solfer.config.records.rt_layer import ExecutorRecord, RtPluginsRecord
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
 from solfer.config.reference.schema import given
 from solfer.config.yaml.nodes import shown

@@ -1,33 +1,34 @@
-"""Checks a whole main configuration: its grammar, the names of its robot, and a dry run of each plugin."""
+"""Checks a main configuration, or an RT layer: its grammar, names of its robot, and the generation of each plugin."""
 
 import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load, read
+from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load
 from solfer.config.loading.configuration import own_tags
-from solfer.config.loading.layering import ModulePlacement
-from solfer.config.yaml.files import is_file, opened
+from solfer.config.loading.layers import ModulePlacement
+from solfer.config.loading.lists import check_group, read_layer
+from solfer.config.records.middlewares import RT
+from solfer.config.yaml.files import opened
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.search import Folders
-from solfer.errors import SolferError, nearest, raise_all, repeats
-from solfer.model.actuators import ActuatorsRecord
-from solfer.plugins.generation.dry_run import UnknownComponent, dry_run
-from solfer.plugins.generation.generator import Generator
+from solfer.errors import SolferError, raise_all, repeats, singles
+from solfer.plugins.generation.dry_run import DryMiddleware
+from solfer.plugins.generation.generator import Generator, UnknownComponent
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.runners import note_runners
-from solfer.plugins.generation.sources import COMMAND_TOPIC, check_sources, sinks_of
+from solfer.plugins.generation.sources import check_topics, sinks_of
+from solfer.plugins.generation.together import SharedGenerator, find_generator
 from solfer.plugins.generation.unbuilt import importable_beside
-from solfer.plugins.shared.dry_run import dry_run_together
-from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
+from solfer.robot.file_checks import check_actuators, checked_files
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.plausibility import check_plausibility
-from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
-from solfer.robot.sources import is_robot_read, require_robot
+from solfer.robot.shipped import RobotFiles
 
-_WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
+_ASSUMED_RATE = 100.0
+"""Rate of a plugin whose own has a mistake [Hz]."""
 
 
 def check_file(  # noqa: PLR0913 for users: what replaces values of the file, by its name
@@ -73,24 +74,90 @@ def check_file(  # noqa: PLR0913 for users: what replaces values of the file, by
         placement=ModulePlacement(layer, shared),
     )
     if rate is not None:
-        _set_rate(report, rate)
-    _check_listed(report, registry)
+        for name, part in report.parts.items():
+            report.parts[name] = replace(part, configuration=part.configuration.at(rate))
+        for name, configuration in report.configurations.items():
+            report.configurations[name] = configuration.at(rate)
+    plugins = _PluginCheck(report, registry, robot)
+    plugins.check_listed()
     listed = [each for group in report.shared.values() for each in group.configurations]
     sinks = sinks_of((*(part.configuration for part in report.parts.values()), *listed))
     with importable_beside(os.fspath(file)):
-        absent = [
-            part
-            for part in report.parts.values()
-            if not _check_module(part, report, registry, robot=robot, plugin=plugin, sinks=sinks)
-        ]
+        absent = [part for part in report.parts.values() if not plugins.check(part, plugin, sinks)]
         for group in report.shared.values():
-            check_together(group.plugins, report, registry, robot=robot)
+            plugins.check_together(group.plugins)
     if middleware is None and layer is None:
         note_runners(report, registry.configuration)
     if absent:
         names = ", ".join(part.configuration.name for part in absent)
         what = f"the plugins of {names} are not available here, so that their own tags are not read"
         report.problems.inform(absent[0].configuration.tree.nearest(("modules",)).head, what)
+    return report
+
+
+def check_layer(
+    file: str | os.PathLike,
+    modules: Sequence[str] | None = None,
+    *,
+    search_paths: Folders = (),
+    system: str | None = None,
+    robot: RobotFiles | None = None,
+    registry: Registry | None = None,
+) -> CheckReport:
+    """Report all mistakes and warnings of the file of an RT layer, and of its plugins as they run in the layer.
+
+    Args:
+        file: The file of the layer.
+        modules: Names of the plugins' configurations to check; by default all that the layer lists.
+        search_paths: Folders to search for files that are not where the configuration expects them.
+        system: `SM` or `HW` instead of the main configuration's `system`.
+        robot: The robot that the names refer to; by default the one that the main configuration names.
+        registry: The plugins that there are; by default the built-in ones.
+    """
+    registry = registry or Registry()
+    report = CheckReport()
+    try:
+        layer = read_layer(file, registry.configuration)
+    except SolferError as error:
+        for each in singles([error]):
+            mark = Mark.read(each.where) or Mark(os.fspath(file), 1, 1)
+            report.problems.put(mark, each.at(str(mark)))
+        return report
+    report.problems.absorb(layer.problems)
+    names = tuple(entry.name for entry in layer.plugins)
+    for name in modules or ():
+        if name not in names:
+            report.problems.unknown(layer.record.place("plugins"), "plugin of the layer", name, names)
+    report.modules = tuple(name for name in names if modules is None or name in modules)
+    usable = list[SharedPlugin]()
+    for entry in layer.plugins:
+        if entry.name not in report.modules:
+            continue
+        found = check_file(
+            layer.file,
+            [entry.configuration],
+            search_paths=search_paths,
+            system=system,
+            robot=robot,
+            registry=registry,
+            plugin=entry.plugin,
+            middleware=RT.name,
+            layer=RT.layer,
+            rate=layer.executor.rate,
+            shared=entry.shared,
+        )
+        part = found.parts.get(entry.configuration)
+        if part is not None:
+            report.parts[entry.name] = part
+        if entry.plugin not in registry and (part is None or part.class_name is None):
+            report.problems.unknown(entry.mark, "plugin", entry.plugin, registry.known)
+        report.problems.absorb(found.problems)
+        for configuration in found.configurations.values():
+            usable.append(entry.loaded(configuration))
+            report.configurations[entry.name] = usable[-1].configuration
+    check_group(usable, names, "the RT layer", problems=report.problems)
+    with importable_beside(os.fspath(layer.file)):
+        _PluginCheck(report, registry, robot).check_together(usable, layer.start)
     return report
 
 
@@ -116,222 +183,126 @@ def load_checked(file: str | os.PathLike, name: str, plugin: str, **options: Any
         raise error from None
 
 
-def _set_rate(report: CheckReport, rate: float) -> None:
-    """Set the rate of all plugins [Hz]."""
-    for name, part in report.parts.items():
-        configuration = replace(part.configuration, rate=rate)
-        report.parts[name] = replace(part, configuration=configuration)
-        if name in report.configurations:
-            report.configurations[name] = configuration
-
-
-def check_together(
-    listed: Sequence[SharedPlugin],
-    report: CheckReport,
-    registry: Registry,
-    robot: RobotFiles | None = None,
-    start: Collection[str] | None = None,
-) -> None:
-    """Check what plugins that run in one process have to agree on: sources, topics, both ends of each, and commands.
+class _PluginCheck:
+    """Generates the plugins of a report, and notes in it what was not found before.
 
     Args:
-        listed: The plugins, in the order of their cycles.
-        report: Receives the mistakes.
+        report: What could be read of the configurations, and the mistakes so far.
         registry: The plugins that there are.
-        robot: The robot that the names refer to; by default the ones that the configurations name.
-        start: Names of those that start by themselves; None: all.
+        robot: The robot that the names refer to; None: the one that each configuration names.
     """
-    found = Problems()
-    files = {each.name: _files(each.configuration, found, robot) for each in listed}
-    known = {name: each for name, each in files.items() if each is not None}
-    if listed and len(known) == len(listed):
-        generators = [_generator_of(each, registry, report.problems, found=found) for each in listed]
-        whole = not report.errors and not found
-        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole=whole, start=start)
-        _put(errors, listed[0], report.problems, found=found)
-    report.problems.absorb(found)
 
+    def __init__(self, report: CheckReport, registry: Registry, robot: RobotFiles | None):
+        self._report = report
+        self._registry = registry
+        self._robot = robot
 
-def _generator_of(listed: SharedPlugin, registry: Registry, before: Problems, found: Problems) -> type[Generator]:
-    """Find the generator of a plugin of a list; only a mistake in its `class` has not been noted yet."""
-    try:
-        return find_generator(listed, registry)
-    except SolferError as error:
-        if listed.configuration.module.class_ is not None:
-            _put([error], listed, before, found=found)
-        return UnknownComponent
+    def check_listed(self) -> None:
+        """Check the names of the plugins that shared plugins list."""
+        for shared in self._report.shared.values():
+            for index, plugin in enumerate(shared.plugins):
+                if plugin.configuration.module.class_ is None and plugin.plugin not in self._registry:
+                    mark = shared.record.place("plugins", index)
+                    self._report.problems.unknown(mark, "plugin", plugin.plugin, self._registry.known)
 
+    def check(self, part: Part, plugin: str | None, sinks: frozenset[str]) -> bool:
+        """Check one module; return whether its component is there, or is reported.
 
-def _put(errors: Iterable[SolferError], listed: SharedPlugin, before: Problems, found: Problems) -> None:
-    """Note errors, in the list if they have no place; those that were noted before are left out."""
-    for error in errors:
-        if not repeats(error, (*before.errors, *found.errors)):
-            found.put(Mark.read(error.where) or listed.configuration.tree.head, error)
-
-
-def _check_listed(report: CheckReport, registry: Registry) -> None:
-    """Check the names of the plugins that shared plugins list."""
-    for shared in report.shared.values():
-        for index, plugin in enumerate(shared.plugins):
-            if plugin.configuration.module.class_ is None and plugin.plugin not in registry:
-                mark = shared.record.place("plugins", index)
-                report.problems.unknown(mark, "plugin", plugin.plugin, registry.known)
-
-
-def _check_module(
-    part: Part,
-    report: CheckReport,
-    registry: Registry,
-    robot: RobotFiles | None,
-    plugin: str | None,
-    sinks: frozenset[str],
-) -> bool:
-    """Check one module; return whether its component is there, or is reported."""
-    configuration = part.configuration
-    found = Problems()
-    whole = configuration.name in report.configurations
-    generator = _generator(part, report, registry, plugin=plugin, problems=found)
-    record = None if generator is None else generator.component.Tags
-    tags = None if record is None else _read_tags(configuration, record, report.problems, found=found)
-    if generator is not None and record is None and generator.known:
-        for _, tag in own_tags(part.module).items():
-            found.warn(tag.head, "has no effect: the component has no tags of its own")
-    files = _files(configuration, found, robot)
-    if files is not None:
-        names = files.names()
-        check_names(configuration, names, found, tags=tags, dofs=part.dofs)
-        check_calibrations(configuration.calibrations.values(), names, found)
-        used = {pipe.calibration for pipe in (*configuration.feedbacks, *configuration.controllers)}
-        calibrations = [record for name, record in configuration.calibrations.items() if name in used]
-        check_plausibility(files, (tags, *calibrations), found)
-    check_contacts(configuration, found)
-    check_sources(configuration, files, sinks, problems=found)
-    if files is None:
-        _check_actuators(configuration, found)
-    else:
-        _check_sinks(configuration, files, found)
-        errors = dry_run(part, generator or UnknownComponent, files, whole=whole and not found)
-        _note(errors, part, report.problems, found=found)
-    report.problems.absorb(found)
-    return generator is not None
-
-
-def _read_tags(configuration: Configuration, record: type[Record], before: Problems, found: Problems) -> Record | None:
-    """Read the component's own tags; an unknown key that is known to be another one, misspelt, is not noted again."""
-    problems = Problems()
-    tags = configuration.read_tags(record, problems)
-    for error in problems.errors:
-        if not repeats(error, before.errors):
-            found.put(Mark.read(error.where) or configuration.tree.head, error)
-    for notice in problems.notices:
-        found.warn(*notice)
-    return tags
-
-
-def _note(errors: Iterable[SolferError], part: Part, before: Problems, found: Problems) -> None:
-    """Note the errors of a dry run, at the module if they have no place; those that were noted before are left out."""
-    for error in errors:
-        if not repeats(error, (*before.errors, *found.errors)):
-            mark = Mark.read(error.where) or part.place()
-            found.put(mark, error.at(str(mark)))
-
-
-def _files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:
-    """Find the files of the robot; None if there are none, or if they are wrong."""
-    urdf = configuration.tree.nearest((configuration.section, "source", "urdf")).head
-    if _lacks_files(configuration):
-        return None
-    try:
-        files = robot or robot_files(configuration)
+        Args:
+            part: The module, as far as it could be read.
+            plugin: The plugin that runs it; None: one that its configuration is for.
+            sinks: Topics that the plugins of the file publish.
+        """
+        configuration = part.configuration
+        found = Problems()
+        generator = self._generator(part, plugin, found)
+        tags = None if generator is None else self._tags(part, generator, found)
+        files = checked_files(configuration, found, self._robot)
         if files is not None:
-            files.names()
-            return files
-    except SolferError as error:
-        problems.put(urdf, error.at(str(urdf)))
-        return None
-    if _check_robot(configuration, problems):
-        return None
-    name = configuration.tree.get("robot", "name")
-    close = nearest(str(name.value), robots_beside(configuration.file)) if name else ()
-    if name is not None and close:
-        problems.warn(name.mark, f"{_WITHOUT_ROBOT}; did you mean {' or '.join(close)}?")
-    else:
-        problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
-    return None
+            names = files.names()
+            check_names(configuration, names, found, tags=tags, dofs=part.dofs)
+            check_calibrations(configuration.calibrations.values(), names, found)
+            used = {pipe.calibration for pipe in (*configuration.feedbacks, *configuration.controllers)}
+            calibrations = [record for name, record in configuration.calibrations.items() if name in used]
+            check_plausibility(files, (tags, *calibrations), found)
+        check_contacts(configuration, found)
+        check_topics(configuration, files, sinks, problems=found)
+        if files is None:
+            check_actuators(configuration, found)
+        else:
+            whole = configuration.name in self._report.configurations and not found
+            outside = DryMiddleware(part.assumed(_ASSUMED_RATE), files, whole)
+            generation = (generator or UnknownComponent)(outside.configuration, outside)
+            self._note(generation.check(whole), part.place(), found)
+        self._report.problems.absorb(found)
+        return generator is not None
 
+    def check_together(self, listed: Sequence[SharedPlugin], start: Collection[str] | None = None) -> None:
+        """Check what plugins of one process have to agree on: sources, topics, both ends of each, and commands.
 
-def _lacks_files(configuration: Configuration) -> bool:
-    """Whether a file of the model or its groups is not there, which was reported when the configuration was read."""
-    sources = configuration.sources
-    named = (sources.urdf, sources.srdf) if sources is not None else ()
-    paths = [source.location for source in named if source is not None and source.location is not None]
-    return not all(is_file(path) for path in paths)
+        Args:
+            listed: The plugins, in the order of their cycles.
+            start: Names of those that start by themselves; None: all.
+        """
+        found = Problems()
+        files = {each.name: checked_files(each.configuration, found, self._robot) for each in listed}
+        if listed and all(files.values()):
+            generators = [self._listed_generator(each, found) for each in listed]
+            whole = not self._report.errors and not found
+            outside = {each.name: DryMiddleware(each.configuration, files[each.name], whole) for each in listed}
+            generation = SharedGenerator(
+                listed,
+                generators,
+                lambda each: outside[each.module.name],
+                known=lambda each: outside[each.module.name].configuration,
+            )
+            self._note(generation.check(whole, start), listed[0].configuration.tree.head, found)
+        self._report.problems.absorb(found)
 
+    def _generator(self, part: Part, plugin: str | None, found: Problems) -> type[Generator] | None:
+        """Find the generator of a module; None if its component is not available here, or not known, with a warning."""
+        name = part.configuration.name
+        entries = (entry for shared in self._report.shared.values() for entry in shared.plugins)
+        listed = [entry.plugin for entry in entries if entry.configuration.name == name]
+        known = [each for each in listed if each in self._registry]
+        plugins = (plugin,) if plugin else (*known, *self._registry.of_configuration(name))
+        runnable = [each for each in plugins if each in self._registry.names()]
+        if part.class_name is None and not runnable:
+            if plugins:
+                return None
+            found.warn(part.place(), f"no plugin is known for '{name}', so its own tags are not read")
+            return UnknownComponent
+        try:
+            return self._registry.find(runnable[0] if runnable else name, part.class_name, str(part.place("class")))
+        except SolferError as error:
+            found.put(part.place("class"), error)
+            return UnknownComponent
 
-def _check_robot(configuration: Configuration, problems: Problems) -> bool:
-    """Check that the files of actuators and contacts know the robot; return whether one does not."""
-    sources = configuration.sources
-    for source in (sources.actuators, sources.contacts) if sources is not None and is_robot_read(configuration) else ():
-        if source is not None and source.location is not None and is_file(source.location):
-            try:
-                require_robot(configuration, source.location)
-            except SolferError as error:
-                problems.put(source.place(), error.at(str(source.place())))
-                return True
-    return False
+    def _listed_generator(self, listed: SharedPlugin, found: Problems) -> type[Generator]:
+        """Find the generator of a plugin of a list; only a mistake in its `class` has not been noted yet."""
+        try:
+            return find_generator(listed, self._registry)
+        except SolferError as error:
+            if listed.configuration.module.class_ is not None:
+                self._note([error], listed.configuration.tree.head, found)
+            return UnknownComponent
 
-
-def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Problems) -> None:
-    """Warn of commands to a controller of the robot on a topic that it does not receive."""
-    known = {controller.name for controller in files.controllers}
-    for record in configuration.controllers:
-        if record.lower_level and record.leads_to in known and record.sink not in (None, COMMAND_TOPIC):
-            what = f"the controller '{record.leads_to}' receives '{record.leads_to}{COMMAND_TOPIC}', not"
-            problems.warn(record.place("sink"), f"{what} '{record.leads_to}{record.sink}'")
-
-
-def _check_actuators(configuration: Configuration, problems: Problems) -> None:
-    """Check that the file of the actuators knows the robot, whose joints are not known."""
-    source = configuration.sources.actuators if configuration.sources else None
-    robot = configuration.robot
-    if source is None or source.file is None or robot is None or not robot.actuators.read:
-        return
-    if not is_robot_read(configuration):
-        return
-    try:
-        require_robot(configuration, source.location)
-        read(source.location, ActuatorsRecord, (robot.name,))
-    except SolferError as error:
-        mark = source.place()
-        problems.put(mark, error.at(str(mark)))
-
-
-def _generator(
-    part: Part, report: CheckReport, registry: Registry, plugin: str | None, problems: Problems
-) -> type[Generator] | None:
-    """Find the generator of a module; None if its component is not available here, or not known, with a warning."""
-    name = part.configuration.name
-    class_name = part.class_name
-    plugins = (plugin,) if plugin else _plugins(name, report, registry)
-    runnable = [each for each in plugins if each in registry.names()]
-    if class_name is None and not runnable:
-        if plugins:
+    def _tags(self, part: Part, generator: type[Generator], found: Problems) -> Record | None:
+        """Read the component's own tags; a key that is known to be another one, misspelt, is not noted again."""
+        if generator.component.Tags is None:
+            for _, tag in own_tags(part.module).items() if generator.known else ():
+                found.warn(tag.head, "has no effect: the component has no tags of its own")
             return None
-        problems.warn(part.place(), f"no plugin is known for '{name}', so its own tags are not read")
-        return UnknownComponent
-    try:
-        return registry.find(runnable[0] if runnable else name, class_name, str(part.place("class")))
-    except SolferError as error:
-        problems.put(part.place("class"), error)
-        return UnknownComponent
+        problems = Problems()
+        tags: Record | None = part.configuration.read_tags(generator.component.Tags, problems)
+        self._note(problems.errors, part.configuration.tree.head, found)
+        for notice in problems.notices:
+            found.warn(*notice)
+        return tags
 
-
-def _plugins(name: str, report: CheckReport, registry: Registry) -> tuple[str, ...]:
-    """Find the known plugins that run the configuration `name`: by default, or because a shared plugin lists both."""
-    listed = [
-        entry.plugin
-        for shared in report.shared.values()
-        for entry in shared.plugins
-        if entry.configuration.name == name and entry.plugin in registry
-    ]
-    return tuple(dict.fromkeys((*listed, *registry.of_configuration(name))))
+    def _note(self, errors: Iterable[SolferError], mark: Mark, found: Problems) -> None:
+        """Note errors, at `mark` if they have no place; those that were noted before are left out."""
+        for error in errors:
+            if not repeats(error, (*self._report.problems.errors, *found.errors)):
+                place = Mark.read(error.where) or mark
+                found.put(place, error.at(str(place)))

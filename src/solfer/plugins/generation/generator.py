@@ -16,7 +16,6 @@ from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.generation.config_service import answer_at_once, configuration_service
 from solfer.plugins.generation.runners import start_line
-from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.command_gate import CommandGate
@@ -28,6 +27,7 @@ from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin, PluginParts
 from solfer.plugins.plugin_log import documents_of
 from solfer.plugins.requests import RequestNotes
+from solfer.plugins.sharing.robots import Sharing
 from solfer.plugins.tuning import Tuning
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
@@ -76,6 +76,13 @@ class Generator:
         plugin = self.attempt()
         raise_all(self.faults)
         return cast(Plugin, plugin)
+
+    def check(self, whole: bool = True) -> list[SolferError]:
+        """Build everything as `attempt` does, release it, and return the faults."""
+        plugin = self.attempt(whole)
+        if plugin is not None:
+            plugin.close()
+        return self.faults
 
     def attempt(self, whole: bool = True) -> Plugin | None:
         """Build everything as far as possible; what cannot be made is noted in `faults`, and then there is no plugin.
@@ -150,10 +157,10 @@ class Generator:
 
     def make_robot(self) -> Robot:
         """Build the Robot that the configuration describes."""
-        if self._shared is None:
-            return build(self.configuration, self.middleware, faults=self.faults)
-        robot = build(self.configuration, self.middleware, self._shared.first, faults=self.faults)
-        self._shared.join(robot)
+        shared = self._shared
+        robot = build(self.configuration, self.middleware, shared.first if shared else None, faults=self.faults)
+        if shared is not None and shared.first is None:
+            shared.first = robot
         return robot
 
     def make_component(self, robot: Robot) -> Component:
@@ -438,6 +445,12 @@ class Generator:
                 where=module.where(),
                 expected="a component without mistakes in its own code",
             ) from error
+
+
+class UnknownComponent(Generator):
+    """Generates all of a plugin but its component, which is not there, or cannot be used."""
+
+    known = False
 
 
 def generate(

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from solfer.config import CheckReport, Configuration
-from solfer.config.loading.rt_layer import is_layer, read_layer
-from solfer.config.loading.shared import Naming
+from solfer.config.loading.lists import Naming, is_layer, read_layer
 from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE
 from solfer.config.yaml.files import YamlFile
 from solfer.config.yaml.nodes import Mark
@@ -136,20 +135,13 @@ def _foreign(configuration: Configuration) -> Foreign | None:
 
 
 def _command(configuration: Configuration, default: Naming) -> str:
-    """Return the command that runs a configuration in an RT layer; with the file of the layer if that is found."""
+    """Return the command that runs a configuration in an RT layer, with the layer's file if one beside it lists it."""
     name = configuration.name
-    found = next(_layers_of(configuration, default), None)
-    if found is not None:
-        return f"`rosrun solfer xbot {shlex.quote(found)}`"
-    return f"`rosrun solfer xbot LAYER` with a file LAYER that lists '{name}' in its XBotRTPlugins"
-
-
-def _layers_of(configuration: Configuration, default: Naming) -> Iterator[str]:
-    """Yield the files of RT layers beside a main configuration that list a configuration of it."""
     main = Path(configuration.file)
     for path in sorted(main.parent.glob("*.yaml")):
-        if path.is_file() and is_layer(path) and _lists(path, main, configuration.name, default=default):
-            yield os.fspath(path)
+        if path.is_file() and is_layer(path) and _lists(path, main, name, default=default):
+            return f"`rosrun solfer xbot {shlex.quote(os.fspath(path))}`"
+    return f"`rosrun solfer xbot LAYER` with a file LAYER that lists '{name}' in its XBotRTPlugins"
 
 
 def _lists(path: Path, main: Path, name: str, default: Naming) -> bool:

@@ -1,4 +1,4 @@
-"""Finds feedbacks of a topic without a publisher whose name is close to that of one with a publisher."""
+"""Checks topics: finds feedbacks whose topic has no publisher and is close to one that has, and commands to nothing."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -23,12 +23,12 @@ def sinks_of(configurations: Iterable[Configuration]) -> frozenset[str]:
     return frozenset(topic.lstrip("/") for each in configurations for topic in (*_used(each), *_listed(each)))
 
 
-def check_sources(
+def check_topics(
     configuration: Configuration, files: RobotFiles | None, sinks: frozenset[str], problems: Problems
 ) -> None:
     """Warn of sources that are published neither by the simulated robot nor by a plugin, if they may be misspelt.
 
-    Other sources may be published by nodes outside.
+    Other sources may be published by nodes outside. Commands have to be on the topics of the robot's controllers.
 
     Args:
         configuration: One module; parts of it may be missing because of other mistakes.
@@ -47,6 +47,18 @@ def check_sources(
         if close and mark is not None:
             what = f"neither the simulated robot nor a plugin of this file publishes '{record.source}'"
             problems.warn(mark, f"{what}; did you mean {' or '.join(close)}?")
+    if files is not None:
+        _check_sinks(configuration, files, problems)
+
+
+def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Problems) -> None:
+    """Warn of commands to a controller of the robot on a topic that it does not receive."""
+    known = {controller.name for controller in files.controllers}
+    for record in configuration.controllers:
+        mark = record.place("sink")
+        if mark and record.lower_level and record.leads_to in known and record.sink not in (None, COMMAND_TOPIC):
+            what = f"the controller '{record.leads_to}' receives '{record.leads_to}{COMMAND_TOPIC}', not"
+            problems.warn(mark, f"{what} '{record.leads_to}{record.sink}'")
 
 
 def _spelling(topic: str) -> str:

@@ -14,10 +14,9 @@ from solfer.config import load_shared
 from solfer.errors import ClaimRefused, SolferError, singles
 from solfer.interfaces.geometry import Header, Vector
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins import Registry, check_file
+from solfer.plugins import Registry, check_file, generate_shared
+from solfer.plugins.generation.check import check_layer
 from solfer.plugins.generation.dry_run import DryMiddleware
-from solfer.plugins.generation.layer_check import check_layer
-from solfer.plugins.shared import generate_shared
 from solfer.robot.shipped import robot_files
 
 

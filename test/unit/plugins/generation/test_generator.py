@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,10 +14,13 @@ from support.walk.files import FILES, changed
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
 from solfer.config.loading.configuration import Configuration
+from solfer.errors import SolferError, singles
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, generate
+from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.generator import log_start
-from solfer.plugins.plugin import PluginState
+from solfer.plugins.plugin import Plugin, PluginState
+from solfer.robot.shipped import robot_files
 
 HEARD = "heard", "sensor_msgs/JointState"
 FEEDBACK, CONTROLLER = "main/mwoibn/feedback/", "main/mwoibn/controller/"
@@ -82,6 +86,22 @@ def test_warnings_of_tags_are_logged_at_the_start(repository, monkeypatch, caplo
     monkeypatch.setattr(Configuration, "read_tags", read_tags)
     log_start(configuration, SimpleNamespace(component=component))
     assert re.search(r"centauro.yaml:\d+:\d+: .* a tag of WheeledMotionTags is no more", caplog.text)
+
+
+def test_a_check_finds_what_a_start_refuses(repository, monkeypatch):
+    """Both generate in one way: what a start raises the check returns, and it releases what it could make."""
+    configuration = load(repository / "config/centauro.yaml", "joint_states")
+    files = robot_files(configuration)
+    generator = Registry().find("joint_states")
+    released = []
+    monkeypatch.setattr(Plugin, "close", lambda plugin: released.append(plugin.component.name))
+    outside = DryMiddleware(configuration, files)
+    assert generator(outside.configuration, outside).check() == [] and released == ["joint_states"]
+    blind = replace(configuration, feedbacks=())
+    with pytest.raises(SolferError, match="commands a robot but receives no state of it") as refused:
+        generate(blind, DryMiddleware(blind, files), generator)
+    faults = generator(blind, DryMiddleware(blind, files)).check()
+    assert list(map(str, faults)) == list(map(str, singles([refused.value]))) and len(released) == 1
 
 
 @pytest.mark.slow

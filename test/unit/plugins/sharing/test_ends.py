@@ -9,9 +9,9 @@ from support.unit.contract import ALL, NAMED
 
 from solfer.errors import SolferError
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins.shared.ends import check_ends
-from solfer.plugins.shared.member import SpaceMember
-from solfer.plugins.shared.space import SharedSpace, SharedTopic
+from solfer.plugins.sharing.ends import check_ends
+from solfer.plugins.sharing.member import SpaceMember
+from solfer.plugins.sharing.space import SharedSpace, SharedTopic
 from solfer.transport import MessageStatus
 
 every_pipe = pytest.mark.parametrize("case", ALL.values(), ids=ALL)

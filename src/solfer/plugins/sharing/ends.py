@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from solfer.config import Configuration
 from solfer.errors import SolferError, raise_all
 from solfer.pipes import CommandPipe, FeedbackPipe
-from solfer.plugins.shared.space import SharedTopic, SpaceChannel
+from solfer.plugins.sharing.space import SharedTopic, SpaceChannel
 from solfer.transport.messages import canonical
 
 
@@ -42,21 +42,14 @@ def check_ends(feedbacks: Iterable[tuple[FeedbackPipe, str]], commands: Sequence
     errors: list[SolferError] = []
     for pipe, where in feedbacks:
         channel = getattr(pipe.reader, "channel", None)
-        if isinstance(channel, SpaceChannel):
-            try:
-                _check_end(pipe, channel, senders.get(id(channel)))
-            except SolferError as error:
-                errors.append(_located(error, pipe, channel.publication, where=where))
+        if not isinstance(channel, SpaceChannel) or channel.message is None:
+            continue
+        sender = senders.get(id(channel))
+        try:
+            pipe.check_fit(channel.message, "" if sender is None else sender.quantity)
+        except SolferError as error:
+            topic = channel.publication
+            sent = ", ".join(filter(None, (topic.topic, topic.where)))
+            error.what = f"feedback '{pipe.name}' does not fit what '{topic.component}' sends ({sent}): {error.what}"
+            errors.append(error.at(where))
     raise_all(errors)
-
-
-def _check_end(pipe: FeedbackPipe, channel: SpaceChannel, sender: CommandPipe | None) -> None:
-    if channel.message is not None:
-        pipe.check_fit(channel.message, "" if sender is None else sender.quantity)
-
-
-def _located(error: SolferError, pipe: FeedbackPipe, publication: SharedTopic, where: str) -> SolferError:
-    """Add both ends to an error of a pipe that does not fit."""
-    sent = ", ".join(filter(None, (publication.topic, publication.where)))
-    error.what = f"feedback '{pipe.name}' does not fit what '{publication.component}' sends ({sent}): {error.what}"
-    return error.at(where)

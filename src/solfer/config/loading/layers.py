@@ -61,6 +61,7 @@ class Layers:
         over: What is laid over all files in the end; None: nothing.
 
     Attributes:
+        file: Path of the main configuration.
         main: The value of the main file's root key.
         names: Names of its modules.
 
@@ -85,7 +86,7 @@ class Layers:
                 written = self.main.get(key) or self.main
                 self.main = _with(self.main, (key,), replace(written, value=value))
         self.names = tuple(name for name, _ in _modules(self.main).items())
-        self._file = os.fspath(file)
+        self.file = os.fspath(file)
         self._folders = tuple(folders)
         self._read: dict[str, tuple[YamlNode | None, Problems]] = {}
         self._last = over
@@ -161,7 +162,7 @@ class Layers:
         path = None if record is None else location_of(record, problems)
         if path is None:
             return None
-        if os.path.samefile(path, self._file):
+        if os.path.samefile(path, self.file):
             problems.add(named.mark, "the main file cannot be laid over itself", "another file")
             return None
         if path not in self._read:

@@ -4,7 +4,7 @@ import pytest
 from support.plugins.fleet import Fleet, loaded, tree
 
 from solfer.errors import PipeError, SolferErrors
-from solfer.plugins.generation.robot_groups import apart, conflicts, robot_groups, writing_of
+from solfer.plugins.sharing.groups import apart, conflicts, robot_groups, writing_of
 
 NAMES = ("first", "second")
 

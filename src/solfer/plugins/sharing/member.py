@@ -1,13 +1,13 @@
 """The middleware of one component of a shared plugin: the shared space first, then that of the process."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
 from solfer.interfaces.declaration import Service
 from solfer.pipes.sharing.local_topic import LocalReader, LocalWriter
 from solfer.pipes.sharing.others_reader import OthersReader
-from solfer.plugins.shared.space import SharedSpace, SharedTopic
+from solfer.plugins.sharing.space import SharedSpace, SharedTopic
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import TYPES, canonical
@@ -83,7 +83,7 @@ class SpaceMember(Middleware):
             return LocalReader(topic, channel, self.now)
         outside = self._outside.reader(topic, message, kept)
         own = self._space.published_by(self.component, resolved, message)
-        return outside if own is None else OthersReader(outside, self._senders())
+        return outside if own is None else OthersReader(outside, (self._outside.name,))
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
         """See `Middleware.queue`; pipes have none, so that the shared space has none either."""
@@ -158,6 +158,3 @@ class SpaceMember(Middleware):
 
     def close(self) -> None:
         """See `Middleware.close`: the process closes its own."""
-
-    def _senders(self) -> Collection[str]:
-        return (self._outside.name,)

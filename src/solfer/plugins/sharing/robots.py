@@ -12,7 +12,7 @@ from solfer.config.kinds.contact import ContactTags
 from solfer.pipes import CommandPipe, FeedbackPipe, PipeContext, StateFeedbackPipe, factory
 from solfer.pipes.sharing.cached_feedback import CachedFeedback, CycleCount
 from solfer.pipes.sharing.local_topic import LocalFeedbackPipe, LocalReader, LocalTopic, LocalWriter
-from solfer.plugins.generation.robot_groups import (
+from solfer.plugins.sharing.groups import (
     MeasuredSources,
     Number,
     Writing,
@@ -47,10 +47,6 @@ class SharedRobot:
         self._group, self._turns, self._sources = group, turns, MeasuredSources(group)
         self._read: list[tuple[dict[str, Any], CachedFeedback]] = []
         self._written: dict[Writing, LocalTopic] = {}
-
-    def join(self, robot: Robot) -> None:
-        """Add the Robot of a plugin: the first one, or a companion of it."""
-        self.first = self.first or robot
 
     def feedback(self, record: FeedbackRecord, configuration: Configuration, context: PipeContext) -> FeedbackPipe:
         """Make a plugin's pipe for a feedback that measures the Robot; see `factory.feedback`.

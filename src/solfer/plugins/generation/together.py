@@ -5,19 +5,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from solfer.config import Configuration
-from solfer.config.loading.shared import SharedPlugin
+from solfer.config.loading.lists import SharedPlugin
 from solfer.config.records.modules import SharedRecord
 from solfer.errors import SolferError, raise_all, repeats, singles
 from solfer.pipes import CommandPipe
 from solfer.plugins.generation.generator import Generator, log_start
 from solfer.plugins.generation.registry import Registry
-from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.life.budget import BudgetRules
 from solfer.plugins.life.switchboard import find_conflicts
 from solfer.plugins.plugin import Plugin
-from solfer.plugins.shared.ends import check_ends, publications
-from solfer.plugins.shared.member import SpaceMember
-from solfer.plugins.shared.space import SharedSpace, SharedTopic
+from solfer.plugins.sharing.ends import check_ends, publications
+from solfer.plugins.sharing.member import SpaceMember
+from solfer.plugins.sharing.robots import Sharing
+from solfer.plugins.sharing.space import SharedSpace, SharedTopic
 from solfer.transport import Middleware
 
 ONE_COMMANDS = (
@@ -73,6 +73,13 @@ class SharedGenerator:
         self._outside = [middleware_of(each.configuration) for each in listed]
         self.spaces = self._make_spaces()
         self.sharing = Sharing([each.configuration for each in listed], [each.group for each in listed])
+
+    def check(self, whole: bool = True, start: Collection[str] | None = None) -> list[SolferError]:
+        """Make all of them as `attempt` does, release them, and return the faults."""
+        for plugin in self.attempt(whole, start):
+            if plugin is not None:
+                plugin.close()
+        return self.faults
 
     def attempt(self, whole: bool = True, start: Collection[str] | None = None) -> list[Plugin | None]:
         """Make all of them in their order; None for one that cannot be made.

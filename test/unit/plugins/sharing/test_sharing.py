@@ -8,7 +8,7 @@ from support.plugins.fleet import JOINTS, SRDF, Fleet, loaded, still, tree
 from support.unit.cart import URDF
 
 from solfer.plugins import PluginState, Sharing, check_file
-from solfer.plugins.generation.robot_groups import Writing
+from solfer.plugins.sharing.groups import Writing
 
 NAMES = ("first", "second", "third")
 

@@ -6,8 +6,8 @@ from numpy.testing import assert_array_equal
 
 from solfer.errors import PipeError, SolferErrors
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins.shared.member import SpaceMember
-from solfer.plugins.shared.space import SharedSpace, SharedTopic
+from solfer.plugins.sharing.member import SpaceMember
+from solfer.plugins.sharing.space import SharedSpace, SharedTopic
 from solfer.transport import MessageStatus
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
