@@ -27,8 +27,8 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
 from solfer.supervision import supervise
+from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CONFIG = REPOSITORY / "config"

@@ -17,9 +17,9 @@ from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import Interruptions
-from solfer.realtime.telemetry.black_box import BlackBox
-from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.statistics_memory import EXECUTOR, LoopCount, LoopTime, RuntimeStatistics
+from solfer.telemetry.black_box import BlackBox
+from solfer.telemetry.kernel import count_durations
+from solfer.telemetry.statistics import EXECUTOR, LoopCount, LoopTime, RuntimeStatistics
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.lower_level import Answer, answered

@@ -13,7 +13,6 @@ from solfer.pipes.joint.pipes import JointCommandPipe
 from solfer.plugins.generation.dry_run import known_without_robot
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.plugin import Plugin
-from solfer.plugins.plugin_log import PluginLog
 from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
 from solfer.replay.feedback import RecordedFeedbackPipe
@@ -21,6 +20,7 @@ from solfer.replay.generator import RecordedClaim, RecordedTime, replaying
 from solfer.replay.middleware import ReplayMiddleware
 from solfer.replay.rows import LIFE, RecordedRows
 from solfer.robot.shipped import RobotFiles
+from solfer.telemetry.plugin_log import PluginLog
 from solfer.transport.plugin_state import PluginState
 
 STOPPED = PluginState.STOPPED

@@ -13,10 +13,10 @@ import pytest
 from solfer.cli.main import main
 from solfer.errors import RecordingError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.recordings import FileRecorder, place_beside
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
+from solfer.telemetry.recorder import Recorder
+from solfer.telemetry.recordings import FileRecorder, place_beside
 
 WAIT = 30.0  # [s]
 

@@ -15,8 +15,8 @@ from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
+from solfer.telemetry.kernel import count_durations
+from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 from solfer.transport.health import Health
 
 

@@ -16,9 +16,9 @@ from solfer.plugins.generation.registry import load_class
 from solfer.plugins.generation.robot_groups import _two_sources
 from solfer.plugins.life.switchboard import find_conflicts
 from solfer.plugins.outputs.outputs import _refuse
-from solfer.plugins.plugin_log import _declared
 from solfer.plugins.shared.space import SharedTopic, _rivals
 from solfer.robot.shipped import robot_files
+from solfer.telemetry.plugin_log import _declared
 
 
 def refusal(call):

@@ -21,11 +21,11 @@ def run(options: argparse.Namespace) -> int:
     """
     from solfer.cli.columns import aligned
     from solfer.cli.tables.scenario import ScenarioTrace
-    from solfer.recording.pictures import canvas
+    from solfer.recording.review import check_suffix, save
     from solfer.scenarios import read_scenario
 
     if options.plot is not None:
-        canvas.check_suffix(options.plot)
+        check_suffix(options.plot)
     trace = ScenarioTrace(read_scenario(options.file))
     for line in aligned(trace.rows()):
         print(line)
@@ -33,6 +33,6 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None:
         from solfer.cli.scenario_page import scenario_page
 
-        canvas.save([("scenario", scenario_page(trace))], options.plot)
+        save([("scenario", scenario_page(trace))], options.plot)
         print(options.plot)
     return 0

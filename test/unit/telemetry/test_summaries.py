@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from solfer.plugins import PluginState
-from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.health import layer_report, plugin_report
-from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
-from solfer.realtime.telemetry.summaries import StatisticsReader
+from solfer.realtime.emergency_stop import EmergencyStopLatch, stopped
+from solfer.telemetry.kernel import count_durations
+from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
+from solfer.telemetry.summaries import StatisticsReader, layer_report, plugin_report
 from solfer.transport.health import Health
 
 STAGES = ("read", "component", "write")
@@ -24,7 +23,7 @@ def statistics(tmp_path):
 
 @pytest.fixture
 def observer(statistics, tmp_path):
-    return StatisticsReader(tmp_path)
+    return StatisticsReader(tmp_path, stopped)
 
 
 def cycle(statistics, count=1, **times):
@@ -40,9 +39,9 @@ def cycle(statistics, count=1, **times):
 
 
 def test_without_a_layer_there_is_nothing_to_see(tmp_path):
-    assert StatisticsReader(tmp_path).look() is None
+    assert StatisticsReader(tmp_path, stopped).look() is None
     statistics = RuntimeStatistics.create(tmp_path, 500.0, ["arm"], STAGES)
-    observer = StatisticsReader(tmp_path)
+    observer = StatisticsReader(tmp_path, stopped)
     assert observer.look() is not None
     statistics.close()
     assert observer.look() is None

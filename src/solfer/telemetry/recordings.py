@@ -17,9 +17,8 @@ from solfer.errors import MiddlewareError, RecordingError, UnknownName
 from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.lock import locked
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
-from solfer.realtime.telemetry.drain import RecordDrain
-from solfer.realtime.telemetry.recorder import RECORDER_FILE
-from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.drain import RecordDrain, writer_of
+from solfer.telemetry.rows import RECORDER_FILE
 
 logger = logging.getLogger(__name__)
 
@@ -128,11 +127,10 @@ def write_kept(folder: Path, target: Path) -> list[Path]:
     files = []
     for place in sorted(path.parent for path in folder.rglob(RECORDER_FILE)):
         drain = RecordDrain(place)
-        attached = {name: text.encode() for name, text in drain.layout.attachments.items()}
         target.mkdir(parents=True, exist_ok=True)
         files.append(target / f"{place.name}.mcap")
-        with closing(RecordingWriter(files[-1], attached, drain.layout.metadata)) as writer:
-            drain.into(writer).fill()
+        with closing(writer_of(files[-1], [drain])) as writer:
+            drain.fill()
             writer.finish(drain.lost)
     return files
 

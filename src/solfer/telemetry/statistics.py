@@ -3,6 +3,7 @@
 import enum
 import json
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ import numpy as np
 from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.realtime.namespaces import STATISTICS
-from solfer.realtime.telemetry.histograms import HISTOGRAM_WORDS, Histograms
+from solfer.telemetry import STATISTICS
+from solfer.telemetry.histograms import HISTOGRAM_WORDS, Histograms
 from solfer.transport.plugin_state import PluginState
 
 EXECUTOR = "xbotcore"
@@ -81,17 +82,15 @@ class RuntimeStatistics:
         self.rate = rate
         self.plugins = tuple(plugins)
         self.stages = tuple(stages)
-        words = len(LoopCount) + STATISTICS_WORDS * len(self.plugins)
         rows = len(LOOP_HISTOGRAMS) + len(self.stages) * len(self.plugins)
-        self.size = 8 * words + 8 * rows * (HISTOGRAM_WORDS + 1) + TEXT_BYTES * (1 + len(self.plugins))
+        words = (len(LoopCount), STATISTICS_WORDS * len(self.plugins), HISTOGRAM_WORDS * rows, rows)
+        ends = [8 * end for end in accumulate(words)]
+        self.size = ends[-1] + TEXT_BYTES * (1 + len(self.plugins))
         data = memory if memory is not None else memoryview(bytearray(self.size))
-        self.counts = data[: 8 * len(LoopCount)].cast("q")
-        self._lives = data[8 * len(LoopCount) : 8 * words].cast("q")
-        self.histograms = Histograms(
-            np.frombuffer(data[8 * words : 8 * (words + rows * HISTOGRAM_WORDS)], dtype=np.int64)
-        )
-        self.skips = data[8 * (words + rows * HISTOGRAM_WORDS) : 8 * (words + rows * (HISTOGRAM_WORDS + 1))].cast("q")
-        self._texts = data[8 * (words + rows * (HISTOGRAM_WORDS + 1)) : self.size]
+        parts = [data[end - 8 * size : end].cast("q") for end, size in zip(ends, words, strict=True)]
+        self.counts, self._lives, histograms, self.skips = parts
+        self.histograms = Histograms(np.frombuffer(histograms, dtype=np.int64))
+        self._texts = data[ends[-1] : self.size]
         self._segment: Segment | None = None
 
     @classmethod
@@ -102,10 +101,7 @@ class RuntimeStatistics:
             MiddlewareError: Another executor owns them, or the memory cannot be made.
         """
         layout = json.dumps({"rate": rate, "plugins": list(plugins), "stages": list(stages)}).encode()
-        segment = Segment.create(folder / STATISTICS, STATISTICS, layout, size=cls(rate, plugins, stages).size)
-        statistics = cls(rate, plugins, stages, memory=segment.data)
-        statistics._segment = segment
-        return statistics
+        return cls._in(Segment.create(folder / STATISTICS, STATISTICS, layout, size=cls(rate, plugins, stages).size))
 
     @classmethod
     def attach(cls, folder: Path) -> "RuntimeStatistics":
@@ -115,13 +111,16 @@ class RuntimeStatistics:
             MiddlewareError: No executor runs in that namespace.
         """
         try:
-            segment = Segment.attach(folder / STATISTICS, STATISTICS)
+            return cls._in(Segment.attach(folder / STATISTICS, STATISTICS))
         except MiddlewareError as error:
             raise MiddlewareError(
                 f"no RT layer to look at: {error.what}",
                 where=str(folder / STATISTICS),
                 expected="`rosrun solfer xbot`, and its namespace",
             ) from error
+
+    @classmethod
+    def _in(cls, segment: Segment) -> "RuntimeStatistics":
         statistics = cls(**json.loads(segment.layout), memory=segment.data)
         statistics._segment = segment
         return statistics
@@ -150,42 +149,41 @@ class RuntimeStatistics:
         """Return the row of a stage of a plugin, by their indices."""
         return len(LOOP_HISTOGRAMS) + plugin * len(self.stages) + stage
 
-    def life(self, plugin: int, word: PluginCount) -> int:
-        """Return a word of a plugin."""
-        return self._lives[plugin * STATISTICS_WORDS + word]
+    def life(self, plugin: int) -> memoryview:
+        """Return the words of a plugin: by `PluginCount`, then those of COMPUTED."""
+        return self._lives[plugin * STATISTICS_WORDS : (plugin + 1) * STATISTICS_WORDS]
 
     def state(self, plugin: int) -> PluginState:
         """Return the state of a plugin's life."""
-        return PluginState(self.life(plugin, PluginCount.STATE))
-
-    def put_life(self, plugin: int, state: PluginState, starts: int, aborts: int, over_budget: int) -> None:
-        """Set the words of a plugin."""
-        first = plugin * STATISTICS_WORDS
-        for word, value in zip(PluginCount, (state, starts, aborts, over_budget), strict=True):
-            self._lives[first + word] = value
+        return PluginState(self.life(plugin)[PluginCount.STATE])
 
     def computed(self, plugin: int) -> dict[str, int]:
         """Return how often each of COMPUTED was computed for a plugin's Robot."""
-        first = plugin * STATISTICS_WORDS + len(PluginCount)
-        return dict(zip(COMPUTED, self._lives[first : first + len(COMPUTED)], strict=True))
+        return dict(zip(COMPUTED, self.life(plugin)[len(PluginCount) :], strict=True))
+
+    def put_life(self, plugin: int, state: PluginState, starts: int, aborts: int, over_budget: int) -> None:
+        """Set the words of a plugin."""
+        life = self.life(plugin)
+        for word, value in zip(PluginCount, (state, starts, aborts, over_budget), strict=True):
+            life[word] = value
 
     def put_computed(self, plugin: int, counts: Mapping[str, int]) -> None:
         """Set how often each of COMPUTED was computed for a plugin's Robot; what is not among `counts` stays."""
-        first = plugin * STATISTICS_WORDS + len(PluginCount)
-        for place, name in enumerate(COMPUTED, first):
-            self._lives[place] = counts.get(name, self._lives[place])
+        life = self.life(plugin)
+        for place, name in enumerate(COMPUTED, len(PluginCount)):
+            life[place] = counts.get(name, life[place])
 
     def text(self, plugin: int | None = None) -> str:
         """Return the reason of a plugin's state; None: the text of the loop, its scheduling."""
-        place = 0 if plugin is None else 1 + plugin
-        return bytes(self._texts[place * TEXT_BYTES : (place + 1) * TEXT_BYTES]).rstrip(b"\0").decode(errors="replace")
+        return bytes(self._text(plugin)).rstrip(b"\0").decode(errors="replace")
 
     def put_text(self, text: str, plugin: int | None = None) -> None:
         """Set a text; it is cut off at TEXT bytes."""
+        self._text(plugin)[:] = text.encode(errors="replace")[:TEXT_BYTES].ljust(TEXT_BYTES, b"\0")
+
+    def _text(self, plugin: int | None) -> memoryview:
         place = 0 if plugin is None else 1 + plugin
-        self._texts[place * TEXT_BYTES : (place + 1) * TEXT_BYTES] = text.encode(errors="replace")[:TEXT_BYTES].ljust(
-            TEXT_BYTES, b"\0"
-        )
+        return self._texts[place * TEXT_BYTES : (place + 1) * TEXT_BYTES]
 
     def close(self) -> None:
         """Release the memory."""

@@ -1,15 +1,12 @@
 """What is recorded of a plugin: its pipes, its States, times and counts, and what its component declares."""
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from typing import cast
 
 import numpy as np
 
-from solfer.config import Configuration
 from solfer.config.kinds.point import POINT_MESSAGES
-from solfer.errors import ComponentError, SolferError, UnknownName, located
+from solfer.errors import ComponentError, SolferError, located
 from solfer.interfaces.port import Port
 from solfer.model import State
 from solfer.model.urdf.scalar_joints import BASE_DOFS
@@ -20,18 +17,18 @@ from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.plugin import Plugin
 from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
-from solfer.recording.log import Logger, LogSource, RunDocuments, with_units
+from solfer.recording.log import Logger, LogSource, with_units
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND
 from solfer.robot import Robot
-from solfer.transport import Middleware
 from solfer.transport.messages import BodyMessage, JointMessage, PointsMessage, VectorMessage, WrenchMessage
-from solfer.transport.middleware import SEED
 
 NANOSECOND = 1e-9
 """Unit of the times of stages [s]."""
 
 _STATES = {"position": "position", "velocity": "velocity", "effort": "torque"}
 """Fields of a message of joints, and the interfaces of a State that they carry."""
+
+_WRENCH = "geometry_msgs/WrenchStamped"
 
 _UNITS = {"velocity": "m/s", "acceleration": "m/s2", "force": "N", "torque": "Nm"}
 """Units of the quantities whose message does not contain them."""
@@ -121,7 +118,7 @@ class PluginLog:
                 log.add(each.field, each.values, names, _units(robot, names, each.field), kind=kind)
         elif isinstance(pipe, ContactFeedbackPipe):
             for name, wrench in pipe.wrenches.items():
-                _add_wrench(log, name, wrench, frame=pipe.frame)
+                log.add(name, wrench, frame=pipe.frame, kind=_WRENCH)
         elif feedback.name in inputs:
             _add_point(log, "value", inputs[feedback.name])
         log.add("age", age, ("age",), "s")
@@ -140,12 +137,10 @@ class PluginLog:
             parts = (sent.position, sent.orientation, sent.linear, sent.angular)
             self._add_copies(log, name, "nav_msgs/Odometry", parts=parts, frame=sent.frame, child=sent.child)
         elif isinstance(sent, WrenchMessage):
-            self._add_copies(
-                log, name, "geometry_msgs/WrenchStamped", parts=(sent.force, sent.torque), frame=sent.frame
-            )
+            self._add_copies(log, name, _WRENCH, parts=(sent.force, sent.torque), frame=sent.frame)
         elif isinstance(sent, PointsMessage) and pipe.quantity == "wrench" and sent.names:
             for contact, wrench in zip(sent.names, sent.values, strict=True):
-                _add_wrench(log, f"{name}/{contact}", wrench, frame=sent.frame)
+                log.add(f"{name}/{contact}", wrench, frame=sent.frame, kind=_WRENCH)
         elif isinstance(sent, PointsMessage):
             log.add(name, sent.values, _of_each(sent.names, sent.values), frame=sent.frame)
         elif isinstance(sent, VectorMessage) and port is not None:
@@ -160,9 +155,7 @@ class PluginLog:
         for part in parts:
             self._copies.append((memoryview(whole[start : start + part.size]), memoryview(part)))
             start += part.size
-        log.add(
-            name, whole, NAMED[kind], unit=with_units(NAMED[kind], CHANNEL_UNITS), frame=frame, kind=kind, child=child
-        )
+        log.add(name, whole, frame=frame, kind=kind, child=child)
 
 
 def _count_in(gates: Iterable[CommandGate], counts: np.ndarray) -> None:
@@ -206,19 +199,14 @@ def _joint_fields(sent: JointMessage) -> Iterator[tuple[str, np.ndarray]]:
 def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     """Declare the numbers of a port."""
     kind = POINT_MESSAGES[port.quantity]
-    columns = NAMED[kind]
     unit = _UNITS.get(port.quantity, "")
-    units = (unit,) * len(columns) if unit else with_units(columns, CHANNEL_UNITS)
     if port.count is None:
-        log.add(name, port.value, columns, unit=units, frame=frame, kind=kind)
+        log.add(name, port.value, unit=unit, frame=frame, kind=kind)
     else:
+        columns = NAMED[kind]
         names = [f"{index} {column}" for index in range(port.count) for column in columns]
-        log.add(name, port.value, names, units * port.count, frame)
-
-
-def _add_wrench(log: Logger, name: str, wrench: np.ndarray, frame: str) -> None:
-    kind = "geometry_msgs/WrenchStamped"
-    log.add(name, wrench, NAMED[kind], unit=with_units(NAMED[kind], CHANNEL_UNITS), frame=frame, kind=kind)
+        units = (unit,) * len(columns) if unit else with_units(columns, CHANNEL_UNITS)
+        log.add(name, port.value, names, unit=units * port.count, frame=frame)
 
 
 def _of_each(names: tuple[str, ...], values: np.ndarray) -> list[str]:
@@ -239,14 +227,3 @@ def _slides(robot: Robot, name: str) -> bool:
     """Return whether a joint slides; one that the Robot does not have counts as turning."""
     joint = robot.description.joints.get(name)
     return name in BASE_DOFS[:3] if joint is None else joint.type == "prismatic"
-
-
-def documents_of(configuration: Configuration, robot: Robot, middleware: Middleware) -> RunDocuments:
-    """Return a plugin's configuration, the description of its robot, its tags, and the seed of a simulated robot."""
-    files = {"configuration.yaml": configuration.text(), "robot.urdf": robot.description.text}
-    if robot.semantics.text:
-        files["robot.srdf"] = robot.semantics.text
-    texts = {f"{configuration.module.name}/tags": json.dumps(configuration.own_tags())}
-    with suppress(UnknownName):  # a robot of hardware has none
-        texts["seed"] = str(middleware.parameter(SEED))
-    return RunDocuments(files, texts)

@@ -8,10 +8,10 @@ from scipy.interpolate import CubicSpline
 
 from solfer.errors import RecordingError
 from solfer.numerics.rotations import whole_turns
-from solfer.recording.comparison.fit import BLOCK, DELAY_INDEX, GAIN_INDEX, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
-from solfer.recording.comparison.motion import JointMotion, Samples, measured_joints, sampled, shift_of
-from solfer.recording.comparison.verdict import SHAPE, Difference, JointVerdict, excess, judged, thresholds
 from solfer.recording.model import Recording
+from solfer.recording.review.fit import BLOCK, DELAY_INDEX, GAIN_INDEX, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
+from solfer.recording.review.motion import JointMotion, Samples, measured_joints, sampled, shift_of
+from solfer.recording.review.verdict import SHAPE, Difference, JointVerdict, excess, judged, thresholds
 
 COMPARED_MOTION_RANGE, OVER_NOISE = 0.02, 20.0
 """Range of a joint that moves: so much [rad, m], and so many standard deviations of what smoothing leaves of noise."""

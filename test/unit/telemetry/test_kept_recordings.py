@@ -9,10 +9,11 @@ import numpy as np
 
 from solfer.middleware.shared_memory.memory.lock import Lock
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.recorder import RECORDER_FILE, Recorder
-from solfer.realtime.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep, write_kept
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
+from solfer.telemetry.recorder import Recorder
+from solfer.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep, write_kept
+from solfer.telemetry.rows import RECORDER_FILE
 
 
 def test_memory_of_ended_node_becomes_a_file(tmp_path):

@@ -9,10 +9,10 @@ from support.plugins.several import Several
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.black_box import TRUTH_MESSAGE, BlackBox
-from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.black_box import TRUTH_MESSAGE, BlackBox
+from solfer.telemetry.drain import RecordDrain
 from solfer.transport import BodyMessage
 
 STARTING, RUNNING = PluginState.STARTING, PluginState.RUNNING

@@ -6,8 +6,8 @@ from support.plugins.fleet import RATE, Fleet, still, tree
 
 from solfer.components import Component
 from solfer.errors import ComponentError
-from solfer.plugins.plugin_log import PluginLog
 from solfer.recording.model import COLUMNS_KIND
+from solfer.telemetry.plugin_log import PluginLog
 
 
 class Logs(Component):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solfer.recording.pictures.canvas import CANVAS_FONT, FIRST_COLOR, SECOND_COLOR, WRONG, draw, dress, new_figure
+from solfer.recording.review.canvas import CANVAS_FONT, FIRST_COLOR, SECOND_COLOR, WRONG, draw, dress, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,10 +9,9 @@ import numpy as np
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.realtime.telemetry.recorder import RECORDER_FILE, RECORDER_KIND, events_of
 from solfer.recording.model import Event
-from solfer.recording.rows import RowLayout
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.rows import RECORDER_FILE, RECORDER_KIND, RowLayout, events_of
 
 BATCH = 256
 """Most rows of a chunk of the file."""
@@ -44,19 +43,18 @@ class RecordDrain:
                 expected="an RT layer in this namespace, with `record` above 0",
             ) from error
         described = json.loads(self._segment.layout)
-        whole = RowLayout.from_text(described["rows"])
         size = described["count"]
         self.rate = described["rate"]
-        self.layout = whole
+        self.layout = RowLayout.from_text(described["rows"])
         self.count = 0
         self.span = (0.0, 0.0)
-        self._ring = Ring(self._segment.data, whole.width, size)
+        width = self.layout.width
+        self._ring = Ring(self._segment.data, width, size)
         # rows overwritten before this do not count as lost; the oldest one may just be overwritten
         self._ring.sequence = max(0, self._ring.newest - size + 1)
-        self._events = events_of(self._segment.data, Ring.size(whole.width, size))
-        self._rows = np.zeros((BATCH, whole.width))
-        self._numbers = np.zeros(BATCH, dtype=np.int64)
-        self._times = np.zeros(BATCH, dtype=np.int64)
+        self._events = events_of(self._segment.data, Ring.size(width, size))
+        self._rows = np.zeros((BATCH, width))
+        self._stamps = np.zeros((2, BATCH), dtype=np.int64)
 
     @property
     def lost(self) -> int:
@@ -83,20 +81,41 @@ class RecordDrain:
         self._ring.skip()
         self._events.skip()
 
-    def into(self, writer: RecordingWriter) -> "FileDrain":
-        """Announce the channels in a file, and return what fills it."""
-        return FileDrain(self, writer)
+    def into(self, writer: RecordingWriter) -> "RecordDrain":
+        """Announce the channels in a file, which `fill` fills, and return the drain itself."""
+        self._writer = writer
+        self._block = writer.block(self.layout.channels)
+        return self
+
+    def fill(self) -> int:
+        """Write what is new to the file; return how many rows.
+
+        Raises:
+            RecordingError: The disk is full: rows that did not fit are lost, later ones may fit.
+        """
+        before = self.count
+        for numbers, times, values in self.batches():
+            self._writer.write(self._block, numbers, times, values)
+        for event in self.events():
+            self._writer.event(event)
+        return self.count - before
 
     def batches(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Fetch new rows: their numbers, their times [ns] and the columns of all channels."""
+        ring = self._ring
         number = BATCH
         while number == BATCH:
-            number = self._fetch()
+            number = 0
+            while number < BATCH and ring.read():
+                self._stamps[0, number] = ring.sequence
+                self._stamps[1, number] = ring.stamp
+                self._rows[number] = ring.values
+                number += 1
             if number:
-                times = self._times[:number]
-                yield self._numbers[:number], times, self.layout.values(self._rows[:number])
+                numbers, times = self._stamps[:, :number]
+                yield numbers, times, self.layout.values(self._rows[:number])
                 first = self.span[0] if self.count else 1e-9 * times[0]
-                self.count = self.count + number
+                self.count += number
                 self.span = (first, 1e-9 * times[-1])
 
     def events(self) -> Iterator[Event]:
@@ -105,36 +124,16 @@ class RecordDrain:
             content = self._events.values.tobytes().rstrip(b"\0")
             yield Event(1e-9 * self._events.stamp, *json.loads(content))
 
-    def _fetch(self) -> int:
-        """Fetch at most one batch; return how many rows it has."""
-        ring = self._ring
-        for place in range(BATCH):
-            if not ring.read():
-                return place
-            self._numbers[place], self._times[place], self._rows[place] = ring.sequence, ring.stamp, ring.values
-        return BATCH
 
+def writer_of(path: Path, drains: Sequence[RecordDrain]) -> RecordingWriter:
+    """Make the file of some drains, with all that belongs to them; `RecordDrain.fill` fills it.
 
-class FileDrain:
-    """Fills a file from a drain.
-
-    Args:
-        drain: The drain.
-        writer: The file.
+    Raises:
+        RecordingError: The file cannot be made.
     """
-
-    def __init__(self, drain: RecordDrain, writer: RecordingWriter):
-        self.drain, self._writer, self._block = drain, writer, writer.block(drain.layout.channels)
-
-    def fill(self) -> int:
-        """Write what is new; return how many rows.
-
-        Raises:
-            RecordingError: The disk is full: rows that did not fit are lost, later ones may fit.
-        """
-        before = self.drain.count
-        for numbers, times, values in self.drain.batches():
-            self._writer.write(self._block, numbers, times, values)
-        for event in self.drain.events():
-            self._writer.event(event)
-        return self.drain.count - before
+    files = {name: text.encode() for drain in drains for name, text in drain.layout.attachments.items()}
+    texts = {name: text for drain in drains for name, text in drain.layout.metadata.items()}
+    writer = RecordingWriter(path, files, texts)
+    for drain in drains:
+        drain.into(writer)
+    return writer

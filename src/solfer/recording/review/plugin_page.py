@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.recording.model import Channel, Recording
-from solfer.recording.pictures.canvas import (
+from solfer.recording.requests import EventGroup, grouped
+from solfer.recording.review.canvas import (
     CANVAS_FONT,
     DESIRED_LINE_COLOR,
     FIRST_COLOR,
@@ -15,8 +16,7 @@ from solfer.recording.pictures.canvas import (
     dress,
     new_figure,
 )
-from solfer.recording.pictures.tracks import Track, tracks_of
-from solfer.recording.requests import EventGroup, grouped
+from solfer.recording.review.tracks import Track, tracks_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.clock import MonotonicClock, SteppedClock
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.histograms import HISTOGRAM_WORDS, Histograms, bucket_of, upper_edge
-from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
+from solfer.telemetry.histograms import HISTOGRAM_WORDS, Histograms, bucket_of, upper_edge
+from solfer.telemetry.kernel import count_durations
+from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
 
 
 def count(histograms, row, *times):
@@ -70,7 +70,7 @@ def test_statistics_are_shared_with_other_processes(tmp_path):
         and seen.state(1) is PluginState.ABORTED
         and seen.state(0) is PluginState.CONFIGURED
     )
-    assert [seen.life(1, word) for word in PluginCount] == [6, 3, 2, 1]
+    assert [seen.life(1)[word] for word in PluginCount] == [6, 3, 2, 1]
     assert seen.text() == "granted nothing" and seen.text(1) == "because" and seen.text(0) == ""
     assert seen.histograms.longest(seen.row(1, 1)) == 12345 and seen.histograms.count(len(LOOP_HISTOGRAMS)) == 0
     assert seen.alive and seen.pid == statistics.pid

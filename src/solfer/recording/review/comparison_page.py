@@ -4,8 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solfer.recording.comparison import Comparison, JointVerdict
-from solfer.recording.pictures.canvas import CANVAS_FONT, FIRST_COLOR, SECOND_COLOR, WRONG, draw, dress, new_figure
+from solfer.recording.review.canvas import CANVAS_FONT, FIRST_COLOR, SECOND_COLOR, WRONG, draw, dress, new_figure
+from solfer.recording.review.compare import Comparison
+from solfer.recording.review.verdict import JointVerdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.numerics.rotations import whole_turns
-from solfer.recording.comparison.motion import continuous_joints
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
+from solfer.recording.review.motion import continuous_joints
 
 
 @dataclass(frozen=True)

@@ -10,17 +10,17 @@ from solfer.errors import MiddlewareError, RecordingError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime import watchdog
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry import recordings
-from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.recordings import (
+from solfer.realtime.watchdog import Watchdog
+from solfer.recording.log import Logger
+from solfer.telemetry import recordings
+from solfer.telemetry.recorder import Recorder
+from solfer.telemetry.recordings import (
     FileRecorder,
     kept_folder,
     namespace_of_master,
     of_namespace,
     of_plugins,
 )
-from solfer.realtime.watchdog import Watchdog
-from solfer.recording.log import Logger
 
 
 @pytest.fixture

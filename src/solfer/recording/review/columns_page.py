@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.recording.model import Recording
-from solfer.recording.pictures.canvas import CANVAS_FONT, new_figure
-from solfer.recording.pictures.plugin_page import lines
+from solfer.recording.review.canvas import CANVAS_FONT, new_figure
+from solfer.recording.review.plugin_page import lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from solfer.errors import MiddlewareError, RecordingError
-from solfer.realtime.telemetry.drain import RecordDrain
-from solfer.realtime.telemetry.recorder import EVENT_WIDTH, RECORDER_EVENTS, Recorder
 from solfer.recording.log import Logger
 from solfer.recording.model import Event
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.drain import RecordDrain, writer_of
+from solfer.telemetry.recorder import Recorder
+from solfer.telemetry.rows import EVENT_WIDTH, RECORDER_EVENTS
 
 WAIT = 60.0  # [s]
 
@@ -102,9 +103,8 @@ def test_a_file_holds_everything(tmp_path, loop):
     loop.record(recorder, 1, 6)
     recorder.event(Event(0.004, "arm", "abort", "because"))
     recorder.event(Event(0.005, "arm", "fault", "long: " + 1000 * "ü"))
-    files = {name: text.encode() for name, text in drain.layout.attachments.items()}
-    with closing(RecordingWriter(path, files, drain.layout.metadata)) as writer:
-        assert drain.into(writer).fill() == 5
+    with closing(writer_of(path, [drain])) as writer:
+        assert drain.fill() == 5
         writer.finish(drain.lost)
     found = read(path)
     assert set(found.channels) == {f"arm/{name}" for name in ("position", "inertia", "same", "again", "timing")}
@@ -172,10 +172,10 @@ def follow(folder, path, ready):
     loop = Loop()
     recorder = Recorder(folder, loop.sources, 1000.0)
     drain = RecordDrain(folder)
-    fill = drain.into(RecordingWriter(path, {"robot.urdf": b"<robot/>"}))
+    drain.into(RecordingWriter(path, {"robot.urdf": b"<robot/>"}))
     for first in range(1, 1_000_000, 10):
         loop.record(recorder, first, first + 10)
-        fill.fill()
+        drain.fill()
         if first > 500:
             ready.set()
 
@@ -202,7 +202,8 @@ def drain_on_a_full_disk(folder, published):
     recorder = Recorder(folder, log.sources, 1000.0)
     drain = RecordDrain(folder)
     writer = RecordingWriter(folder / "whole.mcap")
-    fill, random = drain.into(writer), np.random.default_rng(0)
+    drain.into(writer)
+    random = np.random.default_rng(0)
 
     def record(first, last):
         for number in range(first, last):
@@ -212,17 +213,17 @@ def drain_on_a_full_disk(folder, published):
 
     refusal = ""
     record(1, 41)
-    fill.fill()
+    drain.fill()
     resource.setrlimit(resource.RLIMIT_FSIZE, (65536, resource.RLIM_INFINITY))
     record(41, 101)
     try:
-        fill.fill()
+        drain.fill()
     except RecordingError as error:
         refusal = str(error)
     full = len(read(writer.path)["arm/noise"].times)
     resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     record(101, 201)
-    fill.fill()
+    drain.fill()
     writer.finish(drain.lost)
     published.put((refusal, writer.dropped, full))
 

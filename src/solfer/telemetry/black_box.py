@@ -7,12 +7,12 @@ import numpy as np
 
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.plugin import Plugin
-from solfer.plugins.plugin_log import NANOSECOND, PluginLog
-from solfer.realtime.telemetry.recorder import RECORDER_DURATION, Recorder
-from solfer.recording.kinds import CHANNEL_UNITS, NAMED
-from solfer.recording.log import Logger, with_units
+from solfer.recording.kinds import NAMED
+from solfer.recording.log import Logger
 from solfer.recording.model import Event
 from solfer.recording.versions import versions
+from solfer.telemetry.plugin_log import NANOSECOND, PluginLog
+from solfer.telemetry.recorder import RECORDER_DURATION, Recorder
 from solfer.transport.endpoints import NEW, Reader
 from solfer.transport.plugin_state import PluginState
 
@@ -87,10 +87,7 @@ class BlackBox:
         self._true = np.full(len(NAMED[TRUTH_MESSAGE]), np.nan)
         for plugin in plugins if truth is not None else ():
             link = plugin.robot.kinematics.base_link or ""
-            units = with_units(NAMED[TRUTH_MESSAGE], CHANNEL_UNITS)
-            Logger(plugin.name, loop.sources).add(
-                "truth", self._true, NAMED[TRUTH_MESSAGE], unit=units, frame="world", kind=TRUTH_MESSAGE, child=link
-            )
+            Logger(plugin.name, loop.sources).add("truth", self._true, frame="world", kind=TRUTH_MESSAGE, child=link)
         sources = [*loop.sources, *(source for log in logs for source in log.sources)]
         files: dict[str, str] = {}
         texts = versions()

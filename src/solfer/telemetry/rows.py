@@ -1,4 +1,4 @@
-"""Rows of a ring: which of its columns belong to which channel."""
+"""What the memory of a recording holds: rows of numbers, and events."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -6,10 +6,14 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
+from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
 
-_DESCRIBED = ("name", "kind", "columns", "units", "frame", "child")
+RECORDER_FILE = RECORDER_KIND = "recording"
+
+RECORDER_EVENTS, EVENT_WIDTH = 256, 64
+"""Events that the memory holds, and their size in words of eight bytes; a longer text is cut."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +43,26 @@ class RowLayout:
         cls, sources: Sequence[LogSource], attachments: Mapping[str, str], metadata: Mapping[str, str]
     ) -> tuple["RowLayout", list[np.ndarray]]:
         """Lay out what is recorded; also returns the arrays of a row in their order, all as float64."""
-        views = [source.array.reshape(-1).view(np.float64) for source in sources]
-        pieces = sorted({(_address(view), view.size): view for view in views}.items(), key=lambda piece: piece[0])
-        places = np.cumsum([0, *(view.size for _, view in pieces)]).tolist()
-        known = {key: start for (key, _), start in zip(pieces, places, strict=False)}
-        starts = tuple(known[_address(view), view.size] for view in views)
+        pieces: dict[tuple[int, int], np.ndarray] = {}
+        keys = []
+        for source in sources:
+            view = source.array.reshape(-1).view(np.float64)
+            keys.append((view.__array_interface__["data"][0], view.size))
+            pieces[keys[-1]] = view
+        arrays = [pieces[key] for key in sorted(pieces)]
+        *places, width = np.cumsum([0, *(array.size for array in arrays)]).tolist()
+        known = dict(zip(sorted(pieces), places, strict=True))
         factors = tuple(source.factor if source.array.dtype == np.int64 else 0.0 for source in sources)
         channels = tuple(source.channel for source in sources)
-        layout = cls(
-            channels, starts, factors, width=places[-1], attachments=dict(attachments), metadata=dict(metadata)
-        )
-        return layout, [view for _, view in pieces]
+        starts = tuple(known[key] for key in keys)
+        return cls(channels, starts, factors, width=width, attachments=attachments, metadata=metadata), arrays
 
     def text(self) -> str:
         """Describe the layout for another process."""
-        channels = [{name: getattr(channel, name) for name in _DESCRIBED} for channel in self.channels]
-        return json.dumps({**asdict(self), "channels": channels})
+        described = asdict(self)
+        for channel in described["channels"]:
+            del channel["times"], channel["values"]
+        return json.dumps(described)
 
     @classmethod
     def from_text(cls, text: str) -> "RowLayout":
@@ -68,18 +76,18 @@ class RowLayout:
 
     def only(self, plugins: Sequence[str]) -> "RowLayout":
         """Return the layout with the channels and files of some plugins alone."""
-        kept = [index for index, each in enumerate(self.channels) if each.name.partition("/")[0] in plugins]
-        files = {name: text for name, text in self.attachments.items() if name.partition("/")[0] in plugins}
-        texts = {
-            name: text for name, text in self.metadata.items() if name.partition("/")[0] in plugins or "/" not in name
-        }
+
+        def kept(name: str) -> bool:
+            return name.partition("/")[0] in plugins
+
+        places = [place for place, channel in enumerate(self.channels) if kept(channel.name)]
         return replace(
             self,
-            channels=tuple(self.channels[index] for index in kept),
-            starts=tuple(self.starts[index] for index in kept),
-            factors=tuple(self.factors[index] for index in kept),
-            attachments=files,
-            metadata=texts,
+            channels=tuple(self.channels[place] for place in places),
+            starts=tuple(self.starts[place] for place in places),
+            factors=tuple(self.factors[place] for place in places),
+            attachments={name: text for name, text in self.attachments.items() if kept(name)},
+            metadata={name: text for name, text in self.metadata.items() if "/" not in name or kept(name)},
         )
 
     def renamed(self, before: str, after: str) -> "RowLayout":
@@ -99,5 +107,6 @@ class RowLayout:
         return np.concatenate([np.zeros((len(rows), 0)), *parts], axis=1)
 
 
-def _address(array: np.ndarray) -> int:
-    return array.__array_interface__["data"][0]
+def events_of(memory: memoryview, rows: int) -> Ring:
+    """Return the ring of events in a segment, behind that of the rows, which takes so many bytes."""
+    return Ring(memory[rows:], EVENT_WIDTH, RECORDER_EVENTS)

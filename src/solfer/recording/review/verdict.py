@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.recording.comparison.fit import DELAY_INDEX, GAIN_INDEX, NEUTRAL, OFFSET, Law
+from solfer.recording.review.fit import DELAY_INDEX, GAIN_INDEX, NEUTRAL, OFFSET, Law
 
 
 class Difference(enum.Enum):
