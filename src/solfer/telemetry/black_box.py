@@ -37,7 +37,7 @@ HOLD = "hold"
 """Kind of the event that a plugin which ran has to start again."""
 
 
-class BlackBox:
+class BlackBox(Recorder):
     """Records each cycle: its timing, and of every plugin what `PluginLog` lists; and the changes of their states.
 
     Further channels are `loop/timing` with lateness and duration of each cycle [s], `loop/cycle` with its number, and
@@ -51,9 +51,6 @@ class BlackBox:
         seconds: Duration that the memory holds [s].
         ros_time: Reads ROS time [s]; None: there is none.
         truth: Receives the true pose and velocity of the base, a `BodyMessage`, from a simulator; None: there is none.
-
-    Attributes:
-        size: Size of the memory [B].
 
     Raises:
         MiddlewareError: Another process records there, or there is no room.
@@ -95,9 +92,7 @@ class BlackBox:
             documents = plugin.documents()
             files |= {f"{plugin.name}/{name}": text for name, text in documents.files.items()}
             texts |= documents.texts
-        self._recorder = Recorder(folder, sources, plugins[0].rate, seconds=seconds, attachments=files, metadata=texts)
-        self._record = self._recorder.record
-        self.size = self._recorder.size
+        super().__init__(folder, sources, plugins[0].rate, seconds=seconds, attachments=files, metadata=texts)
 
     def record(self, time: int, late: int, took: int) -> None:
         """Record a cycle that ends at `time`, began `late` after its deadline and `took` so long [ns]."""
@@ -113,10 +108,11 @@ class BlackBox:
             np.concatenate((body.position, body.orientation, body.linear, body.angular), out=self._true)
         for take in self._takes:
             take(now)
-        self._record(time)
+        self.append(time)
         for name, notes in self._notes:
-            if notes:
-                self._note_requests(name, notes, now)
+            for kind, text in notes:
+                self.event(Event(now, name, kind, text=text))
+            notes.clear()
 
     def note(self, index: int, managed: ManagedPlugin, time: int) -> None:
         """Record a plugin's new state or reason at `time` [ns]."""
@@ -124,14 +120,4 @@ class BlackBox:
         ran = self._words[3 + index] == PluginState.RUNNING
         self._words[3 + index] = state
         kind = HOLD if ran and state is PluginState.STARTING else BLACK_BOX_KINDS.get(state, state.name.lower())
-        self._recorder.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))
-
-    def _note_requests(self, name: str, notes: list[tuple[str, str]], now: float) -> None:
-        """Record requests to a component, and what else happened to it, in the cycle that ends `now` [s]."""
-        for kind, text in notes:
-            self._recorder.event(Event(now, name, kind, text=text))
-        notes.clear()
-
-    def close(self) -> None:
-        """Remove the recording. A process that ends without this leaves its last seconds to readers."""
-        self._recorder.close()
+        self.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))

@@ -25,7 +25,6 @@ class RecordDrain:
 
     Attributes:
         layout: What the rows are.
-        rate: Cycles of the loop per second [Hz].
         count: Number of rows that went into a file.
         span: Times of the first and the last of them [s].
 
@@ -44,7 +43,6 @@ class RecordDrain:
             ) from error
         described = json.loads(self._segment.layout)
         size = described["count"]
-        self.rate = described["rate"]
         self.layout = RowLayout.from_text(described["rows"])
         self.count = 0
         self.span = (0.0, 0.0)

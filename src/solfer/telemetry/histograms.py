@@ -1,4 +1,4 @@
-"""Statistics of a loop in fixed memory: histograms of durations."""
+"""Histograms of durations: rows of fixed memory, which other processes may read while they are filled."""
 
 import numpy as np
 
@@ -27,41 +27,21 @@ def upper_edge(bucket: int) -> int:
     return (following - (octave << FINE)) << (octave + HISTOGRAM_UNIT)
 
 
-class Histograms:
-    """Rows of histograms in one block of memory, which other processes may read while they are filled.
+def since(histograms: np.ndarray, earlier: np.ndarray) -> np.ndarray:
+    """Return the counts of all rows since an earlier copy; the longest times are those of the whole run."""
+    recent = histograms - earlier
+    recent[:, 1] = histograms[:, 1]
+    return recent
+
+
+def quantile(histogram: np.ndarray, share: float) -> int:
+    """Compute a time that at least `share` of all do not exceed [ns]; at most 1/16 too long; 0 without any.
 
     Args:
-        memory: int64, shape (rows * WIDTH,); zeros before the first time.
-
-    Attributes:
-        rows: The same memory, shape (rows, WIDTH); `count_durations` counts there.
+        histogram: int64, shape (HISTOGRAM_WORDS,).
+        share: Part of all times.
     """
-
-    def __init__(self, memory: np.ndarray):
-        self.rows = memory.reshape(-1, HISTOGRAM_WORDS)
-
-    def snapshot(self) -> np.ndarray:
-        """Copy all counts so far, int64, shape (rows, WIDTH)."""
-        return self.rows.copy()
-
-    def since(self, earlier: np.ndarray) -> "Histograms":
-        """Return the counts since a snapshot; the longest times are those of the whole run."""
-        rows = self.rows - earlier
-        rows[:, 1] = self.rows[:, 1]
-        return Histograms(rows)
-
-    def count(self, row: int) -> int:
-        """Return the number of counted times."""
-        return int(self.rows[row, 0])
-
-    def longest(self, row: int) -> int:
-        """Return the longest time [ns]; 0 before the first."""
-        return int(self.rows[row, 1])
-
-    def quantile(self, row: int, share: float) -> int:
-        """Compute a time that at least `share` of all do not exceed [ns]; at most 1/16 too long; 0 without any."""
-        sums = np.cumsum(self.rows[row, 2:])
-        if not sums[-1]:
-            return 0
-        bucket = int(np.searchsorted(sums, share * sums[-1]))
-        return min(upper_edge(bucket), self.longest(row))
+    sums = np.cumsum(histogram[2:])
+    if not sums[-1]:
+        return 0
+    return min(upper_edge(int(np.searchsorted(sums, share * sums[-1]))), int(histogram[1]))

@@ -53,7 +53,7 @@ def _count_durations(rows, times, always):
     """Count one duration for each histogram; a zero counts only in the first `always` of them.
 
     Args:
-        rows: `Histograms.rows`, int64, shape (rows, WIDTH).
+        rows: The histograms, int64, shape (rows, HISTOGRAM_WORDS).
         times: The durations, int64, shape (rows,) [ns].
         always: Number of histograms that count zeros.
     """

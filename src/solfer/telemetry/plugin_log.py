@@ -1,6 +1,6 @@
 """What is recorded of a plugin: its pipes, its States, times and counts, and what its component declares."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -8,13 +8,11 @@ import numpy as np
 from solfer.config.kinds.point import POINT_MESSAGES
 from solfer.errors import ComponentError, SolferError, located
 from solfer.interfaces.port import Port
-from solfer.model import State
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.pipes.shared_feedback import SharedFeedbackPipe
 from solfer.plugins.cycle_timing import STAGES
-from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.plugin import Plugin
 from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
 from solfer.recording.log import Logger, LogSource, with_units
@@ -68,7 +66,8 @@ class PluginLog:
         robot = plugin.robot
         log = Logger(plugin.name)
         for title, state in (("measured", robot.state), ("wanted", robot.command)):
-            _add_state(log.section(title), robot, state)
+            for field, interface in _STATES.items():
+                _add_joints(log.section(title), robot, field, values=state[interface], names=robot.dofs)
         gates = [(pipe, gate) for pipe, gate in plugin.outputs.controllers if gate is not None]
         counted = [f"{pipe.name} {kind}" for pipe, gate in gates for kind in gate.kinds]
         # one piece of memory for all that is copied: each further one costs time in every cycle
@@ -81,7 +80,10 @@ class PluginLog:
             self._add_feedback(log.section(f"feedback/{feedback.name}"), feedback, ages[index : index + 1])
         for command, _ in plugin.outputs.controllers:
             self._add_command(log, command)
-        _count_in([gate for _, gate in gates], held.view(np.int64))
+        begin = 0
+        for _, gate in gates:
+            gate.count_in(memoryview(held).cast("B").cast("q")[begin : begin + len(gate.kinds)])
+            begin += len(gate.kinds)
         if counted:
             log.add("gate", held.view(np.int64), counted)
         log.add("life", life, ("state", "blend", "passed", "lost"), ("", "s", "s", "s"))
@@ -114,8 +116,7 @@ class PluginLog:
         if isinstance(pipe, StateFeedbackPipe):
             for each in pipe.state_fields:
                 names = [robot.dofs[dof] for dof in each.dofs]
-                kind = JOINTS_KIND if each.field in JOINT_PARTS else COLUMNS_KIND
-                log.add(each.field, each.values, names, _units(robot, names, each.field), kind=kind)
+                _add_joints(log, robot, each.field, values=each.values, names=names)
         elif isinstance(pipe, ContactFeedbackPipe):
             for name, wrench in pipe.wrenches.items():
                 log.add(name, wrench, frame=pipe.frame, kind=_WRENCH)
@@ -127,12 +128,11 @@ class PluginLog:
         """Declare what a pipe sends."""
         name = f"command/{pipe.name}"
         sent = pipe.sent
-        robot = self._plugin.robot
         port = self._plugin.component.outputs.get(pipe.name)
         if isinstance(sent, JointMessage):
-            for field, values in _joint_fields(sent):
-                kind = JOINTS_KIND if field in JOINT_PARTS else COLUMNS_KIND
-                log.add(f"{name}/{field}", values, sent.names, _units(robot, sent.names, field), kind=kind)
+            for field in (*JOINT_PARTS, "stiffness", "damping", *sent.interfaces):
+                if (values := sent.numbers(field)) is not None:
+                    _add_joints(log.section(name), self._plugin.robot, field, values=values, names=sent.names)
         elif isinstance(sent, BodyMessage):
             parts = (sent.position, sent.orientation, sent.linear, sent.angular)
             self._add_copies(log, name, "nav_msgs/Odometry", parts=parts, frame=sent.frame, child=sent.child)
@@ -158,15 +158,6 @@ class PluginLog:
         log.add(name, whole, frame=frame, kind=kind, child=child)
 
 
-def _count_in(gates: Iterable[CommandGate], counts: np.ndarray) -> None:
-    """Let gates count in an array, one after the other."""
-    words = memoryview(counts).cast("B").cast("q")
-    begin = 0
-    for gate in gates:
-        gate.count_in(words[begin : begin + len(gate.kinds)])
-        begin += len(gate.kinds)
-
-
 def _declared(plugin: Plugin, log: Logger) -> None:
     """Let the component declare what it logs.
 
@@ -184,16 +175,15 @@ def _declared(plugin: Plugin, log: Logger) -> None:
         ) from error
 
 
-def _add_state(log: Logger, robot: Robot, state: State) -> None:
-    for field, interface in _STATES.items():
-        log.add(field, state[interface], robot.dofs, _units(robot, robot.dofs, field), kind=JOINTS_KIND)
-
-
-def _joint_fields(sent: JointMessage) -> Iterator[tuple[str, np.ndarray]]:
-    for field in (*JOINT_PARTS, "stiffness", "damping", *sent.interfaces):
-        values = sent.numbers(field)
-        if values is not None:
-            yield field, values
+def _add_joints(log: Logger, robot: Robot, field: str, values: np.ndarray, names: Sequence[str]) -> None:
+    """Declare a field of joints, in rad, or m of a joint that slides."""
+    form = _FORMS.get(field, "")
+    units = []
+    for name in names:
+        joint = robot.description.joints.get(name)  # one that the Robot does not have counts as turning
+        slides = name in BASE_DOFS[:3] if joint is None else joint.type == "prismatic"
+        units.append(form.replace("Nm", "N").format("m") if slides else form.format("rad"))
+    log.add(field, values, names, units, kind=JOINTS_KIND if field in JOINT_PARTS else COLUMNS_KIND)
 
 
 def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
@@ -214,16 +204,3 @@ def _of_each(names: tuple[str, ...], values: np.ndarray) -> list[str]:
     count, width = values.shape
     titles = names if len(names) == count else tuple(str(index) for index in range(count))
     return [f"{title} {column}" if width > 1 else title for title in titles for column in range(width)]
-
-
-def _units(robot: Robot, names: Sequence[str], field: str) -> tuple[str, ...]:
-    """Return the units of a field of joints."""
-    form = _FORMS.get(field, "")
-    slides = (_slides(robot, name) for name in names)
-    return tuple(form.replace("Nm", "N").format("m") if each else form.format("rad") for each in slides)
-
-
-def _slides(robot: Robot, name: str) -> bool:
-    """Return whether a joint slides; one that the Robot does not have counts as turning."""
-    joint = robot.description.joints.get(name)
-    return name in BASE_DOFS[:3] if joint is None else joint.type == "prismatic"

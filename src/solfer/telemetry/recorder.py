@@ -74,7 +74,7 @@ class Recorder:
         )
         self._address = self._memory.address
 
-    def record(self, time: int) -> None:
+    def append(self, time: int) -> None:
         """Record all sources as they are at `time` [ns], over the oldest row."""
         append(self._address, time)
 
@@ -89,5 +89,5 @@ class Recorder:
         self._events.write(round(1e9 * event.time))
 
     def close(self) -> None:
-        """End the recording; rows that are not drained yet are lost."""
+        """Remove the recording. A process that ends without this leaves its last seconds to readers."""
         self._segment.close()

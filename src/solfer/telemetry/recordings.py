@@ -79,38 +79,26 @@ def _age(path: Path) -> float:
 def recordings(root: Path = SHARED_MEMORY) -> Iterator[tuple[str, RecordDrain]]:
     """Yield the recordings of processes that live and that this one may read, each with the name of its namespace."""
     for name in names(root):
-        for each in _places(root / f"{PREFIX}{name}"):
-            try:
-                drain = RecordDrain(each)
-            except MiddlewareError:
-                continue
-            if not drain.over:
-                yield name, drain
+        folder = root / f"{PREFIX}{name}"
+        with contextlib.suppress(PermissionError):  # another user's
+            for each in (folder, *sorted((folder / SHARED_FOLDER).glob("*/"))):
+                with contextlib.suppress(MiddlewareError):  # nothing is recorded there
+                    drain = RecordDrain(each)
+                    if not drain.over:
+                        yield name, drain
 
 
-def _places(folder: Path) -> list[Path]:
-    """List the folders of a namespace that have a recording; none where they are another user's."""
-    try:
-        return [
-            each for each in (folder, *sorted((folder / SHARED_FOLDER).glob("*/"))) if (each / RECORDER_FILE).exists()
-        ]
-    except PermissionError:
-        return []
-
-
-def kept_folder() -> Path | None:
-    """Return the folder of the environment variable `SOLFER_RECORDINGS`, where nodes leave what they have in memory."""
-    folder = os.environ.get(RECORDINGS_VARIABLE)
-    return Path(folder) if folder else None
-
-
-def keep(folder: Path, target: Path) -> None:
-    """Copy the memory of a recording, for `kept`; where that is not possible, warn of it.
+def keep(folder: Path, node: str) -> None:
+    """Copy the memory of a node into the folder `SOLFER_RECORDINGS`, if that is set; if it is not possible, warn of it.
 
     Args:
         folder: Folder of the memory.
-        target: Folder of the copy; made if missing.
+        node: Name of the node.
     """
+    kept = os.environ.get(RECORDINGS_VARIABLE)
+    if not kept:
+        return
+    target = Path(kept, node.strip("/"))
     try:
         target.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(folder / RECORDER_FILE, target / RECORDER_FILE)

@@ -12,7 +12,7 @@ from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.telemetry import STATISTICS
-from solfer.telemetry.histograms import HISTOGRAM_WORDS, Histograms
+from solfer.telemetry.histograms import HISTOGRAM_WORDS
 from solfer.transport.plugin_state import PluginState
 
 EXECUTOR = "xbotcore"
@@ -73,9 +73,10 @@ class RuntimeStatistics:
         memory: The memory; None: memory of this process.
 
     Attributes:
-        histograms: Rows by `LoopTime`, then `stages` of each plugin.
+        histograms: Rows by `LoopTime`, then `stages` of each plugin, int64, shape (rows, HISTOGRAM_WORDS).
         skips: Periods that were skipped because of each of these rows; a late wake-up counts for `lateness`.
         counts: Words by `LoopCount`, int64.
+        segments: The segment of shared memory; none if it is not shared.
     """
 
     def __init__(self, rate: float, plugins: Sequence[str], stages: Sequence[str], memory: memoryview | None = None):
@@ -89,9 +90,9 @@ class RuntimeStatistics:
         data = memory if memory is not None else memoryview(bytearray(self.size))
         parts = [data[end - 8 * size : end].cast("q") for end, size in zip(ends, words, strict=True)]
         self.counts, self._lives, histograms, self.skips = parts
-        self.histograms = Histograms(np.frombuffer(histograms, dtype=np.int64))
+        self.histograms = np.frombuffer(histograms, dtype=np.int64).reshape(rows, HISTOGRAM_WORDS)
         self._texts = data[ends[-1] : self.size]
-        self._segment: Segment | None = None
+        self.segments: tuple[Segment, ...] = ()
 
     @classmethod
     def create(cls, folder: Path, rate: float, plugins: Sequence[str], stages: Sequence[str]) -> "RuntimeStatistics":
@@ -122,28 +123,23 @@ class RuntimeStatistics:
     @classmethod
     def _in(cls, segment: Segment) -> "RuntimeStatistics":
         statistics = cls(**json.loads(segment.layout), memory=segment.data)
-        statistics._segment = segment
+        statistics.segments = (segment,)
         return statistics
-
-    @property
-    def segments(self) -> tuple[Segment, ...]:
-        """Segments of shared memory; empty if it is not shared."""
-        return () if self._segment is None else (self._segment,)
 
     @property
     def alive(self) -> bool:
         """Whether the executor that owns the memory still runs."""
-        return self._segment is None or self._segment.owned()
+        return all(segment.owned() for segment in self.segments)
 
     @property
     def pid(self) -> int:
         """Process of the executor; 0: it is not shared."""
-        return self._segment.pid if self._segment is not None else 0
+        return sum(segment.pid for segment in self.segments)
 
     def beat(self, nanoseconds: int) -> None:
         """Write the executor's heartbeat, a time of the monotonic clock [ns]."""
-        if self._segment is not None:
-            self._segment.beat(nanoseconds)
+        for segment in self.segments:
+            segment.beat(nanoseconds)
 
     def row(self, plugin: int, stage: int) -> int:
         """Return the row of a stage of a plugin, by their indices."""
@@ -187,5 +183,5 @@ class RuntimeStatistics:
 
     def close(self) -> None:
         """Release the memory."""
-        if self._segment is not None:
-            self._segment.close()
+        for segment in self.segments:
+            segment.close()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.telemetry.histograms import Histograms
+from solfer.telemetry.histograms import quantile, since
 from solfer.telemetry.statistics import EXECUTOR, LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
@@ -102,11 +102,11 @@ class StatisticsReader:
             stop = self._stopped(self._folder)
         except MiddlewareError:
             return None
-        now = statistics.histograms.snapshot()
+        now = statistics.histograms.copy()
         if statistics.pid != self._process or self._earlier is None or self._earlier.shape != now.shape:
             self._process = statistics.pid
             self._earlier = np.zeros_like(now)
-        recent = Histograms(now).since(self._earlier)
+        recent = since(now, self._earlier)
         self._earlier = now
         counts = statistics.counts
 
@@ -114,10 +114,10 @@ class StatisticsReader:
             return tuple(
                 StageSummary(
                     name,
-                    statistics.histograms.count(row),
-                    1e-9 * recent.quantile(row, 0.5),
-                    p99=1e-9 * recent.quantile(row, 0.99),
-                    longest=1e-9 * statistics.histograms.longest(row),
+                    int(now[row, 0]),
+                    1e-9 * quantile(recent[row], 0.5),
+                    p99=1e-9 * quantile(recent[row], 0.99),
+                    longest=1e-9 * int(now[row, 1]),
                     skipped=statistics.skips[row],
                 )
                 for row, name in enumerate(names, first)

@@ -35,9 +35,9 @@ def rt(namespace, *arguments):
 
 def count(statistics, nanoseconds):
     """Count one more cycle in which the component of the second plugin needed that time."""
-    times = np.zeros(len(statistics.histograms.rows), dtype=np.int64)
+    times = np.zeros(len(statistics.histograms), dtype=np.int64)
     times[statistics.row(1, 1)] = nanoseconds
-    count_durations(statistics.histograms.rows, times, 0)
+    count_durations(statistics.histograms, times, 0)
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ class Loop:
             self.position[:] = number, 2 * number, 3 * number
             self.inertia[:] = number
             self.counts[:] = number, 10 * number
-            recorder.record(1_000_000 * number)
+            recorder.append(1_000_000 * number)
 
 
 @pytest.fixture
@@ -209,7 +209,7 @@ def drain_on_a_full_disk(folder, published):
         for number in range(first, last):
             numbers[:] = random.standard_normal(100)
             numbers[0] = number
-            recorder.record(1000 * number)
+            recorder.append(1000 * number)
 
     refusal = ""
     record(1, 41)

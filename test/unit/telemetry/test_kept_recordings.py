@@ -16,7 +16,7 @@ from solfer.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep,
 from solfer.telemetry.rows import RECORDER_FILE
 
 
-def test_memory_of_ended_node_becomes_a_file(tmp_path):
+def test_memory_of_ended_node_becomes_a_file(tmp_path, monkeypatch):
     numbers, log = np.zeros(2), Logger("arm")
     log.add("error", numbers, ("x", "y"), "m")
     folder = tmp_path / "memory"
@@ -24,8 +24,11 @@ def test_memory_of_ended_node_becomes_a_file(tmp_path):
     recorder = Recorder(folder, log.sources, 100.0, 1.0, {"arm/robot.urdf": "<x/>"}, {"seed": "3"})
     for cycle in range(40):
         numbers[:] = cycle, -cycle
-        recorder.record(cycle * 10_000_000)
-    keep(folder, tmp_path / "kept" / "arm_node")
+        recorder.append(cycle * 10_000_000)
+    for value in ("", str(tmp_path / "kept")):
+        assert not (tmp_path / "kept").exists()
+        monkeypatch.setenv("SOLFER_RECORDINGS", value)
+        keep(folder, "/arm_node")
     recorder.close()
     (file,) = write_kept(tmp_path / "kept", tmp_path / "out")
     found = read(file)
@@ -33,8 +36,9 @@ def test_memory_of_ended_node_becomes_a_file(tmp_path):
     np.testing.assert_array_equal(found["arm/error"].column("y"), -np.arange(40.0))
 
 
-def test_memory_that_cannot_be_kept_warns(tmp_path, caplog):
-    keep(tmp_path / "nowhere", tmp_path / "kept")
+def test_memory_that_cannot_be_kept_warns(tmp_path, caplog, monkeypatch):
+    monkeypatch.setenv("SOLFER_RECORDINGS", str(tmp_path / "kept"))
+    keep(tmp_path / "nowhere", "arm")
     assert "the last cycles are not kept" in caplog.text
     assert write_kept(tmp_path / "kept", tmp_path / "out") == []
 

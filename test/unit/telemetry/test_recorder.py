@@ -37,7 +37,7 @@ def test_rows_are_the_arrays_as_they_were(tmp_path):
         for place, array in enumerate(arrays):
             array[...] = number + place
         counts[1] = SIGNALLING
-        recorder.record(10 * number)
+        recorder.append(10 * number)
         lying = sorted(arrays, key=lambda array: array.ctypes.data)
         expected = np.concatenate([array.reshape(-1).view(np.int64) for array in lying])
         assert reader.read() and reader.stamp == 10 * number
@@ -50,7 +50,7 @@ def test_a_slow_reader_counts_lost_rows(tmp_path):
     recorder, reader = made(tmp_path, [values])
     for number in range(10):
         values[:] = number
-        recorder.record(number)
+        recorder.append(number)
     rows = [reader.values[0] for _ in range(COUNT) if reader.read()]
     assert rows == [7.0, 8.0, 9.0]  # the oldest of four may be overwritten while it is read
     assert reader.lost == 7
@@ -59,10 +59,10 @@ def test_a_slow_reader_counts_lost_rows(tmp_path):
 @pytest.mark.parametrize("arrays", [[], [np.zeros(0)]], ids=["none", "empty"])
 def test_rows_without_numbers_are_counted(tmp_path, arrays):
     recorder, reader = made(tmp_path, arrays)
-    recorder.record(7)
+    recorder.append(7)
     assert reader.read() and (reader.sequence, reader.stamp) == (1, 7)
 
 
 def test_recording_keeps_no_memory(tmp_path):
     recorder, _ = made(tmp_path, [np.zeros(50), np.zeros(3)])
-    check_that_it_keeps_no_memory(lambda: recorder.record(1))
+    check_that_it_keeps_no_memory(lambda: recorder.append(1))

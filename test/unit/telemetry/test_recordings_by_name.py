@@ -16,7 +16,6 @@ from solfer.telemetry import recordings
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.recordings import (
     FileRecorder,
-    kept_folder,
     namespace_of_master,
     of_namespace,
     of_plugins,
@@ -94,14 +93,6 @@ def test_a_master_has_a_namespace(monkeypatch, uri, namespace):
     assert namespace_of_master() == namespace
     monkeypatch.setenv("ROS_NAMESPACE", "/left/")  # as roslaunch writes it
     assert namespace_of_master() == f"{namespace}.left"
-
-
-def test_a_folder_keeps_recordings_if_asked(monkeypatch, tmp_path):
-    for value, folder in (("", None), (str(tmp_path), tmp_path)):
-        monkeypatch.setenv("SOLFER_RECORDINGS", value)
-        assert kept_folder() == folder
-    monkeypatch.delenv("SOLFER_RECORDINGS")
-    assert kept_folder() is None
 
 
 def test_a_file_needs_a_folder(tmp_path):

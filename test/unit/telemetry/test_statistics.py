@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.clock import MonotonicClock, SteppedClock
 from solfer.plugins import PluginState
-from solfer.telemetry.histograms import HISTOGRAM_WORDS, Histograms, bucket_of, upper_edge
+from solfer.telemetry.histograms import HISTOGRAM_WORDS, bucket_of, quantile, since, upper_edge
 from solfer.telemetry.kernel import count_durations
 from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
 
@@ -18,7 +18,7 @@ from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, PluginCount,
 def count(histograms, row, *times):
     """Count times in one row, as cycles in which all others are zero."""
     for time in times:
-        count_durations(histograms.rows, np.where(np.arange(len(histograms.rows)) == row, time, 0), 0)
+        count_durations(histograms, np.where(np.arange(len(histograms)) == row, time, 0), 0)
 
 
 @given(st.integers(0, 3 * 10**9))
@@ -31,28 +31,28 @@ def test_buckets_are_at_most_a_sixteenth_wide(nanoseconds):
 
 @pytest.mark.parametrize("nanoseconds", [-5, 10**12])
 def test_times_out_of_range_count_in_outer_buckets(nanoseconds):
-    histograms = Histograms(np.zeros(HISTOGRAM_WORDS, dtype=np.int64))
+    histograms = np.zeros((1, HISTOGRAM_WORDS), dtype=np.int64)
     count(histograms, 0, nanoseconds)
-    assert histograms.count(0) == 1
-    assert histograms.longest(0) == max(nanoseconds, 0)
+    assert histograms[0, 0] == 1
+    assert histograms[0, 1] == max(nanoseconds, 0)
 
 
 def test_quantiles_are_those_of_numpy_within_a_bucket():
     times = np.random.default_rng(3).lognormal(11.0, 1.0, 20000).astype(int)
-    histograms = Histograms(np.zeros(2 * HISTOGRAM_WORDS, dtype=np.int64))
+    histograms = np.zeros((2, HISTOGRAM_WORDS), dtype=np.int64)
     count(histograms, 1, *times)
-    assert histograms.count(0) == histograms.quantile(0, 0.5) == 0
-    assert histograms.count(1) == 20000 and histograms.longest(1) == times.max()
+    assert histograms[0, 0] == quantile(histograms[0], 0.5) == 0
+    assert histograms[1, 0] == 20000 and histograms[1, 1] == times.max()
     for share in (0.5, 0.9, 0.99, 0.999):
         exact = np.quantile(times, share, method="inverted_cdf")
-        assert exact <= histograms.quantile(1, share) <= exact * 17 / 16 + 64
-    assert histograms.quantile(1, 1.0) == times.max()
+        assert exact <= quantile(histograms[1], share) <= exact * 17 / 16 + 64
+    assert quantile(histograms[1], 1.0) == times.max()
 
 
 def test_a_zero_counts_for_the_loop_only():
-    histograms = Histograms(np.zeros(3 * HISTOGRAM_WORDS, dtype=np.int64))
-    count_durations(histograms.rows, np.array([0, 0, 70]), 1)
-    assert [histograms.count(row) for row in range(3)] == [1, 0, 1]
+    histograms = np.zeros((3, HISTOGRAM_WORDS), dtype=np.int64)
+    count_durations(histograms, np.array([0, 0, 70]), 1)
+    assert [histograms[row, 0] for row in range(3)] == [1, 0, 1]
 
 
 def test_statistics_are_shared_with_other_processes(tmp_path):
@@ -72,7 +72,7 @@ def test_statistics_are_shared_with_other_processes(tmp_path):
     )
     assert [seen.life(1)[word] for word in PluginCount] == [6, 3, 2, 1]
     assert seen.text() == "granted nothing" and seen.text(1) == "because" and seen.text(0) == ""
-    assert seen.histograms.longest(seen.row(1, 1)) == 12345 and seen.histograms.count(len(LOOP_HISTOGRAMS)) == 0
+    assert seen.histograms[seen.row(1, 1), 1] == 12345 and seen.histograms[len(LOOP_HISTOGRAMS), 0] == 0
     assert seen.alive and seen.pid == statistics.pid
     statistics.close()
     assert not seen.alive
@@ -119,10 +119,10 @@ def test_the_monotonic_clock_never_wakes_early():
 
 
 def test_counts_since_a_snapshot():
-    histograms = Histograms(np.zeros(HISTOGRAM_WORDS, dtype=np.int64))
+    histograms = np.zeros((1, HISTOGRAM_WORDS), dtype=np.int64)
     count(histograms, 0, 10**6)
-    before = histograms.snapshot()
+    before = histograms.copy()
     count(histograms, 0, 1000, 1000, 1000)
-    since = histograms.since(before)
-    assert since.count(0) == 3 and since.longest(0) == 10**6
-    assert 1000 < since.quantile(0, 0.99) <= 1000 + 64
+    (recent,) = since(histograms, before)
+    assert recent[0] == 3 and recent[1] == 10**6
+    assert 1000 < quantile(recent, 0.99) <= 1000 + 64

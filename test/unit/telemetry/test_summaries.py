@@ -30,12 +30,12 @@ def cycle(statistics, count=1, **times):
     """Count cycles, with times of the rows of the loop, or of the stages of the first plugin [us]."""
     for _ in range(count):
         statistics.counts[LoopCount.CYCLES] += 1
-        taken = np.zeros(len(statistics.histograms.rows), dtype=np.int64)
+        taken = np.zeros(len(statistics.histograms), dtype=np.int64)
         for name, time in times.items():
             taken[LOOP_HISTOGRAMS.index(name) if name in LOOP_HISTOGRAMS else statistics.row(0, STAGES.index(name))] = (
                 1000 * time
             )
-        count_durations(statistics.histograms.rows, taken, 0)
+        count_durations(statistics.histograms, taken, 0)
 
 
 def test_without_a_layer_there_is_nothing_to_see(tmp_path):
