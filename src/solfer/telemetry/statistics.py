@@ -134,7 +134,7 @@ class RuntimeStatistics:
     @property
     def pid(self) -> int:
         """Process of the executor; 0: it is not shared."""
-        return sum(segment.pid for segment in self.segments)
+        return self.segments[0].pid if self.segments else 0
 
     def beat(self, nanoseconds: int) -> None:
         """Write the executor's heartbeat, a time of the monotonic clock [ns]."""

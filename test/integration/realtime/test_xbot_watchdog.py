@@ -48,7 +48,7 @@ def tripped(layer) -> EmergencyStopLatch:
 
 def last_beat(layer) -> int:
     """Time of the newest beat [ns]."""
-    return RuntimeStatistics.attach(layer.namespace.folder)._segment.heartbeat
+    return RuntimeStatistics.attach(layer.namespace.folder).segments[0].heartbeat
 
 
 def test_an_endless_loop_trips_the_emergency_stop(layer):
