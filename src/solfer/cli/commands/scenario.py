@@ -21,10 +21,11 @@ def run(options: argparse.Namespace) -> int:
     """
     from solfer.cli.columns import aligned
     from solfer.cli.tables.scenario import ScenarioTrace
-    from solfer.recording.review import check_suffix, save
     from solfer.scenarios import read_scenario
 
     if options.plot is not None:
+        from solfer.recording.review import check_suffix
+
         check_suffix(options.plot)
     trace = ScenarioTrace(read_scenario(options.file))
     for line in aligned(trace.rows()):
@@ -32,6 +33,7 @@ def run(options: argparse.Namespace) -> int:
     print(trace.summary())
     if options.plot is not None:
         from solfer.cli.scenario_page import scenario_page
+        from solfer.recording.review import save
 
         save([("scenario", scenario_page(trace))], options.plot)
         print(options.plot)
