@@ -23,12 +23,10 @@ BLACK_BOX_KINDS = {
     PluginState.STARTING: "start",
     PluginState.RUNNING: "run",
     PluginState.STOPPING: "stop",
-    PluginState.STOPPED: "stopped",
     PluginState.ABORTED: "abort",
-    PluginState.FAULT: "fault",
     PluginState.CLOSED: "close",
 }
-"""Kinds of events, by the state that a plugin enters."""
+"""Kinds of events, by the state that a plugin enters; of other states, their names."""
 
 TRUTH_MESSAGE = "nav_msgs/Odometry"
 """Message of the true state of a simulated base."""

@@ -132,6 +132,9 @@ class FileRecorder:
         file: The file.
         patience: Longest wait for plugins that are not there yet [s].
 
+    Attributes:
+        process: The process.
+
     Raises:
         RecordingError: Nothing can be written there.
     """
@@ -147,27 +150,17 @@ class FileRecorder:
         names = [word for plugin in plugins for word in ("-n", plugin)]
         command = ["record", *names, "--whole", "--wait", str(patience), namespace, str(file.absolute())]
         # a session of its own: Ctrl-C ends the loop first, and then this has all of it
-        self._process = subprocess.Popen(
+        self.process = subprocess.Popen(
             [sys.executable, "-c", _MAIN, *command], stdin=subprocess.DEVNULL, start_new_session=True
         )
-
-    @property
-    def running(self) -> bool:
-        """Whether the process runs."""
-        return self._process.poll() is None
-
-    @property
-    def code(self) -> int:
-        """Exit code of the process; 0 as long as it runs."""
-        return self._process.poll() or 0
 
     def close(self) -> None:
         """Wait until the file is complete; the loop has ended."""
         try:
-            self._process.wait(self.PATIENCE)
+            self.process.wait(self.PATIENCE)
         except subprocess.TimeoutExpired:
             logger.warning("the recording ends before the loop, which goes on after %g s", self.PATIENCE)
-            self._process.terminate()  # a SIGINT would be lost while Python still begins
+            self.process.terminate()  # a SIGINT would be lost while Python still begins
 
 
 _MAIN = "import sys; from solfer.cli.main import main; sys.exit(main())"

@@ -94,7 +94,7 @@ def loop(namespace, file, started):
         numbers[:] = number
         recorder.append(1_000_000 * number)
         if number == 5000:
-            started.put(process._process.pid)
+            started.put(process.process.pid)
         time.sleep(0.001)
 
 
