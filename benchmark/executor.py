@@ -201,7 +201,7 @@ def measure(rate: float, seconds: float, apart: bool, figures: Figures) -> None:
 def report(figures: Figures, statistics: RuntimeStatistics, before, skipped: int) -> None:
     """Print the figures of the layer since a snapshot."""
     histograms = since(statistics.histograms, before)
-    count = histograms[0, 0]
+    count = int(histograms[0, 0])
     print(statistics.text(), file=sys.stderr)
     figures.row("layer", rate=statistics.rate, plugins=len(statistics.plugins), cycles=count)
     for row, name in enumerate(LOOP_HISTOGRAMS):
