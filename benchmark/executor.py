@@ -27,8 +27,9 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
 from solfer.supervision import supervise
+from solfer.telemetry.histograms import quantile, since
+from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CONFIG = REPOSITORY / "config"
@@ -176,7 +177,7 @@ def measure(rate: float, seconds: float, apart: bool, figures: Figures) -> None:
             wait_for_robot(name)
         statistics, program = wait_for_all(namespace, processes), compiled(folder)
         time.sleep(1.0)
-        before, skipped, bare = statistics.histograms.snapshot(), statistics.counts[LoopCount.SKIPPED], None
+        before, skipped, bare = statistics.histograms.copy(), statistics.counts[LoopCount.SKIPPED], None
         cycles = round(seconds * rate)
         if program is not None:
             bare = subprocess.Popen(
@@ -199,17 +200,17 @@ def measure(rate: float, seconds: float, apart: bool, figures: Figures) -> None:
 
 def report(figures: Figures, statistics: RuntimeStatistics, before, skipped: int) -> None:
     """Print the figures of the layer since a snapshot."""
-    histograms = statistics.histograms.since(before)
-    count = histograms.count(0)
+    histograms = since(statistics.histograms, before)
+    count = int(histograms[0, 0])
     print(statistics.text(), file=sys.stderr)
     figures.row("layer", rate=statistics.rate, plugins=len(statistics.plugins), cycles=count)
     for row, name in enumerate(LOOP_HISTOGRAMS):
-        p50, p99 = (1e-3 * histograms.quantile(row, share) for share in (0.5, 0.99))
+        p50, p99 = (1e-3 * quantile(histograms[row], share) for share in (0.5, 0.99))
         left_out = skipped if name == "lateness" else None
-        figures.row(name, p50_us=p50, p99_us=p99, max_us=1e-3 * histograms.longest(row), skipped=left_out)
+        figures.row(name, p50_us=p50, p99_us=p99, max_us=1e-3 * histograms[row, 1], skipped=left_out)
     for stage, name in enumerate(statistics.stages):
         middle = sum(
-            histograms.quantile(statistics.row(plugin, stage), 0.5) for plugin in range(len(statistics.plugins))
+            quantile(histograms[statistics.row(plugin, stage)], 0.5) for plugin in range(len(statistics.plugins))
         )
         figures.row(f"{name}, all plugins", p50_us=1e-3 * middle, p99_us=None, max_us=None, skipped=None)
 

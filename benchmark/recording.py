@@ -16,10 +16,10 @@ from form import Figures, parser_of
 from mcap_ros2.writer import Writer
 from plugin import measure, start
 
-from solfer.realtime.telemetry.black_box import BlackBox
-from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.kinds import COLUMNS_KIND, definition, ros_name
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.black_box import BlackBox
+from solfer.telemetry.drain import RecordDrain
 
 ROWS = 250
 

@@ -19,8 +19,9 @@ from executor import CONFIG, REPOSITORY, simulated_layer
 from form import Figures, parser_of
 
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
+from solfer.realtime.emergency_stop import stopped
 from solfer.supervision import supervise
+from solfer.telemetry.summaries import LayerSummary, StatisticsReader
 
 sys.path.insert(0, str(REPOSITORY / "test"))
 from support.page import opened_page  # noqa: E402
@@ -46,7 +47,7 @@ def skipped(namespace: Namespace) -> int:
     Raises:
         SystemExit: It has ended.
     """
-    summary: LayerSummary | None = StatisticsReader(namespace.folder).look()
+    summary: LayerSummary | None = StatisticsReader(namespace.folder, stopped).look()
     if summary is None:
         raise SystemExit("the layer has ended")
     return summary.skipped

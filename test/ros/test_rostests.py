@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from solfer.realtime.telemetry.recordings import RECORDINGS_VARIABLE, write_kept
 from solfer.supervision import descendants
+from solfer.telemetry.recordings import RECORDINGS_VARIABLE, write_kept
 
 FOLDER = Path(__file__).parent
 LIMIT = 870.0

@@ -22,7 +22,7 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.ros.node.launch import free_port
 from solfer.middleware.shared_memory import Namespace
 from solfer.msg import LayerStatistics
-from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
+from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")

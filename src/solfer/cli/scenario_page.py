@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.cli.tables.scenario import ScenarioTrace
-from solfer.recording.pictures.canvas import (
+from solfer.recording.review import (
     DESIRED_LINE_COLOR,
     FIRST_COLOR,
     SECOND_COLOR,
@@ -16,7 +16,7 @@ from solfer.recording.pictures.canvas import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from solfer.recording.review import Figure
 
 
 def scenario_page(trace: ScenarioTrace) -> "Figure":

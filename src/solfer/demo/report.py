@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from solfer.demo.record import MotionRecorder, Trace
+from solfer.recording.review import new_figure
 from solfer.transport.middleware import HealthReport
 
 Row = tuple[str, str]
@@ -117,15 +118,11 @@ def format_table(rows: list[Row]) -> str:
 
 def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, ...], path: Path) -> None:
     """Draw the tracking of the joints that are commanded, wheel speeds and the base over time into a PNG."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     measured = recorder.joints("measured")
     desired = recorder.joints("desired")
     base = recorder.base()
     start = measured.time[0]
-    figure = Figure(figsize=(10, 9), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(10.0, 9.0)
     positions, errors, speeds, place = figure.subplots(4, 1, sharex=True)
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
     for joint in (each for each in joints if each in desired.names):

@@ -12,8 +12,8 @@ from solfer.demo.centauro import Progress
 from solfer.demo.driving_record import DrivingRecorder
 from solfer.demo.film import film
 from solfer.demo.tracking_page import tracking_page
-from solfer.recording.pictures import canvas
 from solfer.recording.reader import read
+from solfer.recording.review import saved
 from solfer.robot import Robot
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.world import find_world, read_world
@@ -69,7 +69,7 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
     with closing(Renderer(robot.description, robot.kinematics, yaw=60.0, world=world)) as renderer:
         renderer.save(seen.position[narrowest], output / "demo.png")
     pages = [("tracking", tracking_page(seen.time, places))]
-    plots = list(canvas.saved(pages, output / "demo_plots.png"))
+    plots = list(saved(pages, output / "demo_plots.png"))
     print(f"pictures: {', '.join(map(str, (output / 'demo.png', *plots)))}")
     if films:
         path = output / "demo.gif"

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.demo.driving_report import Tracked
-from solfer.recording.pictures.canvas import CANVAS_FONT, DESIRED_LINE_COLOR, FIRST_COLOR, draw, dress, new_figure
+from solfer.recording.review import CANVAS_FONT, DESIRED_LINE_COLOR, FIRST_COLOR, draw, dress, new_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from solfer.recording.review import Figure
 
 
 def tracking_page(times: np.ndarray, places: Mapping[str, Tracked]) -> "Figure":

@@ -103,6 +103,15 @@ class EmergencyStopLatch:
         self._words[TRIPPED] = 0
 
 
+def stopped(folder: Path) -> str:
+    """Return why the emergency stop of a namespace's folder is tripped; empty while it is not.
+
+    Raises:
+        MiddlewareError: The folder cannot be used, or a foreign file is in the way.
+    """
+    return EmergencyStopLatch(folder).reason
+
+
 def _read(text: memoryview) -> str:
     return bytes(text).rstrip(b"\0").decode(errors="replace")
 

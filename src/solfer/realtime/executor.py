@@ -17,9 +17,9 @@ from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import Interruptions
-from solfer.realtime.telemetry.black_box import BlackBox
-from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.statistics_memory import EXECUTOR, LoopCount, LoopTime, RuntimeStatistics
+from solfer.telemetry.black_box import BlackBox
+from solfer.telemetry.kernel import count_durations
+from solfer.telemetry.statistics import EXECUTOR, LoopCount, LoopTime, RuntimeStatistics
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.lower_level import Answer, answered
@@ -109,7 +109,7 @@ class Executor:
             plugins[0].rate if plugins else 0.0, [plugin.name for plugin in plugins], STAGES
         )
         # one array for all durations of a cycle, in the rows of the statistics
-        self._durations = np.zeros(len(self.statistics.histograms.rows), dtype=np.int64)
+        self._durations = np.zeros(len(self.statistics.histograms), dtype=np.int64)
         budget = BudgetRules(rules.budget, rules.overruns, rules.grace)
         self._interruptions = telemetry.interruptions
         self._was_interrupted = False
@@ -163,7 +163,7 @@ class Executor:
         durations = self._durations
         counts = statistics.counts
         durations[CYCLE], durations[OVERHEAD], durations[LATENESS] = end - begin, end - begin - components, late
-        count_durations(statistics.histograms.rows, durations, len(LoopTime))
+        count_durations(statistics.histograms, durations, len(LoopTime))
         self._check_overrun(late, end - begin)
         counts[CYCLES] = self._set.cycles
         counts[TIME] = end

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.realtime.namespaces import STATISTICS
+from solfer.telemetry import STATISTICS
 
 HEARTBEAT_POLL_PERIOD = 0.05
 """Time between two looks for a process that is missing, or has begun again [s]."""

@@ -6,9 +6,7 @@ from solfer.errors import MiddlewareError, UnknownName, nearest
 from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
 from solfer.middleware.shared_memory.memory.segment import Segment
-
-STATISTICS = "statistics"
-"""File and kind of the segment that the executor of an RT layer owns as long as it lives."""
+from solfer.telemetry import STATISTICS
 
 
 def find(name: str, root: Path = SHARED_MEMORY) -> Namespace:

@@ -12,7 +12,6 @@ from solfer.numerics.rotations import whole_turns
 from solfer.pipes.joint.pipes import JointCommandPipe
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.plugin import Plugin
-from solfer.plugins.plugin_log import PluginLog
 from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
 from solfer.replay.feedback import RecordedFeedbackPipe
@@ -20,6 +19,7 @@ from solfer.replay.generator import RecordedClaim, RecordedTime, replaying
 from solfer.replay.middleware import ReplayMiddleware
 from solfer.replay.rows import LIFE, RecordedRows
 from solfer.robot.shipped import RobotFiles
+from solfer.telemetry.plugin_log import PluginLog
 from solfer.transport.plugin_state import PluginState
 
 STOPPED = PluginState.STOPPED

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.errors import StudyError, UnknownName
-from solfer.recording.pictures.canvas import CANVAS_FONT, FIRST_COLOR, WRONG, check_suffix, new_figure, save
+from solfer.recording.review import CANVAS_FONT, FIRST_COLOR, WRONG, check_suffix, new_figure, save
 from solfer.study.folder import COLUMNS_FILE, RECORDING, RUNS, StudyFolder, write_whole
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from solfer.recording.review import Figure
 
 WORST = 5
 """How many runs are shown by themselves."""

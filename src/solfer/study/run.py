@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from solfer.config.yaml.nodes import YamlNode
-from solfer.realtime.telemetry.black_box import TRUTH_MESSAGE, BlackBox
-from solfer.realtime.telemetry.drain import RecordDrain
-from solfer.recording.writer import RecordingWriter
 from solfer.study.measures import Columns, evaluated, measured
 from solfer.study.plan import record_of
 from solfer.study.records import StudyRecord
 from solfer.study.result import Result
 from solfer.study.simulated_run import SimulatedRun
+from solfer.telemetry.black_box import TRUTH_MESSAGE, BlackBox
+from solfer.telemetry.drain import RecordDrain, writer_of
 
 DRAIN = 1.0
 """Period in which a recording is written [s]."""
@@ -111,14 +110,13 @@ def recorded(simulated: SimulatedRun, file: Path) -> Iterator[None]:
     truth = simulated.node("recorder").reader("floating_base", TRUTH_MESSAGE) if simulated.simulation.floating else None
     with TemporaryDirectory() as folder, closing(BlackBox(Path(folder), plugins, 2.0 * DRAIN, truth=truth)) as box:
         drain = RecordDrain(Path(folder))
-        attached = {name: text.encode() for name, text in drain.layout.attachments.items()}
-        with closing(RecordingWriter(file, attached, drain.layout.metadata)) as writer:
+        with closing(writer_of(file, [drain])) as writer:
             simulated.every(1.0 / plugins[0].rate, lambda: box.record(simulated.nanoseconds(), 0, 0))
 
-            def write() -> None:
-                drain.into(writer).fill()
+            def fill() -> None:
+                drain.fill()
 
-            simulated.every(DRAIN, write)
+            simulated.every(DRAIN, fill)
             yield
-            write()
+            fill()
             writer.finish(drain.lost)

@@ -19,7 +19,6 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.navigation import Course, Navigation, ReferenceCourse, ScenarioCourse, read_references
 from solfer.plugins import Plugin, PluginSet, Registry, generate, generate_shared
 from solfer.plugins.generation.dry_run import declared
-from solfer.plugins.plugin_log import PluginLog
 from solfer.recording.log import Logger, LogSource
 from solfer.robot.shipped import RobotFiles
 from solfer.scenarios import Player, read_scenario
@@ -29,6 +28,7 @@ from solfer.simulation.world.engine import STEP
 from solfer.study.measures import Columns
 from solfer.study.records import StudyRecord
 from solfer.study.robot import bundle_of, faults_of, simulation_of
+from solfer.telemetry.plugin_log import PluginLog
 
 RUN_PERIOD = 0.02
 """Period of what moves the robot [s]."""

@@ -13,7 +13,7 @@ from solfer.errors import ComponentError
 from solfer.interfaces.declaration import Service
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate, run
-from solfer.realtime.telemetry.statistics_memory import LoopCount
+from solfer.telemetry.statistics import LoopCount
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import TRIGGER, NoFields
 

@@ -11,7 +11,7 @@ from solfer.errors import MiddlewareError
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.telemetry.statistics_memory import LOOP_HISTOGRAMS
+from solfer.telemetry.statistics import LOOP_HISTOGRAMS
 from solfer.transport.lower_level import REFUSALS_TOPIC
 from solfer.transport.messages import REFUSALS, JointMessage
 

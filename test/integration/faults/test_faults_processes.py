@@ -13,7 +13,7 @@ from support.plugins.plugin import configuration
 
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
+from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 
 NODE = REPOSITORY / "nodes" / "xbot"
 SPEED = 1.0  # [rad/s]

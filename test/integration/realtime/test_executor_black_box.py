@@ -15,10 +15,10 @@ from solfer.plugins import PluginState, Registry, generate
 from solfer.plugins.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
-from solfer.realtime.telemetry.black_box import BlackBox
-from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.black_box import BlackBox
+from solfer.telemetry.drain import RecordDrain
 
 PLUGIN, SPEED = "joint_states", 1.5
 COMMANDS = {"position_controller": "position", "velocity_controller": "velocity"}

@@ -9,7 +9,7 @@ from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401 (
 
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.statistics_memory import LoopCount
+from solfer.telemetry.statistics import LoopCount
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
 

@@ -16,7 +16,7 @@ from solfer.config import load
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
-from solfer.realtime.telemetry.black_box import BlackBox
+from solfer.telemetry.black_box import BlackBox
 from solfer.transport import JointMessage
 
 PLUGIN, JOINT_STATE, SIMULATOR = "joint_states", "sensor_msgs/JointState", "simulator"

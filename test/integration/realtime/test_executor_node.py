@@ -19,7 +19,7 @@ from solfer.components.move_joints import MoveJoints, Reply
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
+from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).parents[3]
 GOAL = "mammal_wide_high"

@@ -11,7 +11,7 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.telemetry.statistics_memory import PluginCount
+from solfer.telemetry.statistics import PluginCount
 
 TARGET = "support.plugins.plugin:Saboteur"
 
@@ -194,7 +194,7 @@ def test_a_component_over_its_budget_is_aborted(layer, world):
     assert layer["joint_states"].state is PluginState.RUNNING
     world.run(4 / plugin.rate)
     assert layer["joint_states"].state is PluginState.ABORTED and "budget" in layer["joint_states"].reason
-    assert layer.executor.statistics.life(0, PluginCount.OVER_BUDGET) == 35
+    assert layer.executor.statistics.life(0)[PluginCount.OVER_BUDGET] == 35
 
 
 def test_too_many_overruns_stop_and_name_the_slowest(layer, world):

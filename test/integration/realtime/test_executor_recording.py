@@ -15,9 +15,9 @@ from support.realtime.executor_faults import SPEED, begin
 from solfer.cli.main import main
 from solfer.errors import RecordingError, UnknownName
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import LoopCount
 from solfer.recording.model import Recording
 from solfer.recording.reader import read
+from solfer.telemetry.statistics import LoopCount
 
 WAIT = 60.0  # [s]
 RATE = 500.0  # [Hz]

@@ -13,10 +13,10 @@ import pytest
 from solfer.cli.main import main
 from solfer.errors import RecordingError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.recordings import FileRecorder, place_beside
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
+from solfer.telemetry.recorder import Recorder
+from solfer.telemetry.recordings import FileRecorder, place_beside
 
 WAIT = 30.0  # [s]
 
@@ -51,7 +51,7 @@ def recorders(namespace):
     made = [Recorder(place_beside(namespace, f"/{name}"), source(name, np.ones(1)), 100.0) for name in ("arm", "leg")]
     for recorder in made:
         for number in range(1, 11):
-            recorder.record(1_000_000 * number)
+            recorder.append(1_000_000 * number)
     yield made
     for recorder in made:
         recorder.close()
@@ -92,9 +92,9 @@ def loop(namespace, file, started):
     process = FileRecorder(namespace, ["arm"], file)
     for number in range(1, 100_000):
         numbers[:] = number
-        recorder.record(1_000_000 * number)
+        recorder.append(1_000_000 * number)
         if number == 5000:
-            started.put(process._process.pid)
+            started.put(process.process.pid)
         time.sleep(0.001)
 
 
@@ -118,7 +118,7 @@ def test_file_of_a_loop_is_complete_at_its_end(namespace, tmp_path):
     with closing(Recorder(Namespace(namespace).folder, source("arm", np.ones(1)), 1000.0)) as recorder:
         writer = FileRecorder(namespace, ["arm"], tmp_path / "arm.mcap")
         until(lambda: (tmp_path / "arm.mcap").exists())
-        recorder.record(1_000_000)
+        recorder.append(1_000_000)
     writer.close()
     assert read(tmp_path / "arm.mcap").missing == ()
     with pytest.raises(RecordingError, match="no file can be made there"):

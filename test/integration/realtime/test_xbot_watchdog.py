@@ -8,7 +8,7 @@ import pytest
 from support.integration.xbot_system import system, until
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def layer():
 BEATING = """
 import os, time
 from solfer.middleware.shared_memory import Namespace
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 statistics = RuntimeStatistics.create(Namespace({name!r}).folder, 500.0, ["plugin"], ["component"])
 end = time.monotonic() + {duration}
 while time.monotonic() < end:
@@ -48,7 +48,7 @@ def tripped(layer) -> EmergencyStopLatch:
 
 def last_beat(layer) -> int:
     """Time of the newest beat [ns]."""
-    return RuntimeStatistics.attach(layer.namespace.folder)._segment.heartbeat
+    return RuntimeStatistics.attach(layer.namespace.folder).segments[0].heartbeat
 
 
 def test_an_endless_loop_trips_the_emergency_stop(layer):

@@ -12,10 +12,10 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
-from solfer.realtime.telemetry.black_box import BlackBox
-from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.black_box import BlackBox
+from solfer.telemetry.drain import RecordDrain
 from solfer.transport.middleware import SEED
 
 PLUGIN = "joint_states"

@@ -22,7 +22,7 @@ from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.transport import Inbox
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import NoFields

@@ -14,11 +14,11 @@ from support.page import opened_page  # noqa: E402
 from solfer import Robot  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
 from solfer.recording.reader import read  # noqa: E402
-from solfer.recording.rows import RowLayout  # noqa: E402
 from solfer.recording.writer import RecordingWriter  # noqa: E402
 from solfer.robot.shipped import robot_of  # noqa: E402
 from solfer.scene import LiveScene  # noqa: E402
 from solfer.study import SimulatedRun, read_study  # noqa: E402
+from solfer.telemetry.rows import RowLayout  # noqa: E402
 from solfer.view import Page, PageServer, Playback  # noqa: E402
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,7 @@ import time
 
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.transport.lower_level import CLAIM_INTERFACE, LOWER_LEVEL, ClaimAnswer, ClaimRequest
 from solfer.transport.messages import JointMessage
 

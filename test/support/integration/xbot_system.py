@@ -18,7 +18,7 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 
 REPOSITORY = Path(__file__).parents[3]
 ROBOT = REPOSITORY / "config" / "robots" / "centauro" / "robot.yaml"

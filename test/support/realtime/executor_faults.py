@@ -5,7 +5,7 @@ from support.integration.world import CONFIG
 from support.integration.xbot_system import REPOSITORY, System, until
 
 from solfer.plugins import PluginState
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 
 SPEED = 2.0  # [rad/s]
 

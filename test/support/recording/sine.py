@@ -9,9 +9,9 @@ from support.plugins import fleet
 from solfer.components import Component, Service
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginSet
-from solfer.realtime.telemetry.black_box import BlackBox
-from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.black_box import BlackBox
+from solfer.telemetry.drain import RecordDrain
 from solfer.transport.lower_level import Answer
 from solfer.transport.messages import WrenchMessage
 from solfer.transport.middleware import SWITCH_ONE, Flag

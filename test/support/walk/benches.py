@@ -22,11 +22,11 @@ from solfer.plugins import Plugin, Registry, budget_of, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
 from solfer.realtime.schedule import ScheduleRequest
-from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.simulation import Simulation, SimulationServer
 from solfer.simulation.bundle import load_bundle, read_bundle
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
 from solfer.simulation.server.publications import robot_parameters
+from solfer.telemetry.black_box import BlackBox
 from solfer.transport.inbox import Inbox
 from solfer.transport.messages import BodyMessage, ImuMessage, JointMessage, PointsMessage, VectorMessage, WrenchMessage
 

@@ -15,8 +15,8 @@ from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
+from solfer.telemetry.kernel import count_durations
+from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 from solfer.transport.health import Health
 
 
@@ -35,9 +35,9 @@ def rt(namespace, *arguments):
 
 def count(statistics, nanoseconds):
     """Count one more cycle in which the component of the second plugin needed that time."""
-    times = np.zeros(len(statistics.histograms.rows), dtype=np.int64)
+    times = np.zeros(len(statistics.histograms), dtype=np.int64)
     times[statistics.row(1, 1)] = nanoseconds
-    count_durations(statistics.histograms.rows, times, 0)
+    count_durations(statistics.histograms, times, 0)
 
 
 @pytest.fixture

@@ -15,10 +15,10 @@ from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.registry import load_class
 from solfer.plugins.life.switchboard import find_conflicts
 from solfer.plugins.outputs.outputs import _refuse
-from solfer.plugins.plugin_log import _declared
 from solfer.plugins.sharing.groups import _two_sources
 from solfer.plugins.sharing.space import SharedTopic, _rivals
 from solfer.robot.shipped import robot_files
+from solfer.telemetry.plugin_log import _declared
 
 
 def refusal(call):

@@ -12,7 +12,7 @@ from solfer.plugins import PluginState
 from solfer.plugins.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
-from solfer.realtime.telemetry.statistics_memory import LoopCount, LoopTime
+from solfer.telemetry.statistics import LoopCount, LoopTime
 
 LATE = round(1.5e9 * PERIOD)  # [ns]
 

@@ -10,7 +10,7 @@ import pytest
 from solfer.errors import MiddlewareError
 from solfer.realtime import heartbeat
 from solfer.realtime.heartbeat import Heartbeat
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 
 WAIT = 30.0  # [s]
 

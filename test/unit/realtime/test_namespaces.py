@@ -9,7 +9,7 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import ESTOP_TEXT_BYTES, EmergencyStopLatch
 from solfer.realtime.namespaces import cure, find, living, no_layer
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.telemetry.statistics import RuntimeStatistics
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from support.recording.motion import POSITION, Motion
 
 from solfer.cli.main import main
 from solfer.errors import RecordingError, UnknownName
-from solfer.recording.comparison import Difference, compare
 from solfer.recording.model import Channel, Recording
+from solfer.recording.review import Difference, compare
 from solfer.recording.writer import save
 
 NOISE = 3e-4  # [rad]

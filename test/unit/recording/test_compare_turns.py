@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from solfer.recording.comparison import Difference, compare
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
+from solfer.recording.review import Difference, compare
 
 NAMES, RATE, DURATION = ("wheel", "knee", "hip"), 200.0, 12.0
 URDF = b"""<robot name="r"><joint name="wheel" type="continuous"/><joint name="knee" type="revolute"/>

@@ -13,11 +13,17 @@ def test_arrays_are_declared_with_names_and_units():
     log.section("log").add("error", np.zeros(2), ("x", "y"), ("m", "m/s"), "world")
     log.add("position", np.zeros(2), ("a", "b"), "rad", kind=JOINTS_KIND)
     log.add("counts", np.zeros((2, 2), dtype=np.int64), factor=1e-9)
+    log.add("place", np.zeros(3), frame="world", kind="geometry_msgs/PointStamped")
+    log.add("turn", np.zeros(3), unit="rad", kind="geometry_msgs/Vector3Stamped")
+    log.add("named", np.zeros(3), ("x", "y", "z"), kind="geometry_msgs/PointStamped")
     channels = [source.channel for source in log.sources]
     assert [(each.name, each.kind, each.columns, each.units, each.frame) for each in channels] == [
         ("arm/log/error", COLUMNS_KIND, ("x", "y"), ("m", "m/s"), "world"),
         ("arm/position", JOINTS_KIND, ("a", "b"), ("rad", "rad"), ""),
         ("arm/counts", COLUMNS_KIND, ("0", "1", "2", "3"), ("",) * 4, ""),
+        ("arm/place", "geometry_msgs/PointStamped", ("x", "y", "z"), ("m",) * 3, "world"),
+        ("arm/turn", "geometry_msgs/Vector3Stamped", ("x", "y", "z"), ("rad",) * 3, ""),
+        ("arm/named", "geometry_msgs/PointStamped", ("x", "y", "z"), ("",) * 3, ""),
     ]
 
 

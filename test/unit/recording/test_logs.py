@@ -16,10 +16,10 @@ from solfer.cli.recordings.progress import progress
 from solfer.model import Description
 from solfer.recording.kinds import NAMED
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, REQUEST, Channel, Event, Recording
-from solfer.recording.pictures.canvas import LINE_POINTS, outline
-from solfer.recording.pictures.plugin_page import plugin_page
-from solfer.recording.pictures.tracks import tracks_of
 from solfer.recording.reader import read
+from solfer.recording.review import tracks_of
+from solfer.recording.review.canvas import LINE_POINTS, outline
+from solfer.recording.review.plugin_page import plugin_page
 from solfer.recording.writer import save
 
 URDF = Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf"

@@ -6,9 +6,8 @@ from support.recording.sine import recorded
 from support.recording.turning import DRIVERS, driven
 
 from solfer.cli.main import main
-from solfer.recording.comparison import compare
-from solfer.recording.pictures.tracks import tracks_of
 from solfer.recording.reader import read
+from solfer.recording.review import compare, tracks_of
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """Figures of a real-time layer as messages."""
 
 from solfer.middleware.ros.statistics import message_of
-from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
+from solfer.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
 
 def test_figures_become_the_fields_of_messages():

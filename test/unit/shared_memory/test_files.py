@@ -13,11 +13,11 @@ from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.memory.lock import Lock
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 from solfer.recording.arrays import save_arrays
 from solfer.recording.model import Recording
 from solfer.recording.writer import RecordingWriter
+from solfer.telemetry.recorder import Recorder
+from solfer.telemetry.statistics import RuntimeStatistics
 
 SECRET = b"what the robot's user wants to keep"
 

@@ -21,18 +21,20 @@ def run(options: argparse.Namespace) -> int:
     """
     from solfer.cli.columns import aligned
     from solfer.cli.tables.scenario import ScenarioTrace
-    from solfer.recording.pictures import canvas
     from solfer.scenarios import read_scenario
 
     if options.plot is not None:
-        canvas.check_suffix(options.plot)
+        from solfer.recording.review import check_suffix
+
+        check_suffix(options.plot)
     trace = ScenarioTrace(read_scenario(options.file))
     for line in aligned(trace.rows()):
         print(line)
     print(trace.summary())
     if options.plot is not None:
         from solfer.cli.scenario_page import scenario_page
+        from solfer.recording.review import save
 
-        canvas.save([("scenario", scenario_page(trace))], options.plot)
+        save([("scenario", scenario_page(trace))], options.plot)
         print(options.plot)
     return 0

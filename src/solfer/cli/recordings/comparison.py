@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solfer.cli.columns import aligned
-from solfer.recording.comparison import Comparison, JointVerdict
+from solfer.recording.review import Comparison, JointVerdict
 
 
 def report(result: Comparison, names: tuple[str, str], limits: bool = False) -> Iterator[str]:

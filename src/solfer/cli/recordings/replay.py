@@ -122,8 +122,7 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
     Raises:
         RecordingError: The picture cannot be written.
     """
-    from solfer.recording.pictures.canvas import save
-    from solfer.recording.pictures.replay_page import REPLAY_ROWS, replay_page
+    from solfer.recording.review import REPLAY_ROWS, replay_page, save
 
     recorded = recorded_commands(replay)
     rows = replay.rows

@@ -12,8 +12,9 @@ from solfer.cli.rt.top import top_of_layer
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
-from solfer.realtime.telemetry.statistics_memory import EXECUTOR, RuntimeStatistics
-from solfer.realtime.telemetry.summaries import StatisticsReader
+from solfer.realtime.emergency_stop import stopped
+from solfer.telemetry.statistics import EXECUTOR, RuntimeStatistics
+from solfer.telemetry.summaries import StatisticsReader
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH, TRIGGER, NoFields, SwitchRequest
 
@@ -31,7 +32,7 @@ def state(options: argparse.Namespace, namespace: Namespace) -> None:
     known = RuntimeStatistics.attach(namespace.folder).plugins
     for name in options.names:
         _require(name, known)
-    layer = StatisticsReader(namespace.folder).look()
+    layer = StatisticsReader(namespace.folder, stopped).look()
     for line in lives(plugin for plugin in layer.plugins if plugin.name in (options.names or known)):
         print(line)
 

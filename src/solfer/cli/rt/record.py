@@ -18,8 +18,8 @@ from solfer.errors import MiddlewareError, RecordingError, UnknownName
 
 if TYPE_CHECKING:
     from solfer.middleware.shared_memory.memory.namespace import Namespace
-    from solfer.realtime.telemetry.drain import FileDrain, RecordDrain
     from solfer.recording.writer import RecordingWriter
+    from solfer.telemetry.drain import RecordDrain
 
 RECORD_PERIOD = 0.1
 """Period at which new rows are polled [s]."""
@@ -60,8 +60,8 @@ def run(options: argparse.Namespace) -> int:
         MiddlewareError: Nothing was recorded.
         RecordingError: The file cannot be written.
     """
-    from solfer.realtime.telemetry.black_box import LOOP_PREFIX
-    from solfer.realtime.telemetry.recordings import of_namespace
+    from solfer.telemetry.black_box import LOOP_PREFIX
+    from solfer.telemetry.recordings import of_namespace
 
     drains = _waited(options) if options.plugins else of_namespace(options.namespace)
     for index, drain in enumerate(drains[1:], start=2):  # each process has a loop
@@ -77,7 +77,7 @@ def _waited(options: argparse.Namespace) -> "list[RecordDrain]":
         UnknownName: One of them does not within the time.
     """
     from solfer.realtime.process import ProcessEnd
-    from solfer.realtime.telemetry.recordings import of_plugins
+    from solfer.telemetry.recordings import of_plugins
 
     end = time.monotonic() + options.wait
     with closing(ProcessEnd()) as ending:
@@ -92,7 +92,7 @@ def _waited(options: argparse.Namespace) -> "list[RecordDrain]":
 
 def record(options: argparse.Namespace, namespace: "Namespace") -> None:
     """Record the RT layer of a namespace; see `run`."""
-    from solfer.realtime.telemetry.drain import RecordDrain
+    from solfer.telemetry.drain import RecordDrain
 
     write(options, [RecordDrain(namespace.folder)])
 
@@ -106,14 +106,12 @@ def write(options: argparse.Namespace, drains: "Sequence[RecordDrain]") -> None:
     """
     from solfer.recording.arrays import save_arrays
     from solfer.recording.reader import read
-    from solfer.recording.writer import RecordingWriter
+    from solfer.telemetry.drain import writer_of
 
     path = options.file
     target = path.with_name(f"{path.name}.{os.getpid()}.mcap") if options.npz else path
-    files = {name: text.encode() for drain in drains for name, text in drain.layout.attachments.items()}
-    texts = {name: text for drain in drains for name, text in drain.layout.metadata.items()}
     try:
-        with closing(RecordingWriter(target, files, texts)) as writer:
+        with closing(writer_of(target, drains)) as writer:
             _record(options, drains, writer)
         if options.npz:
             save_arrays(read(target), path)
@@ -131,13 +129,12 @@ def write(options: argparse.Namespace, drains: "Sequence[RecordDrain]") -> None:
 
 def _record(options: argparse.Namespace, drains: "Sequence[RecordDrain]", writer: "RecordingWriter") -> None:
     """Fill a file, and complete it."""
-    fills = [drain.into(writer) for drain in drains]
     if options.last:
-        _fill(fills)
+        _fill(drains)
     else:
         for drain in () if options.whole else drains:
             drain.skip()
-        _follow(fills, options.seconds, writer)
+        _follow(drains, options.seconds, writer)
     if not any(drain.count for drain in drains):
         raise MiddlewareError(
             "nothing was recorded: the loop has not made a cycle meanwhile",
@@ -146,12 +143,12 @@ def _record(options: argparse.Namespace, drains: "Sequence[RecordDrain]", writer
     writer.finish(sum(drain.lost for drain in drains))
 
 
-def _fill(fills: "Sequence[FileDrain]") -> None:
-    for each in fills:
-        each.fill()
+def _fill(drains: "Sequence[RecordDrain]") -> None:
+    for drain in drains:
+        drain.fill()
 
 
-def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "RecordingWriter") -> None:
+def _follow(drains: "Sequence[RecordDrain]", seconds: float | None, writer: "RecordingWriter") -> None:
     """Drain for `seconds`, until a signal requests the end, or until all that record have ended."""
     from solfer.realtime.process import ProcessEnd
 
@@ -161,10 +158,10 @@ def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "Record
     warned = False
     with closing(ProcessEnd()) as ending:
         while True:
-            gone = all(each.drain.over for each in fills)
+            gone = all(drain.over for drain in drains)
             over = gone or not ending.running() or time.monotonic() >= end
             try:
-                _fill(fills)
+                _fill(drains)
             except RecordingError as error:  # there may be room again later
                 if not warned:
                     print(f"warning: {error}", file=sys.stderr, flush=True)

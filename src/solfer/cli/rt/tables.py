@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from solfer.cli.columns import aligned
-from solfer.realtime.telemetry.statistics_memory import COMPUTED
-from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
+from solfer.telemetry.statistics import COMPUTED
+from solfer.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
 TIME_TITLES = ("p50", "p99", "max", "left out")
 COLUMN_WIDTH = 8

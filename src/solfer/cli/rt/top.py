@@ -10,9 +10,9 @@ from solfer.cli.columns import aligned
 from solfer.cli.rt.tables import overview
 from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.telemetry.health import reports_of
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
-from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
+from solfer.realtime.emergency_stop import stopped
+from solfer.telemetry.statistics import RuntimeStatistics
+from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport
 
 CLEAR = "\x1b[H\x1b[2J"
@@ -26,7 +26,7 @@ PART_SILENCE_LIMIT = 5.0
 def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
     """Print the tables of an RT layer until Ctrl-C, or once. A layer that has ended may start again."""
     RuntimeStatistics.attach(namespace.folder)
-    observer = StatisticsReader(namespace.folder)
+    observer = StatisticsReader(namespace.folder, stopped)
     others = Reports(namespace)
     before: LayerSummary | None = None
     since = "all cycles"

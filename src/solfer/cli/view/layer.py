@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
-from solfer.realtime.telemetry.health import reports_of
-from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
+from solfer.realtime.emergency_stop import stopped
+from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport
 
 LAYER_PERIOD = 1.0
@@ -22,7 +22,7 @@ class LayerMiddleware(XbotMiddleware):
 
     def __init__(self, namespace: Namespace, name: str):
         super().__init__(namespace, name, listens=False)
-        self._statistics = StatisticsReader(namespace.folder)
+        self._statistics = StatisticsReader(namespace.folder, stopped)
         self._before: LayerSummary | None = None
         self._layer: dict[str, HealthReport] = {}
         self._next = self.now()

@@ -8,9 +8,8 @@ from typing import Any
 import rospy
 
 from solfer.msg import LayerStatistics, PluginStatistics, StageTimes
-from solfer.realtime.telemetry.health import reports_of
-from solfer.realtime.telemetry.statistics_memory import EXECUTOR
-from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
+from solfer.telemetry.statistics import EXECUTOR
+from solfer.telemetry.summaries import LayerSummary, PluginSummary, StageSummary, reports_of
 from solfer.transport import Middleware
 
 logger = logging.getLogger(__name__)

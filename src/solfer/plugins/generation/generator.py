@@ -1,14 +1,17 @@
 """Makes a plugin from a configuration: the Robot, its pipes and the component (Listing 16 of the paper)."""
 
+import json
 import logging
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from solfer.components import Component
 from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
-from solfer.errors import ComponentError, PipeError, SolferError, located, raise_all, repeats, singles
+from solfer.errors import ComponentError, PipeError, SolferError, UnknownName, located, raise_all, repeats, singles
 from solfer.interfaces.declaration import Declaration, Service
 from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, factory
 from solfer.pipes.dofs import joint_map
@@ -25,10 +28,10 @@ from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests, requests_of
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin, PluginParts
-from solfer.plugins.plugin_log import documents_of
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.sharing.robots import Sharing
 from solfer.plugins.tuning import Tuning
+from solfer.recording.log import RunDocuments
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
 from solfer.robot.names import RobotNames, check_tags
@@ -36,6 +39,7 @@ from solfer.transport import Inbox, Middleware
 from solfer.transport.declared import Bindings, bind
 from solfer.transport.endpoints import Reader, Writer
 from solfer.transport.messages import GAINS
+from solfer.transport.middleware import SEED
 
 _LOG = logging.getLogger(__name__)
 
@@ -138,11 +142,22 @@ class Generator:
             jumps=self._jumps(robot, component),
             guard=self._guard(robot),
             publish=self.publish,
-            documents=lambda: documents_of(configuration, robot, self.middleware),
+            documents=partial(self._documents, robot),
             requests=self.requests,
             tuning=self.tuning,
         )
         return Plugin(parts)
+
+    def _documents(self, robot: Robot) -> RunDocuments:
+        """Return the configuration, the description of the robot, the tags, and the seed of a simulated robot."""
+        configuration = self.configuration
+        files = {"configuration.yaml": configuration.text(), "robot.urdf": robot.description.text}
+        if robot.semantics.text:
+            files["robot.srdf"] = robot.semantics.text
+        texts = {f"{configuration.module.name}/tags": json.dumps(configuration.own_tags())}
+        with suppress(UnknownName):  # a robot of hardware has none
+            texts["seed"] = str(self.middleware.parameter(SEED))
+        return RunDocuments(files, texts)
 
     def _jumps(self, robot: Robot, component: Component) -> BaseJumps | None:
         """Make what finds jumps of the base; None: the component has no references in the world."""

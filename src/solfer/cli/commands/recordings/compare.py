@@ -32,21 +32,16 @@ def run(options: argparse.Namespace) -> int:
         RecordingError: A recording cannot be read, or they cannot be compared.
     """
     from solfer.cli.recordings.comparison import report
-    from solfer.recording.comparison import compare
     from solfer.recording.reader import read
+    from solfer.recording.review import check_suffix, compare, comparison_page, save
 
     names = (str(options.first), str(options.second))
     if options.plot is not None:
-        from solfer.recording.pictures.canvas import check_suffix
-
         check_suffix(options.plot)
     result = compare(read(options.first), read(options.second), names, plugins=options.names)
     for line in report(result, names, options.limits):
         print(line)
     if options.plot is not None:
-        from solfer.recording.pictures.canvas import save
-        from solfer.recording.pictures.comparison_page import comparison_page
-
         short = (options.first.stem, options.second.stem)
         save([("comparison", comparison_page(result, short if short[0] != short[1] else names))], options.plot)
     return 1 if result.different else 0

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from solfer.recording.model import Recording
+    from solfer.recording.review import Figure
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,16 +32,16 @@ def run(options: argparse.Namespace) -> int:
         UnknownName: There is no such column.
     """
     from solfer.cli.recordings.progress import progress
-    from solfer.recording.pictures import canvas
     from solfer.recording.reader import read
+    from solfer.recording.review import check_suffix, saved, show
 
     if options.output is not None:
-        canvas.check_suffix(options.output)
+        check_suffix(options.output)
     figures = _figures(read(options.file), options)
     if options.output is None:
-        canvas.show(figures)
+        show(figures)
         return 0
-    for path in dict.fromkeys(progress(canvas.saved(figures, options.output), len(figures), "pages")):
+    for path in dict.fromkeys(progress(saved(figures, options.output), len(figures), "pages")):
         print(path)
     return 0
 
@@ -50,8 +49,7 @@ def run(options: argparse.Namespace) -> int:
 def _figures(recording: "Recording", options: argparse.Namespace) -> "list[tuple[str, Figure]]":
     from solfer.cli.recordings.actions import limits_of
     from solfer.errors import RecordingError
-    from solfer.recording.pictures.columns_page import columns_page
-    from solfer.recording.pictures.plugin_page import plugin_page
+    from solfer.recording.review import columns_page, plugin_page
     from solfer.recording.selection import select
 
     if not any(len(channel.times) for channel in recording.channels.values()):

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     from solfer.cli.recordings.replay import draw, replayed, report
 
     if options.plot is not None:
-        from solfer.recording.pictures.canvas import check_suffix
+        from solfer.recording.review import check_suffix
 
         check_suffix(options.plot)
     replay, found = replayed(options)

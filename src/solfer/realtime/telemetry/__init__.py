@@ -1,1 +1,0 @@
-"""Telemetry of the real-time layer: statistics, health, recordings."""

@@ -1,1 +1,0 @@
-"""Pictures of recordings; the only modules that import matplotlib, when something is drawn."""

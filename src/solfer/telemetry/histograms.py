@@ -1,0 +1,47 @@
+"""Histograms of durations: rows of fixed memory, which other processes may read while they are filled."""
+
+import numpy as np
+
+HISTOGRAM_UNIT = 6  # resolution of the shortest times, as a power of two [ns]
+FINE = 4  # buckets in each doubling of the time, as a power of two
+BUCKETS = 400
+"""Buckets of a histogram: up to 4 s, each at most 1/16 wide; longer times count in the last one."""
+
+HISTOGRAM_WORDS = BUCKETS + 2
+"""Words of a histogram: the number of times, the longest one [ns], then the buckets."""
+
+
+def bucket_of(nanoseconds: int) -> int:
+    """Compute the index of the bucket of a time [ns]."""
+    units = max(nanoseconds >> HISTOGRAM_UNIT, 0)
+    octave = 0
+    while units >> octave >= 2 << FINE:
+        octave += 1
+    return min((octave << FINE) + (units >> octave), BUCKETS - 1)
+
+
+def upper_edge(bucket: int) -> int:
+    """Compute the upper edge of a bucket [ns]."""
+    following = bucket + 1
+    octave = max((following >> FINE) - 1, 0)
+    return (following - (octave << FINE)) << (octave + HISTOGRAM_UNIT)
+
+
+def since(histograms: np.ndarray, earlier: np.ndarray) -> np.ndarray:
+    """Return the counts of all rows since an earlier copy; the longest times are those of the whole run."""
+    recent = histograms - earlier
+    recent[:, 1] = histograms[:, 1]
+    return recent
+
+
+def quantile(histogram: np.ndarray, share: float) -> int:
+    """Compute a time that at least `share` of all do not exceed [ns]; at most 1/16 too long; 0 without any.
+
+    Args:
+        histogram: int64, shape (HISTOGRAM_WORDS,).
+        share: Part of all times.
+    """
+    sums = np.cumsum(histogram[2:])
+    if not sums[-1]:
+        return 0
+    return min(upper_edge(int(np.searchsorted(sums, share * sums[-1]))), int(histogram[1]))

@@ -1,0 +1,71 @@
+"""Compiled parts of a loop's telemetry. A file of its own, so that readers need not wait for the compiler."""
+
+from pathlib import Path
+
+import numpy as np
+
+from solfer.middleware.shared_memory.memory.header import HEADER_LINE
+from solfer.middleware.shared_memory.memory.slot import NEWEST, SLOT_STAMP, SLOT_STATE
+from solfer.numerics.compilation import cached, part
+from solfer.numerics.pointers import indices_at, record_at, release_fence
+from solfer.telemetry import histograms
+
+ROW_RING = np.dtype(
+    [
+        # addresses of the arrays and their sizes, in memory of their own, and how many there are
+        *((name, np.int64) for name in ("arrays", "sizes", "pieces")),
+        # the ring: its memory and its words, how many rows it holds, the words from one to the next
+        *((name, np.int64) for name in ("words", "size", "count", "stride")),
+        ("number", np.int64),
+    ]
+)
+"""What `append` reads, and the number of the row that it wrote last; see `solfer.numerics.pointers.Memory`."""
+
+_bucket_of = part(histograms.bucket_of)
+_ring_at = record_at(ROW_RING)
+
+
+def _append(address, stamp):
+    """Publish the arrays as they are now as the next row; in the order that `Slots` protects."""
+    ring = _ring_at(address)
+    words = indices_at(ring.words, ring.size)
+    arrays = indices_at(ring.arrays, ring.pieces)
+    sizes = indices_at(ring.sizes, ring.pieces)
+    number = ring.number + 1
+    slot = HEADER_LINE // 8 + (number % ring.count) * ring.stride
+    words[slot + SLOT_STATE] = 2 * number - 1
+    words[slot + SLOT_STAMP] = stamp
+    release_fence()
+    place = slot + HEADER_LINE // 8
+    for piece in range(ring.pieces):
+        array = indices_at(arrays[piece], sizes[piece])
+        for index in range(sizes[piece]):
+            words[place + index] = array[index]
+        place += sizes[piece]
+    release_fence()
+    words[slot + SLOT_STATE] = 2 * number
+    release_fence()
+    words[NEWEST] = number
+    ring.number = number
+
+
+def _count_durations(rows, times, always):
+    """Count one duration for each histogram; a zero counts only in the first `always` of them.
+
+    Args:
+        rows: The histograms, int64, shape (rows, HISTOGRAM_WORDS).
+        times: The durations, int64, shape (rows,) [ns].
+        always: Number of histograms that count zeros.
+    """
+    for row in range(len(times)):
+        time = times[row]
+        if row < always or time != 0:
+            rows[row, 0] += 1
+            rows[row, 1] = max(rows[row, 1], time)
+            rows[row, 2 + _bucket_of(time)] += 1
+
+
+append = cached("void(int64, int64)", _append)
+count_durations = cached(
+    "void(int64[:, ::1], int64[::1], int64)", _count_durations, sources=[Path(histograms.__file__)]
+)

@@ -1,0 +1,205 @@
+"""Finds what is recorded on this machine."""
+
+import contextlib
+import logging
+import os
+import shutil
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from solfer.errors import MiddlewareError, RecordingError, UnknownName
+from solfer.middleware.shared_memory.memory.files import PREFIX
+from solfer.middleware.shared_memory.memory.lock import locked
+from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
+from solfer.telemetry.drain import RecordDrain, writer_of
+from solfer.telemetry.rows import RECORDER_FILE
+
+logger = logging.getLogger(__name__)
+
+RECORDINGS_VARIABLE = "SOLFER_RECORDINGS"
+"""Environment variable: a folder in which nodes keep their last seconds when they end."""
+
+SHARED_FOLDER = "recordings"
+"""Folder of a namespace for processes that have no namespace of their own, such as the nodes of a ROS master."""
+
+
+OF_MASTERS = "ros."
+"""How the names of namespaces begin in which nodes of a ROS master are recorded."""
+
+YOUNG, CRASHED = 60.0, 86400.0
+"""Ages up to which such a namespace is kept without a living process: a new one, and one with what a crash left [s]."""
+
+
+def namespace_of_master() -> str:
+    """Return the namespace in which the nodes of this ROS master and of this namespace of ROS are recorded."""
+    port = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
+    inside = os.environ.get("ROS_NAMESPACE", "")
+    return ".".join((f"{OF_MASTERS}{port}", *filter(None, inside.split("/"))))
+
+
+def place_beside(namespace: str, node: str) -> Path:
+    """Return the folder for the recording of a node in a namespace, after making it; sweep the others before.
+
+    Raises:
+        MiddlewareError: It cannot be made.
+    """
+    sweep(namespace)
+    return Namespace(namespace).place(SHARED_FOLDER, node, RECORDER_FILE).parent
+
+
+def sweep(own: str, root: Path = SHARED_MEMORY) -> None:
+    """Remove what nodes of other ROS masters have left, of this user, where none of them lives any more."""
+    for name in names(root):
+        folder = root / f"{PREFIX}{name}"
+        if name != own and name.startswith(OF_MASTERS):
+            with contextlib.suppress(OSError):
+                if _is_left(folder):
+                    shutil.rmtree(folder)
+
+
+def _is_left(folder: Path) -> bool:
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or _age(folder) < YOUNG:
+        return False
+    files = [each for each in folder.rglob("*") if each.is_file()]
+    lives = any(locked(each.with_suffix("")) for each in files if each.suffix == ".lock")
+    return not lives and all(_age(each) > CRASHED for each in files if each.name == RECORDER_FILE)
+
+
+def _age(path: Path) -> float:
+    return time.time() - path.lstat().st_mtime
+
+
+def recordings(root: Path = SHARED_MEMORY) -> Iterator[tuple[str, RecordDrain]]:
+    """Yield the recordings of processes that live and that this one may read, each with the name of its namespace."""
+    for name in names(root):
+        folder = root / f"{PREFIX}{name}"
+        with contextlib.suppress(PermissionError):  # another user's
+            for each in (folder, *sorted((folder / SHARED_FOLDER).glob("*/"))):
+                with contextlib.suppress(MiddlewareError):  # nothing is recorded there
+                    drain = RecordDrain(each)
+                    if not drain.over:
+                        yield name, drain
+
+
+def keep(folder: Path, node: str) -> None:
+    """Copy the memory of a node into the folder `SOLFER_RECORDINGS`, if that is set; if it is not possible, warn of it.
+
+    Args:
+        folder: Folder of the memory.
+        node: Name of the node.
+    """
+    kept = os.environ.get(RECORDINGS_VARIABLE)
+    if not kept:
+        return
+    target = Path(kept, node.strip("/"))
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(folder / RECORDER_FILE, target / RECORDER_FILE)
+    except OSError as error:
+        logger.warning("the last cycles are not kept in %s: %s", target, error.strerror)
+
+
+def write_kept(folder: Path, target: Path) -> list[Path]:
+    """Make a file, `<name>.mcap`, of each recording that was kept in a folder, and return the files.
+
+    Raises:
+        RecordingError: A file cannot be written.
+    """
+    files = []
+    for place in sorted(path.parent for path in folder.rglob(RECORDER_FILE)):
+        drain = RecordDrain(place)
+        target.mkdir(parents=True, exist_ok=True)
+        files.append(target / f"{place.name}.mcap")
+        with closing(writer_of(files[-1], [drain])) as writer:
+            drain.fill()
+            writer.finish(drain.lost)
+    return files
+
+
+class FileRecorder:
+    """A process of its own that writes what a loop records to a file, until the loop has ended, however it ends.
+
+    Args:
+        namespace: Namespace of the loop.
+        plugins: Its plugins.
+        file: The file.
+        patience: Longest wait for plugins that are not there yet [s].
+
+    Attributes:
+        process: The process.
+
+    Raises:
+        RecordingError: Nothing can be written there.
+    """
+
+    PATIENCE = 10.0
+    """Longest time that the end waits for a complete file [s]."""
+
+    def __init__(self, namespace: str, plugins: Sequence[str], file: Path, patience: float = 0.0):
+        if not os.access(file.absolute().parent, os.W_OK):
+            raise RecordingError(
+                "no file can be made there", where=str(file), expected="a folder that exists, and that you may write to"
+            )
+        names = [word for plugin in plugins for word in ("-n", plugin)]
+        command = ["record", *names, "--whole", "--wait", str(patience), namespace, str(file.absolute())]
+        # a session of its own: Ctrl-C ends the loop first, and then this has all of it
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", _MAIN, *command], stdin=subprocess.DEVNULL, start_new_session=True
+        )
+
+    def close(self) -> None:
+        """Wait until the file is complete; the loop has ended."""
+        try:
+            self.process.wait(self.PATIENCE)
+        except subprocess.TimeoutExpired:
+            logger.warning("the recording ends before the loop, which goes on after %g s", self.PATIENCE)
+            self.process.terminate()  # a SIGINT would be lost while Python still begins
+
+
+_MAIN = "import sys; from solfer.cli.main import main; sys.exit(main())"
+
+
+def of_plugins(plugins: Sequence[str], namespace: str = "", root: Path = SHARED_MEMORY) -> list[RecordDrain]:
+    """Return the recordings of plugins by name: of each process, in a namespace or any, its part of them.
+
+    Raises:
+        UnknownName: A plugin is not recorded.
+        MiddlewareError: Several processes record a plugin of this name.
+    """
+    found = [drain for name, drain in recordings(root) if name == (namespace or name)]
+    for plugin in plugins:
+        count = sum(plugin in drain.plugins for drain in found)
+        if not count:
+            known = {name for drain in found for name in drain.plugins}
+            raise UnknownName("plugin", plugin, sorted(known), where="what is recorded now")
+        if count > 1:
+            raise MiddlewareError(
+                f"{count} processes record a plugin '{plugin}'", expected="NAMESPACE of the one that is meant"
+            )
+    return [drain.only(plugins) for drain in found if set(plugins) & set(drain.plugins)]
+
+
+def of_namespace(namespace: str, root: Path = SHARED_MEMORY) -> list[RecordDrain]:
+    """Return all recordings of a namespace; where none is named, of the only one that records.
+
+    Raises:
+        UnknownName: Nothing is recorded there.
+        MiddlewareError: None is named, and several record.
+    """
+    found = list(recordings(root))
+    known = sorted({name for name, _ in found})
+    if not namespace and len(known) > 1:
+        raise MiddlewareError(f"{len(known)} namespaces record", expected=f"NAMESPACE, one of {', '.join(known)}")
+    chosen = namespace or (known[0] if known else "solfer")
+    if chosen not in known:
+        raise UnknownName(
+            "namespace that records", chosen, known, where=str(root), expected="" if known else "plugins that run"
+        )
+    return [drain for name, drain in found if name == chosen]
