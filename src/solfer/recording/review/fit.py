@@ -5,8 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 GAIN_INDEX, OFFSET, DELAY_INDEX = 0, 1, 2
 """Indices of the parameters: none, [rad, m], [s]."""
@@ -26,7 +25,7 @@ BLOCKS = 40
 CHANCE = 1e-6
 """Probability that noise alone makes a parameter significant."""
 
-NORMAL_QUANTILE = float(norm.isf(0.5 * CHANCE))
+NORMAL_QUANTILE = -float(ndtri(0.5 * CHANCE))
 
 LONGEST_DELAY = 0.1
 """Largest delay of a single joint [s]."""
@@ -113,7 +112,7 @@ def _linear(
 @lru_cache
 def _quantile(degrees: int) -> float:
     """Return what Student's t exceeds, to either side, with the probability `CHANCE`."""
-    return float(student.isf(0.5 * CHANCE, degrees))
+    return -float(stdtrit(degrees, 0.5 * CHANCE))
 
 
 def _errors(
