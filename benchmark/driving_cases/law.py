@@ -171,7 +171,7 @@ class WheeledLaw:
         rates, bounds = self._rates(state, references, error, jacobian), self._bounds
         bounds.update(self.position)
         given = jacobian, rates, self._damping, self._ends, self._moved
-        velocity = dense_within(*given, bounds, self._ends[1])[0]
+        velocity = dense_within(*given, bounds=bounds, rigid=self._ends[1])[0]
         self.velocity[self._moved] = velocity[self._moved]
         self.position += self._period * self.velocity
         self._before = place, turn

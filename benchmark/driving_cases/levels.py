@@ -33,7 +33,7 @@ def dense_levels(jacobian, rates, damping, ends, columns):
     return velocity.astype(float)
 
 
-def dense_within(jacobian, rates, damping, ends, columns, bounds, rigid=0):
+def dense_within(jacobian, rates, damping, ends, columns, *, bounds, rigid=0):
     """Solve them within bounds: joints at the ends of their ranges first, then all slower; return count and scale.
 
     Where that breaks the first rows, all is slower alone.

@@ -79,7 +79,7 @@ class Model:
         dofs, values = self._robot.named_state(bundle.start.state)
         self._robot.state.position[dofs] = values
         self._robot.update()
-        tags_of = load(configuration_of(folder, self.driven, tags, is_whole, TRUE_BASE), NAME).tags
+        tags_of = load(configuration_of(folder, self.driven, tags, is_whole, base=TRUE_BASE), NAME).tags
         self.component = WheeledMotion(self._robot, tags_of(WheeledMotion.Tags), NAME)
         self.component.set_rate(1.0 / PERIOD)
         self.component.init()

@@ -94,7 +94,7 @@ class World:
         self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
         self.bus.every(STEP, self._server.cycle)
         base = ESTIMATED_BASE if is_estimated else TRUE_BASE
-        file = configuration_of(folder, self.driven, tags, is_whole, base, self.more)
+        file = configuration_of(folder, self.driven, tags, is_whole, base=base, more=self.more)
         self.costs: list[float] = []
         self.run(SETTLE)
         if is_estimated:
@@ -162,7 +162,7 @@ def parameters_of(robot: Driven) -> dict[str, str]:
     return found
 
 
-def configuration_of(folder: Path, robot: Driven, tags: str, is_whole: bool, base: str, more: str = "") -> Path:
+def configuration_of(folder: Path, robot: Driven, tags: str, is_whole: bool, *, base: str, more: str = "") -> Path:
     """Write the robot's configuration with what differs."""
     text, path, secondary = robot.configuration.read_text(), folder / "main.yaml", folder / "secondary.yaml"
     if not robot.is_centauro:

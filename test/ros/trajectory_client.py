@@ -32,8 +32,9 @@ def taken(client: ActionClient) -> Goal:
 def main(argv: list[str]) -> int:
     """Run until the goal has ended."""
     with closing(RosMiddleware(RosNode("trajectory_client", argv))) as middleware:
-        types = messages.FollowGoal, messages.FollowFeedback, messages.FollowResult
-        client = ActionClient(middleware, "joint_states/follow_joint_trajectory", messages.FOLLOW, *types)
+        name = "joint_states/follow_joint_trajectory"
+        types = (messages.FollowGoal, messages.FollowFeedback)
+        client = ActionClient(middleware, name, messages.FOLLOW, *types, result=messages.FollowResult)
         sent, told = taken(client), None
         while middleware.running():
             client.poll()

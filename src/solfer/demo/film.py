@@ -32,6 +32,7 @@ def film(
     positions: np.ndarray,
     world: WorldRecord,
     path: Path,
+    *,
     progress: Callable[[int, int], None] = lambda done, count: None,
 ) -> None:
     """Draw positions of the robot's DoFs, shape (k, n), at `times` [s], shape (k,), into a GIF.

@@ -20,6 +20,7 @@ def build_lower_level(
     groups: Mapping[str, Iterable[str]],
     gains: Mapping[str, GainRecord] | None = None,
     record: LowerLevelRecord | None = None,
+    *,
     posture: np.ndarray | None = None,
     actuators: Actuators | None = None,
 ) -> LowerLevel:
@@ -65,6 +66,7 @@ def _controller(
     kinematics: Kinematics,
     driven: Sequence[str],
     groups: Mapping[str, Iterable[str]],
+    *,
     gains: Mapping[str, GainRecord] | None,
     posture: np.ndarray | None,
 ) -> LowerLevelController:

@@ -66,6 +66,7 @@ class LowerLevel:
         record: LowerLevelRecord | None = None,
         passive: Collection[str] = (),
         actuators: Actuators | None = None,
+        *,
         posture: np.ndarray | None = None,
     ):
         self._passive = tuple(passive)

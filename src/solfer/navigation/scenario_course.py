@@ -98,6 +98,7 @@ class ScenarioCourse(Course):
         target: str,
         odometry: str,
         contacts: Sequence[str] = (),
+        *,
         positions: bool = False,
     ):
         self._player = player

@@ -309,6 +309,7 @@ class StateFeedbackPipe(FeedbackPipe):
         state: State,
         fields: Sequence[str],
         dofs: np.ndarray,
+        *,
         reception: Reception,
     ):
         super().__init__(name, reader, reception.required)

@@ -56,6 +56,7 @@ class JointClaim:
         middleware: Middleware,
         follows: Sequence[str] = (),
         publishes: Sequence[str] = (),
+        *,
         position: Callable[[], np.ndarray] | None = None,
     ):
         self._requests = ClaimRequests(plugin, pipes, middleware, follows=tuple(map(_bare, follows)), position=position)

@@ -92,6 +92,7 @@ def run(
     budget: BudgetRules | None = None,
     polls: Sequence[Callable[[], None]] = (),
     requires: Mapping[str, Sequence[str]] = NOTHING,
+    *,
     recorder: CycleRecorder | None = None,
 ) -> LoopStatistics:
     """Run a plugin, or several one after the other, until the middleware ends; then stop and close them.

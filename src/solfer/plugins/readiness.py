@@ -37,6 +37,7 @@ class Readiness:
         claim: JointClaim | None,
         middleware: Middleware,
         period: float,
+        *,
         stall: float | None = None,
     ):
         self.feedbacks = FeedbackTimeouts(watches)

@@ -71,6 +71,7 @@ class StartConditions:
         middleware: Middleware,
         claim: JointClaim | None,
         period: float,
+        *,
         stall: float | None = None,
     ):
         self._plugin = plugin

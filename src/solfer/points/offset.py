@@ -180,6 +180,7 @@ def chosen(
     count: int,
     names: Sequence[str],
     where: str,
+    *,
     error: type[SolferError],
 ) -> np.ndarray:
     """Convert desired rows or DoFs to their indices, shape (m,), in the order in which they are desired.

@@ -96,6 +96,7 @@ class Executor:
         estop: EmergencyStopLatch,
         rules: ExecutorRules | None = None,
         telemetry: ExecutorTelemetry | None = None,
+        *,
         polls: Sequence[Callable[[], None]] = (),
         requires: Mapping[str, Sequence[str]] = NOTHING,
     ):

@@ -28,6 +28,7 @@ def read_parts(
     floating_base: bool | None,
     actuators: str | Path | None,
     name: str | None,
+    *,
     others: Sequence[str | Path],
     contacts: str | Path | None,
 ) -> Parts:

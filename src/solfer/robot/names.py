@@ -190,7 +190,7 @@ def _check_dofs(dofs: DofsRecord, names: RobotNames, maps: Collection[str], prob
 
 
 def _check(
-    record: Record, key: Key | None, kind: str, name: str, known: Collection[str] | None, problems: Problems
+    record: Record, key: Key | None, kind: str, name: str, known: Collection[str] | None, *, problems: Problems
 ) -> None:
     if known is None or name in known:
         return

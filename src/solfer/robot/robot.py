@@ -103,6 +103,7 @@ class Robot:
         actuators: Actuators | None = None,
         name: str = "",
         contacts: Sequence[ContactRecord] = (),
+        *,
         others: Sequence[Description] = (),
     ):
         self.kinematics = kinematics
@@ -139,6 +140,7 @@ class Robot:
         floating_base: bool | None = None,
         actuators: str | Path | None = None,
         name: str | None = None,
+        *,
         others: Sequence[str | Path] = (),
         contacts: str | Path | None = None,
     ) -> "Robot":

@@ -159,7 +159,7 @@ def _check_step(step: Step, record: ScenarioRecord, problems: Problems) -> None:
 
 
 def _check_index(
-    step: Step, path: Sequence[Key], index: int, table: Sequence[object], name: str, problems: Problems
+    step: Step, path: Sequence[Key], index: int, table: Sequence[object], name: str, *, problems: Problems
 ) -> None:
     """Check that an index is one of a table."""
     if index < len(table):

@@ -61,6 +61,7 @@ def carry_out(
     changes: YamlNode | None,
     variations: Mapping[str, Any],
     recording: Path | None = None,
+    *,
     columns: Path | None = None,
     gui: bool = False,
 ) -> Result:

@@ -82,6 +82,7 @@ class QpHierarchy:
         constraints: Sequence[Constraint] = (),
         policy: Policy | str = Policy.HOLD,
         position: np.ndarray | None = None,
+        *,
         relax: Sequence[str] | None = None,
     ):
         self.stack, self.policy = Stack(levels), _policy(policy)

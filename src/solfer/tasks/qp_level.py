@@ -95,6 +95,7 @@ class QpLevel:
         bounds: VelocityBounds | None,
         inequalities: Inequalities,
         weights: np.ndarray,
+        *,
         basis: np.ndarray,
     ):
         start = stack.ends[index]

@@ -159,6 +159,7 @@ class Task:
         values: ArrayLike,
         least: float = -np.inf,
         above: float = -np.inf,
+        *,
         largest: float = np.finfo(float).max,
     ) -> None:
         values = as_numbers(values, what, self.where)

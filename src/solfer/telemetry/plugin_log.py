@@ -147,7 +147,7 @@ class PluginLog:
             _add_point(log, name, port, frame=sent.frame)
 
     def _add_copies(
-        self, log: Logger, name: str, kind: str, parts: Sequence[np.ndarray], frame: str, child: str = ""
+        self, log: Logger, name: str, kind: str, parts: Sequence[np.ndarray], frame: str, *, child: str = ""
     ) -> None:
         """Declare numbers that are in several arrays, one after the other."""
         whole = np.zeros(sum(part.size for part in parts))

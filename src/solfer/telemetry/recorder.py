@@ -48,6 +48,7 @@ class Recorder:
         rate: float,
         seconds: float = RECORDER_DURATION,
         attachments: Mapping[str, str] | None = None,
+        *,
         metadata: Mapping[str, str] | None = None,
     ):
         layout, arrays = RowLayout.of(sources, attachments or {}, metadata or {})

@@ -54,6 +54,7 @@ class Page:
         middleware: Middleware,
         stop: Callable[[], None] | None = None,
         control: bool = False,
+        *,
         playback: Playback | None = None,
         foxglove: int | None = None,
     ):

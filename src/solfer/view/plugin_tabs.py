@@ -68,6 +68,7 @@ class _PluginTab:
         name: str,
         requests: PageRequests,
         parameters: KnownParameters,
+        *,
         control: PageControl | None,
     ):
         self._gui = gui

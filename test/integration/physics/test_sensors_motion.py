@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from support.controllers import accept
 from support.integration.world import perfect
 
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -159,7 +160,7 @@ def test_torques_agree_with_inverse_dynamics(simulation):
             goal = start.copy()
             goal[knees] += 0.05 * np.sin(0.002 * step) * np.array([1.0, -1.0, -1.0, 1.0])
             goal[controller.joints.index("torso_yaw")] += 0.1 * np.sin(0.002 * step)
-            controller.accept(JointMessage(controller.joints, position=goal))
+            accept(controller, JointMessage(controller.joints, position=goal))
         simulation.step()
         wrenches = simulation.sensors["contacts"].messages()
         if step < 500:

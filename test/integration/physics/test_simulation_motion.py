@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.controllers import accept
 
 from solfer.simulation import Simulation
 from solfer.transport.messages import JointMessage
@@ -42,7 +43,7 @@ def ramp(simulation, state, rate=0.5):
     for step in range(steps + 1000):
         if step % PERIOD == 0:
             share = min((step + PERIOD) / steps, 1.0)
-            controller.accept(JointMessage(controller.joints, position=begin + share * (goal - begin)))
+            accept(controller, JointMessage(controller.joints, position=begin + share * (goal - begin)))
         simulation.step()
         contacts = min(contacts, len(simulation.contact_links()))
     return contacts

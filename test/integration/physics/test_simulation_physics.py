@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
+from support.controllers import accept
 
 from solfer.model import Description, Kinematics
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -27,7 +28,7 @@ def flight(repository):
     controller = simulation.lower_level.controller("position_controller")
     effort = np.random.default_rng(5).uniform(-0.2, 0.2, len(controller.joints)) * controller.limits.effort
     zeros = np.zeros(len(controller.joints))
-    controller.accept(JointMessage(controller.joints, effort=effort, stiffness=zeros, damping=zeros + 0.5))
+    accept(controller, JointMessage(controller.joints, effort=effort, stiffness=zeros, damping=zeros + 0.5))
     history = []
     for _ in range(50):
         before = simulation.q.copy(), simulation.v.copy()

@@ -85,8 +85,8 @@ def test_a_planned_trajectory_is_followed(tmp_path):
         plugin = generate(load(config / "panda.yaml", "joint_states"), node, Registry().find("joint_states"))
         bus.every(1.0 / plugin.rate, plugin.cycle)
         name = "joint_states/follow_joint_trajectory"
-        types = (FollowGoal, FollowFeedback, FollowResult)
-        client = ActionClient(MemoryMiddleware(bus, "move_group"), name, FOLLOW, *types)
+        group = MemoryMiddleware(bus, "move_group")
+        client = ActionClient(group, name, FOLLOW, FollowGoal, FollowFeedback, result=FollowResult)
         bus.every(0.02, client.poll)
         bus.run_until(1.0)
         trajectory = planned()

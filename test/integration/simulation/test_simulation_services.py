@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from support.controllers import accept
 from support.integration.world import World
 
 from solfer.errors import SimulationError, UnknownName
@@ -78,7 +79,7 @@ def test_nothing_ages_in_a_pause(world):
 def test_a_velocity_does_not_expire_in_a_pause(world):
     world.run(0.1)
     wheels = world.simulation.lower_level.controller("velocity_controller")
-    wheels.accept(JointMessage(wheels.joints, velocity=np.ones(4)))
+    accept(wheels, JointMessage(wheels.joints, velocity=np.ones(4)))
     assert ask(world, "pause", data=True).success
     world.run(3.0)
     assert wheels.velocity.all()
@@ -158,7 +159,7 @@ def test_friction_of_the_wheels_decides_whether_it_drives(world):
         world.run(0.2)
         begin = world.simulation.body.position.copy()
         wheels = world.simulation.lower_level.controller("velocity_controller")
-        wheels.accept(JointMessage(wheels.joints, velocity=np.array([1.0, -1.0, 1.0, -1.0])))
+        accept(wheels, JointMessage(wheels.joints, velocity=np.array([1.0, -1.0, 1.0, -1.0])))
         world.run(0.5)
         assert (np.linalg.norm((world.simulation.body.position - begin)[:2]) > 0.02) == moves
 

@@ -52,7 +52,7 @@ def make(  # noqa: PLR0913, PLR0917 a test names what it changes
     sensor = BodySensor(mount, reading, convention.position.type == "FULL", calibrated)
     reader = reader or Told()
     chart = Kinematics(DESCRIPTION).base
-    pipe = BodyFeedbackPipe("base", reader, state, chart, sensor, fields, Reception(low_pass=low_pass))
+    pipe = BodyFeedbackPipe("base", reader, state, chart, sensor, fields=fields, reception=Reception(low_pass=low_pass))
     return pipe, reader, state
 
 

@@ -39,11 +39,6 @@ def make(**record):
     return made
 
 
-def accept(controller, message):
-    """Check and apply a command of one controller."""
-    controller.apply(*controller.check(message))
-
-
 def turn(lower_level, sender, speed=1.0, component=""):
     """Command the wheel."""
     message = JointMessage(("roll",), velocity=np.array([speed]), sender=sender, component=component)

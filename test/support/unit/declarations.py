@@ -121,4 +121,4 @@ class CountingNode:
 
 def counting_client(middleware, name="abacus/count"):
     """Make a client of the node's action."""
-    return ActionClient(middleware, name, COUNT, CountGoal, CountFeedback, CountResult)
+    return ActionClient(middleware, name, COUNT, CountGoal, CountFeedback, result=CountResult)

@@ -40,7 +40,9 @@ class Bench:
         for index, point in enumerate(self._points):
             point.jacobian[(0, 1), (2 * index, 2 * index + 1)] = 1.0
         self.polygon = SupportPolygon(self._points[:4], self._points[4], LEAST)
-        self.guard = MotionGuard(self.polygon, self.lifted, WHEELS, self.rates, LEGS, TURNING, self.velocity)
+        self.guard = MotionGuard(
+            self.polygon, self.lifted, WHEELS, self.rates, LEGS, turning=TURNING, velocity=self.velocity
+        )
 
     def update(self, pace=1.0, is_bound=False):
         for point, place in zip(self._points, self.places, strict=True):

@@ -34,7 +34,7 @@ def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
         true = HEIGHT + float(ground.mean())
         arms = np.column_stack((PLACES, ground - true - lean * PLACES[:, 0]))
         position[:2] = place
-        missing = heights.missing_height(arms, UP, position, 0.0, weights, np.append(direction, 0.0), 0.0)
+        missing = heights.missing_height(arms, UP, position, 0.0, weights, velocity=np.append(direction, 0.0), turn=0.0)
         raised = 0.0 if math.isnan(missing) else missing
         position[2] += raised
         heights.note(raised, weights)

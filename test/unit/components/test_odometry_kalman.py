@@ -24,7 +24,7 @@ ALL = np.ones(4, dtype=bool)
 
 
 def filtered():
-    return WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, RADIUS)
+    return WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, radius=RADIUS)
 
 
 def drive(kalman, random, cycles, rest=100, spun=None):
@@ -107,7 +107,7 @@ def test_the_tilt_is_as_uncertain_as_it_says():
     random, arm, squares = np.random.default_rng(5), np.array((0.0, 0.0, -0.6)), []
     deviation, places = math.radians(0.5), [0, 1, STATE_TILT, STATE_TILT + 1]
     for _ in range(40):
-        kalman = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, RADIUS, deviation)
+        kalman = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, radius=RADIUS, tilt=deviation)
         tilt, slope = deviation * random.standard_normal(2), KALMAN_UNEVENNESS * random.standard_normal(2)
         base, bias = np.zeros(2), BIAS * random.standard_normal(2)
         for k in range(200):
@@ -130,7 +130,7 @@ def test_the_tilt_is_as_uncertain_as_it_says():
 
 
 def test_it_learns_biases_of_the_tilt_at_rest():
-    kalman, random = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, RADIUS, 0.01), np.random.default_rng(7)
+    kalman, random = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, radius=RADIUS, tilt=0.01), np.random.default_rng(7)
     for _ in range(300):
         kalman.rest(np.array((BIAS, -BIAS, 0.0)) + NOISE / math.sqrt(PERIOD) * random.standard_normal(3), PERIOD)
     deviation = NOISE / math.sqrt(300 * PERIOD)
@@ -139,7 +139,7 @@ def test_it_learns_biases_of_the_tilt_at_rest():
 
 
 def test_a_slope_is_no_error_of_the_tilt():
-    kalman = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, RADIUS, 0.01)
+    kalman = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, radius=RADIUS, tilt=0.01)
     assert not kalman.level(0.2, 0.0) and not kalman.tilt[0] and kalman.level(0.005, 0.0) and kalman.tilt[0] > 0.0
 
 

@@ -34,7 +34,7 @@ GOOD = JointTrajectory(
 def motion(trajectory, start=(0.0, 0.0), velocity=(0.0, 0.0), now=0.0):
     """Check a trajectory; return its motion and its time."""
     places = CHECK.places(trajectory.joint_names)
-    return CHECK.motion(trajectory, places, np.array(start), np.array(velocity), np.array(start), now)
+    return CHECK.motion(trajectory, places, np.array(start), np.array(velocity), np.array(start), now=now)
 
 
 def changed(point, **fields):

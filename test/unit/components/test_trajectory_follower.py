@@ -50,7 +50,7 @@ class Scene:
         self._publish = bind("joint_states", declared, node, self.inbox)
         outside = MemoryMiddleware(self.bus, "client")
         name = "joint_states/follow_joint_trajectory"
-        self.client = ActionClient(outside, name, FOLLOW, FollowGoal, FollowFeedback, FollowResult)
+        self.client = ActionClient(outside, name, FOLLOW, FollowGoal, FollowFeedback, result=FollowResult)
         self._topic = outside.writer("joint_states/joint_trajectory", TRAJECTORY)
         self.follows, self.rows = True, []
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.unit.cart import accept
+from support.controllers import accept
 
 from solfer.lower_level import ImpedanceController, JointLimits
 from solfer.lower_level.laws.catch_up import CatchUp

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.unit.cart import accept
+from support.controllers import accept
 
 from solfer.errors import CommandRefused, NotFinite, SizeMismatch
 from solfer.lower_level import ImpedanceController, JointLimits, VelocityController

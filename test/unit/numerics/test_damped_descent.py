@@ -53,7 +53,7 @@ def test_velocities_within_bounds(kind):
         bounds = VelocityBounds([f"joint_{dof}" for dof in range(SIZE)], *ranges, speed, PERIOD)
         is_at_end = (random.uniform(size=SIZE) < 0.2) & np.isfinite(ranges[1])
         bounds.update(np.where(is_at_end, ranges[1], 0.0))
-        expected, count, scale = levels.dense_within(*given, ENDS, COLUMNS, bounds)
+        expected, count, scale = levels.dense_within(*given, ENDS, COLUMNS, bounds=bounds)
         found = descent.update(*given, bounds)
         assert_allclose(found, expected, atol=1e-9 * max(1.0, abs(expected).max()), rtol=0.0)
         assert descent.count == count and abs(descent.scale - scale) < 1e-9

@@ -27,7 +27,9 @@ def publish(message, **tags):
     state, writer = State(DESCRIPTION_DOFS), Kept()
     state.position[:], state.velocity[:] = Q, V
     convention = ConventionRecord.model_validate(tags)
-    pipe = BodyCommandPipe("pipe", writer, message, Kinematics(DESCRIPTION), state, PublishedLink(LINK, convention))
+    pipe = BodyCommandPipe(
+        "pipe", writer, message, Kinematics(DESCRIPTION), state, link=PublishedLink(LINK, convention)
+    )
     pipe.collect()
     pipe.send(2.5)
     return writer.messages[0]
@@ -48,7 +50,7 @@ def test_odometry_carries_the_covariances_of_who_estimates_the_base():
     known = state.add(POSE_COVARIANCE, 36), state.add(TWIST_COVARIANCE, 36)
     kinematics, names = Kinematics(DESCRIPTION), ("nav_msgs/Odometry", LINK)
     pipe = BodyCommandPipe(
-        "pipe", writer, names[0], kinematics, state, PublishedLink(LINK, ConventionRecord(), "odom", known)
+        "pipe", writer, names[0], kinematics, state, link=PublishedLink(LINK, ConventionRecord(), "odom", known)
     )
     state[POSE_COVARIANCE][:], state[TWIST_COVARIANCE][:] = np.arange(36.0), np.arange(36.0, 72.0)
     pipe.collect()

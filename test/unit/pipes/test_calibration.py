@@ -37,7 +37,13 @@ def test_measurements_are_converted_to_the_model(mapping, calibration):
     )
     state = State(DOFS)
     pipe = JointFeedbackPipe(
-        "joints", reader, mapping, state, ("position", "velocity", "effort"), Reception(), JointSender(calibration)
+        "joints",
+        reader,
+        mapping,
+        state,
+        ("position", "velocity", "effort"),
+        reception=Reception(),
+        sender=JointSender(calibration),
     )
     state.position[0] = 0.125
     assert pipe.run() is MessageStatus.NEW
@@ -51,7 +57,7 @@ def test_measurements_are_converted_to_the_model(mapping, calibration):
 def test_names_of_the_model_are_refused(mapping, calibration):
     reader = Told(JointMessage(("wheel", "yaw", "knee"), np.zeros(3)))
     pipe = JointFeedbackPipe(
-        "joints", reader, mapping, State(DOFS), ("position",), Reception(), JointSender(calibration)
+        "joints", reader, mapping, State(DOFS), ("position",), reception=Reception(), sender=JointSender(calibration)
     )
     assert pipe.run() is MessageStatus.OLD and pipe.refused == 1
 
@@ -60,7 +66,9 @@ def test_commands_are_converted_to_the_hardware(mapping, calibration):
     """Hardware receives its own names, signs and offsets, while the gate checks the model's values."""
     state, writer = State(DOFS), Kept()
     state.position[:], state.torque[:] = (9.0, -0.2, 1.0, 7.0), (9.0, -5.0, 6.0, -4.0)
-    pipe = JointCommandPipe("joints", writer, mapping, state, ("position", "effort"), JointReceiver(calibration))
+    pipe = JointCommandPipe(
+        "joints", writer, mapping, state, ("position", "effort"), receiver=JointReceiver(calibration)
+    )
     for _ in range(2):  # sending twice does not calibrate twice
         pipe.collect()
         pipe.send(0.25)
@@ -77,7 +85,9 @@ def test_commands_are_converted_to_the_hardware(mapping, calibration):
 
 def test_changes_of_a_gate_are_sent(mapping, calibration):
     writer = Kept()
-    pipe = JointCommandPipe("joints", writer, mapping, State(DOFS), ("position", "effort"), JointReceiver(calibration))
+    pipe = JointCommandPipe(
+        "joints", writer, mapping, State(DOFS), ("position", "effort"), receiver=JointReceiver(calibration)
+    )
     pipe.collect()
     pipe.message.position[1] = 0.1
     pipe.send(0.0)
@@ -90,7 +100,9 @@ def test_gains_have_neither_sign_nor_zero(mapping, calibration):
         if name not in state:
             state.add(name)
         state[name] = np.array(numbers)
-    pipe = JointCommandPipe("joints", writer, mapping, state, ("stiffness", "acceleration"), JointReceiver(calibration))
+    pipe = JointCommandPipe(
+        "joints", writer, mapping, state, ("stiffness", "acceleration"), receiver=JointReceiver(calibration)
+    )
     pipe.collect()
     pipe.send(0.0)
     assert_allclose(writer.messages[0].stiffness, [500.0, 300.0, 400.0])

@@ -54,8 +54,9 @@ class Scene:
         self.robot = moved(DRIVERS[driver])(folder, "solfer.components.joint_states:JointStates")
         self.bus, self.plugin = self.robot.fleet.bus, self.robot.plugin
         self.client = MemoryMiddleware(self.bus, "client")
-        types = (messages.FollowGoal, messages.FollowFeedback, messages.FollowResult)
-        self.action = ActionClient(self.client, "first/follow_joint_trajectory", messages.FOLLOW, *types)
+        name = "first/follow_joint_trajectory"
+        types = (messages.FollowGoal, messages.FollowFeedback)
+        self.action = ActionClient(self.client, name, messages.FOLLOW, *types, result=messages.FollowResult)
         self.rolls = []
         self.run(0.1)
 

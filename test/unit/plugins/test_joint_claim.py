@@ -99,7 +99,7 @@ def test_a_claim_has_what_is_measured_in_the_numbers_of_the_hardware():
     middleware, mapping = MemoryMiddleware(bus, "cart"), robot.maps["ACTUATED"]
     calibration = Calibration([f"J_{name}" for name in mapping.external], [1, -1], [0.0, 0.3])
     writer = middleware.writer("arm/command", "solfer/JointCommand")
-    pipe = JointCommandPipe("arm", writer, mapping, robot.command, ("position",), JointReceiver(calibration))
+    pipe = JointCommandPipe("arm", writer, mapping, robot.command, ("position",), receiver=JointReceiver(calibration))
     lower_level = LowerLevel(bus, ClaimAnswer())
     place = np.where(np.array(robot.dofs) == "shoulder", 0.2, np.nan)
     claim = JointClaim("cart", [pipe], middleware, position=lambda: place)

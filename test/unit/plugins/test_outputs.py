@@ -43,7 +43,9 @@ class Sender:
         other = factory.controller(published(sink="out", interface={"position": True, "velocity": True}), context)
         known = None if measured is None else np.isin(self.robot.dofs, measured)
         everything = np.ones(self.robot.size, dtype=bool)
-        self.blend = StartBlend("cart", [pipe], self.robot, RATE, SHORTEST, known, everything if efforts else None)
+        self.blend = StartBlend(
+            "cart", [pipe], self.robot, RATE, SHORTEST, measured=known, efforts=everything if efforts else None
+        )
         gate = CommandGate("cart", pipe, self.robot.lower_limits, self.robot.upper_limits)
         self.outputs = Outputs([(pipe, gate), (other, None)], self.blend, self.robot, 1.0 / RATE, idle)
         self.names = pipe.message.names

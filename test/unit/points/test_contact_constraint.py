@@ -25,7 +25,7 @@ MIXED = ((1.0, 0.0, 0.5, 0.0, 0.0, 0.0), (0.0, 2.0, 0.0, 0.0, 0.3, 0.0), (0.0, 0
 ROWS = {"frictionless": NORMAL, "a point": None, "a flat foot": np.eye(6), "screws": MIXED}
 CONTACTS = {
     "point": lambda link, robot, rows: PointContact(link, robot, OFFSET, rows),
-    "ball": lambda link, robot, rows: BallContact(link, robot, 0.04, OFFSET, SLOPE, rows),
+    "ball": lambda link, robot, rows: BallContact(link, robot, 0.04, OFFSET, SLOPE, constraint=rows),
     "wheel": lambda link, robot, rows: RollingContact(link, robot, **WHEEL, normal=SLOPE, constraint=rows),
 }
 

@@ -138,7 +138,7 @@ def test_a_level_takes_what_the_one_before_it_left_beyond_limits(arm, sign):
     stack = Stack([Task("first", Rows(arm, np.eye(7)[2:3])), Task("second", Rows(arm, np.eye(7)[3:4]), velocity=0.3)])
     stack.update()
     before = sign * np.array((1.0 + 1e-5, 0.5 + 1e-5, 0.1, 0.0, 0.0, 0.0, 0.0))
-    solution = QpLevel(stack, 1, bounds, wall, np.full(1, np.inf), np.zeros((2, 7))).solve(before)
+    solution = QpLevel(stack, 1, bounds, wall, np.full(1, np.inf), basis=np.zeros((2, 7))).solve(before)
     assert solution.is_solved
     assert_allclose(solution.x, before + 0.3 * np.eye(7)[3], rtol=0.0, atol=1e-6)
 

@@ -21,7 +21,7 @@ def test_memory_of_ended_node_becomes_a_file(tmp_path, monkeypatch):
     log.add("error", numbers, ("x", "y"), "m")
     folder = tmp_path / "memory"
     folder.mkdir()
-    recorder = Recorder(folder, log.sources, 100.0, 1.0, {"arm/robot.urdf": "<x/>"}, {"seed": "3"})
+    recorder = Recorder(folder, log.sources, 100.0, 1.0, {"arm/robot.urdf": "<x/>"}, metadata={"seed": "3"})
     for cycle in range(40):
         numbers[:] = cycle, -cycle
         recorder.append(cycle * 10_000_000)

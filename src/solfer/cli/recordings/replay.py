@@ -48,6 +48,7 @@ def opened(
     configuration: Path | None,
     plugin: str,
     system: str | None,
+    *,
     changed: Callable[[Configuration], Configuration] = lambda each: each,
 ) -> Iterator[Replay]:
     """Make a replay, which has not run yet, and warn of what keeps it from being the same.

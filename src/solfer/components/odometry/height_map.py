@@ -64,6 +64,7 @@ class HeightMap:
         position: np.ndarray,
         heading: float,
         weights: np.ndarray,
+        *,
         velocity: np.ndarray,
         turn: float,
     ) -> float:

@@ -125,7 +125,15 @@ class WheelInertialFilter:
     """
 
     def __init__(
-        self, count: int, acceleration: float, noise: float, bias: float, walk: float, radius: float, tilt: float = 0.0
+        self,
+        count: int,
+        acceleration: float,
+        noise: float,
+        bias: float,
+        walk: float,
+        *,
+        radius: float,
+        tilt: float = 0.0,
     ):
         size = STATE_RADIUS + count
         self._variances = FilterVariances(

@@ -105,6 +105,7 @@ class SupportGovernor:
         gains: tuple[float, float],
         horizon: float,
         recovery: float,
+        *,
         speed: float,
         holds: bool,
     ):

@@ -145,6 +145,7 @@ class JointProgram:
         base: np.ndarray,
         camber: np.ndarray,
         rates: np.ndarray,
+        *,
         force: np.ndarray,
     ) -> Solution:
         """Solve the program of this cycle, after an update of the wheels.

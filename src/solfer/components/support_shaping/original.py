@@ -101,6 +101,7 @@ class OriginalShaping:
         wheels: DrivenWheels,
         tasks: DrivingTasks,
         references: References,
+        *,
         joints: CommandedJoints,
     ):
         robot.dynamics.subscribe(BIAS)

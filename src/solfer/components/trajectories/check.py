@@ -74,6 +74,7 @@ class TrajectoryCheck:
         start: np.ndarray,
         velocity: np.ndarray,
         measured: np.ndarray,
+        *,
         now: float,
     ) -> tuple[ViaPoints, float]:
         """Make the motion of a trajectory from a present state; points that have passed are left out.

@@ -76,6 +76,7 @@ class Layers:
         system: str | None = None,
         folders: Folders = (),
         middleware: str | None = None,
+        *,
         over: YamlNode | None = None,
     ):
         problems.reading(os.fspath(file))

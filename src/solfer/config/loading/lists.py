@@ -231,7 +231,7 @@ def _named(
 
 
 def _expanded(
-    entry: YamlNode, plugin: str, name: str, layers: Layers, default: Naming, problems: Problems
+    entry: YamlNode, plugin: str, name: str, layers: Layers, default: Naming, *, problems: Problems
 ) -> Iterator[ListedPlugin]:
     """Yield the plugins of a shared plugin that is listed in an RT layer."""
     node = layers.main.nearest(("modules", name))

@@ -54,6 +54,7 @@ def complain(
     record: type[BaseModel],
     problems: Problems,
     also: Iterable[str] = (),
+    *,
     beside: YamlNode | None = None,
 ) -> None:
     """Note each error of pydantic in the value of `node` in `problems`.

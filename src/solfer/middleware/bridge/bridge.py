@@ -69,6 +69,7 @@ class Bridge:
         inwards: Sequence[Route],
         outwards: Sequence[Route],
         search: BridgeSearch | None = None,
+        *,
         beside: Callable[[], None] = lambda: None,
     ):
         self._inside = inside

@@ -76,6 +76,7 @@ class Subscription:
         size: int,
         store,
         now: Callable[[], float] = time.monotonic,
+        *,
         largest: int | None = None,
     ):
         self.codec: Codec = codec(message)

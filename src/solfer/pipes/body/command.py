@@ -56,6 +56,7 @@ class BodyCommandPipe(CommandPipe):
         message: str,
         kinematics: Kinematics,
         state: State,
+        *,
         link: PublishedLink,
     ):
         covariances = link.covariances

@@ -67,6 +67,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         state: State,
         chart: BaseChart,
         sensor: BodySensor,
+        *,
         fields: Sequence[str],
         reception: Reception,
     ):

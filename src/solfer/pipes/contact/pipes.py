@@ -85,7 +85,14 @@ class _Wrenches:
             np.matmul(self._turned.reshape(2, 3), self._rotation(), out=self._published.reshape(2, 3))
 
     def _move(
-        self, source: np.ndarray, taken: np.ndarray, sign: float, out: np.ndarray, put: np.ndarray, places: np.ndarray
+        self,
+        source: np.ndarray,
+        taken: np.ndarray,
+        sign: float,
+        out: np.ndarray,
+        put: np.ndarray,
+        *,
+        places: np.ndarray,
     ) -> None:
         positions = self._robot.contacts.positions
         origins = self._origins.value.reshape(-1, 3)
@@ -132,6 +139,7 @@ class ContactFeedbackPipe(PointFeedbackPipe):
         robot: Robot,
         carried: CarriedContacts,
         required: bool = True,
+        *,
         known: Collection[str] | None = (),
     ):
         port = carried.port()

@@ -70,6 +70,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         mapping: BidirectionalMap,
         state: State,
         fields: Sequence[str],
+        *,
         reception: Reception,
         sender: JointSender,
     ):
@@ -257,6 +258,7 @@ class JointCommandPipe(CommandPipe):
         mapping: BidirectionalMap,
         state: State,
         fields: Sequence[str],
+        *,
         receiver: JointReceiver,
         low_pass: MakeFilter | None = None,
     ):

@@ -59,7 +59,9 @@ class StartLimits:
         interface = interface_of(field)
         return robot.lower_limits[interface][self._dofs], robot.upper_limits[interface][self._dofs]
 
-    def _error(self, field: str, index: int, value: float, lower: float, upper: float, tolerance: float) -> OutOfLimits:
+    def _error(
+        self, field: str, index: int, value: float, lower: float, upper: float, *, tolerance: float
+    ) -> OutOfLimits:
         unit = self._units[index]
         unit = {"position": unit, "velocity": f"{unit}/s", "effort": "Nm" if unit == "rad" else "N"}[field]
         side, limit = ("lower", lower) if value < lower else ("upper", upper)

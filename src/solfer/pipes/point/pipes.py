@@ -58,6 +58,7 @@ class PointFeedbackPipe(FeedbackPipe):
         port: Port,
         received: PointFormat,
         required: bool = True,
+        *,
         known: Collection[str] | None = (),
     ):
         super().__init__(name, reader, required)

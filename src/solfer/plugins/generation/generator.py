@@ -291,8 +291,15 @@ class Generator:
         module = self.configuration.module
         pipes = [cast(JointCommandPipe, pipe) for pipe, gate in controllers if gate is not None]
         measured = {each: self._measured(robot, each) for each in ("position", "velocity", "effort")}
-        known = measured["position"], measured["effort"]
-        blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, *known)
+        blend = StartBlend(
+            module.name,
+            pipes,
+            robot,
+            rate=self.configuration.rate,
+            shortest=module.blend,
+            measured=measured["position"],
+            efforts=measured["effort"],
+        )
         period = 1.0 / self.configuration.rate
         if module.mode == "idle":
             return Outputs(controllers, blend, robot, period=period, idle=True)

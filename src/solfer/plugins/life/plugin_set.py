@@ -64,6 +64,7 @@ class PluginSet:
         blend: float | None = None,
         nanoseconds: Callable[[], int] = monotonic_ns,
         polls: Sequence[Callable[[], None]] = (),
+        *,
         admit: Callable[[], None] = lambda: None,
         requires: Mapping[str, Sequence[str]] = NOTHING,
     ):

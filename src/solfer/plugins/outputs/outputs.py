@@ -48,6 +48,7 @@ class Outputs:
         robot: Robot,
         period: float,
         idle: bool = False,
+        *,
         requests: StartRequests | None = None,
         following: JointFollowing | None = None,
     ):

@@ -53,6 +53,7 @@ class StartBlend:
         robot: Robot,
         rate: float,
         shortest: float = SHORTEST,
+        *,
         measured: np.ndarray | None = None,
         efforts: np.ndarray | None = None,
     ):

@@ -222,6 +222,7 @@ class BallContact(RollingContact):
         radius: float,
         center: ArrayLike = (0.0, 0.0, 0.0),
         normal: ArrayLike = UP,
+        *,
         constraint: ArrayLike | None = None,
     ):
         super().__init__(link, robot, 0.0, tube=radius, axis=UP, center=center, normal=normal, constraint=constraint)

@@ -52,6 +52,7 @@ class SupportVertex(LinkPoint):
         ring: float,
         tube: float,
         axis: ArrayLike = UP,
+        *,
         center: ArrayLike = (0.0, 0.0, 0.0),
         normal: ArrayLike = UP,
     ):

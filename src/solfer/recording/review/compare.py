@@ -212,7 +212,7 @@ class _Pair:
 
     def _made(
         self, index: int, joint: str, kinds: tuple[Difference, ...], text: str,
-        law: Law | None = None, whole: Law | None = None,
+        law: Law | None = None, *, whole: Law | None = None,
     ) -> JointVerdict:  # fmt: skip
         apart = np.abs(self.apart[index])
         largest = float(apart.max())

@@ -45,7 +45,7 @@ def _title(comparison: Comparison, names: tuple[str, str]) -> str:
 
 
 def _joint(
-    left: "Axes", right: "Axes", verdict: JointVerdict, comparison: Comparison, row: int, names: tuple[str, str]
+    left: "Axes", right: "Axes", verdict: JointVerdict, comparison: Comparison, row: int, *, names: tuple[str, str]
 ) -> None:
     times = comparison.times
     first = comparison.first[row]

@@ -53,7 +53,7 @@ def blocks_of(count: int, step: float) -> np.ndarray:
 
 
 def fit(
-    curve: CubicSpline, times: np.ndarray, second: np.ndarray, free: tuple[int, ...], noise: float, density: float
+    curve: CubicSpline, times: np.ndarray, second: np.ndarray, free: tuple[int, ...], noise: float, *, density: float
 ) -> Law:
     """Fit the law robustly: least squares that are weighted again in each round (Huber), linear in a step of the delay.
 

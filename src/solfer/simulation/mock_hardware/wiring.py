@@ -38,6 +38,7 @@ class Wiring:
         controllers: Collection[str],
         measurement: int,
         command: int,
+        *,
         truth: Container[str],
     ):
         self._outside = outside

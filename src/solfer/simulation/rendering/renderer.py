@@ -52,6 +52,7 @@ class Renderer:
         width: int = 960,
         height: int = 720,
         yaw: float = 130.0,
+        *,
         pitch: float = -20.0,
         world: WorldRecord = FLAT_WORLD,
     ):

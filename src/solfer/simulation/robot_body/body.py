@@ -53,6 +53,7 @@ class Body:
         kinematics: Kinematics,
         motors: np.ndarray,
         friction: Friction,
+        *,
         lossless: Collection[str] = (),
     ):
         self._bullet = engine.bullet

@@ -32,6 +32,7 @@ class BodyMotors:
         indices: Sequence[int],
         kinematics: Kinematics,
         motors: np.ndarray,
+        *,
         losses: Sequence[float],
     ):
         self._bullet = engine.bullet

@@ -27,7 +27,7 @@ class Drift:
         bias: Present bias, shape (axes,) [unit].
     """
 
-    def __init__(self, seed: int, sensor: str, density: float, bias: float, walk: float, axes: int = 3):
+    def __init__(self, seed: int, sensor: str, density: float, bias: float, walk: float, *, axes: int = 3):
         self._noise = Noise(seed, f"drift of {sensor}")
         self._density = density
         self._start = bias

@@ -105,6 +105,7 @@ class SimulationServer:
         rates: Rates | None = None,
         factor: float = 1.0,
         name: str = SIMULATION_HEALTH,
+        *,
         followers: StepHook | None = None,
         pictures: Pictures | None = None,
     ):

@@ -138,7 +138,7 @@ class ConfiguredTasks:
             raise
 
     def _task(
-        self, name: str, record: TaskRecord, point: Point, dofs: np.ndarray | None, place: int, count: int
+        self, name: str, record: TaskRecord, point: Point, dofs: np.ndarray | None, place: int, *, count: int
     ) -> Task | None:
         """Make the task number `place` of `count` of a record; None if there is a mistake."""
         faults = self._faults

@@ -48,7 +48,7 @@ class ActionClient:
         goals: Those that have not ended, by the id of their name.
     """
 
-    def __init__(self, middleware: Middleware, name: str, interface: str, goal: type, feedback: type, result: type):
+    def __init__(self, middleware: Middleware, name: str, interface: str, goal: type, feedback: type, *, result: type):
         self._types = envelopes(goal, feedback, result)
         # a client that is started again has the same name, and its clock may begin again
         self._sender = f"{middleware.name}-{secrets.token_hex(4)}"

@@ -71,6 +71,7 @@ class MotionGuard:
         wheels: Sequence[str],
         rates: TaskRates,
         legs: dict[str, int],
+        *,
         turning: np.ndarray,
         velocity: np.ndarray,
     ):

@@ -82,6 +82,7 @@ class Lifting:
         shift: WeightShift,
         polygon: SupportPolygon,
         holding: Sequence[Contact],
+        *,
         margin: float,
     ):
         self._wheels = wheels

@@ -67,6 +67,7 @@ class ServiceServer:
         service: Service,
         submit: Submit,
         now: Callable[[], float],
+        *,
         worker: ThreadPoolExecutor,
     ):
         self.name = f"{owner}/{service.name}"

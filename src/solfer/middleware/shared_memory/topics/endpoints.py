@@ -258,7 +258,7 @@ class XbotWriter(Writer):
     """
 
     def __init__(
-        self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float], number: int = 0
+        self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float], *, number: int = 0
     ):
         self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
         self.carries = message

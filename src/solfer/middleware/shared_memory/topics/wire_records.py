@@ -80,6 +80,7 @@ class NumbersWireRecord(WireRecord):
         shapes: Mapping[str, tuple[int, ...] | None],
         tuples: tuple[str, ...],
         values: np.ndarray,
+        *,
         sender: str,
     ):
         super().__init__(values)
