@@ -108,9 +108,10 @@ class BlackBox(Recorder):
             take(now)
         self.append(time)
         for name, notes in self._notes:
-            for kind, text in notes:
-                self.event(Event(now, name, kind, text=text))
-            notes.clear()
+            if notes:
+                for kind, text in notes:
+                    self.event(Event(now, name, kind, text=text))
+                notes.clear()
 
     def note(self, index: int, managed: ManagedPlugin, time: int) -> None:
         """Record a plugin's new state or reason at `time` [ns]."""
