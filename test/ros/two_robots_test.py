@@ -108,7 +108,7 @@ class TwoRobotsTest(unittest.TestCase):
                 if name not in SHARED:
                     own = "/".join(name.split("/")[:2]) + "/"
                     self.assertEqual([node for node in others if not node.startswith(own)], [], name)
-        places = (*(f"{owners}/{robot}/" for owners in ("", "/parameter_owners") for robot in GOALS), *LAUNCHED)
+        places = (*(f"/{robot}/" for robot in GOALS), *LAUNCHED)
         self.assertEqual([name for name in rospy.get_param_names() if not name.startswith(places)], [])
         for robot in GOALS:
             self.assertEqual(set(self.owners(robot)), {f"/{robot}/wheeled_motion"})

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import re
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, wait
@@ -43,8 +44,8 @@ ANSWERED = 1.0
 ROSPY_SETTLING_TIME = 0.05
 """Time that rospy's sending threads get for what they have already taken [s]."""
 
-OWNERS = "/parameter_owners"
-"""Parameters that hold process and URI of the node that has set another one, by that one's name."""
+SETTER = re.compile(r"(?:\n<!--| #) set by process (\d+) of (\S+?)(?: -->)?\s*$")
+"""The comment, of XML or YAML, with the node that has set a parameter: it goes with the text when another one does."""
 
 Endpoint = TypeVar("Endpoint", RosReader, RosQueue, RosWriter)
 
@@ -125,9 +126,10 @@ class RosMiddleware(Middleware):
         """
         try:
             key = rospy.search_param(name.lstrip("/"))
-            if key is not None and not self._is_left(key):
-                return rospy.get_param(key)
-            known = [each for each in rospy.get_param_names() if each != key and not each.startswith(OWNERS)]
+            present = None if key is None else _living(rospy.get_param(key))
+            if present is not None:
+                return present
+            known = [each for each in rospy.get_param_names() if each != key]
             raise UnknownName("parameter", name, known, where=where)
         except KeyError:  # deleted at this moment
             raise UnknownName("parameter", name, (), where=where) from None
@@ -149,24 +151,19 @@ class RosMiddleware(Middleware):
         """
         key = rospy.resolve_name(name.lstrip("/"))
         present = rospy.get_param(key, None)
-        if present is None or self._is_left(key):
+        living = _living(present)
+        if living is None:
             if present is not None:
                 rospy.delete_param(key)
-            rospy.set_param(f"{OWNERS}{key}", f"{os.getpid()} {rospy.get_node_uri()}")
-            rospy.set_param(key, text)
-        elif str(present).strip() != text.strip():
+            mark = "\n<!-- {} -->" if text.lstrip().startswith("<") else " # {}"
+            rospy.set_param(key, text + mark.format(f"set by process {os.getpid()} of {rospy.get_node_uri()}"))
+        elif str(living).strip() != text.strip():
             logger.warning(
                 "parameter %s was there already, stays, and differs from what this node would set; "
                 "after another robot: rosparam delete %s, and start again",
                 key,
                 key,
             )
-
-    @staticmethod
-    def _is_left(key: str) -> bool:
-        """Return whether a parameter was set by a node that has ended."""
-        process, _, uri = str(rospy.get_param(f"{OWNERS}{key}", "")).partition(" ")
-        return bool(uri) and not lives(uri, int(process))
 
     def reader(self, topic: str, message: str, kept: int = 0) -> RosReader:
         """See `Middleware.reader`."""
@@ -274,3 +271,11 @@ class RosMiddleware(Middleware):
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)
         return endpoint
+
+
+def _living(value: Any) -> Any:
+    """Return the value of a parameter as it was set; None if its node has ended without another one that sets it."""
+    setter = SETTER.search(value) if isinstance(value, str) else None
+    if setter is None:
+        return value
+    return value[: setter.start()] if lives(setter[2], int(setter[1])) else None
