@@ -125,6 +125,23 @@ def test_a_joint_that_follows_its_command_starts_there():
     assert start[[shoulder, roll]].tolist() == [0.45, 0.1]
 
 
+@pytest.mark.parametrize(
+    "there, starts", [(0.35, 0.5), (0.38, 0.5), (0.32, 0.5), (0.31, 0.31), (0.67, 0.5), (0.7, 0.7)]
+)
+def test_a_joint_that_was_moved_meanwhile(there, starts):
+    """It hung 0.13 rad below its command when the plugin began to wait; further away it is another robot's."""
+    sender = Sender()
+    shoulder = sender.dof("shoulder")
+    sender.robot.state.position[shoulder] = sender.robot.command.position[shoulder] = 0.5
+    sender.outputs.start()
+    sender.cycles(1.0)
+    sender.robot.state.position[shoulder] = 0.37
+    sender.outputs.hold(0.0)
+    sender.robot.state.position[shoulder] = there
+    sender.outputs.start()
+    assert sender.outputs.start_position[shoulder] == starts
+
+
 @pytest.mark.parametrize("joint, gap", [("shoulder", 1e-3), ("roll", -1e-3)])
 def test_a_short_way_takes_the_shortest_time(joint, gap):
     sender = Sender()

@@ -132,7 +132,7 @@ class Outputs:
         """Collect and send, but with all velocities at zero."""
         self._robot.command.velocity[:] = 0.0
         self.collect()
-        self.joints.stop()
+        self.joints.stop(self._robot.state.position)
         self.send(stamp)
 
     def hold(self, stamp: float) -> None:
@@ -143,7 +143,7 @@ class Outputs:
         for pipe in self._others:
             pipe.collect()
         self.joints.restore()
-        self.joints.stop()
+        self.joints.stop(self._robot.state.position)
         self.send(stamp)
 
     def counts(self) -> dict[str, float | str]:

@@ -9,6 +9,9 @@ from solfer.pipes import JointCommandPipe
 SENT_JOINTS_NEARNESS = 0.2
 """Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
 
+YIELDING = 0.05
+"""How far such a joint may yield while its plugin waits: beyond that another robot is there, or something moved it."""
+
 
 class SentJoints:
     """Commands in joint space: the numbers to send, and those sent last.
@@ -37,6 +40,7 @@ class SentJoints:
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
         ]
+        self._reach = [np.full(dofs.shape, SENT_JOINTS_NEARNESS) for dofs, _ in self._positions]
         self._velocities = [values for pipe in pipes for field, values in pipe.fields if field == "velocity"]
         self._are_followed = False
         self.is_sent = False
@@ -54,10 +58,12 @@ class SentJoints:
         for block, sent, _ in self._blocks:
             block[...] = sent
 
-    def stop(self) -> None:
-        """Let all velocities be zero: a filter still carries the earlier ones."""
+    def stop(self, position: np.ndarray) -> None:
+        """Let all velocities be zero, also those that a filter carries; joints are at `position`, (n,) [rad, m]."""
         for values in self._velocities:
             values.fill(0.0)
+        for (dofs, sent), reach in zip(self._positions, self._reach, strict=True):
+            np.minimum(np.abs(sent - position[dofs]) + YIELDING, SENT_JOINTS_NEARNESS, out=reach)
 
     def forget(self) -> None:
         """Forget what joints follow: others move them now, or the robot is in another state."""
@@ -65,8 +71,8 @@ class SentJoints:
 
     def follow(self, position: np.ndarray) -> None:
         """Write where joints are that follow what was sent last, beside where they are measured [rad, m]: there."""
-        for dofs, sent in self._positions if self._are_followed else ():
-            follow = np.abs(sent - position[dofs]) <= SENT_JOINTS_NEARNESS
+        for (dofs, sent), reach in zip(self._positions, self._reach, strict=True) if self._are_followed else ():
+            follow = np.abs(sent - position[dofs]) <= reach
             position[dofs[follow]] = sent[follow]
 
 
