@@ -27,6 +27,7 @@ PERIOD_CLOSENESS = 1e-6
 """Share of a period by which a clock's time is rounded."""
 
 NO_TIMES = memoryview(bytes(8 * len(Stage))).cast("q")
+"""Times of a cycle that has reached no stage yet."""
 
 
 class PassedPeriods:
@@ -58,28 +59,17 @@ class PassedPeriods:
 
 
 class CycleTiming:
-    """A stopwatch of the stages of a cycle, in fixed memory.
+    """Times of the stages of a cycle, in fixed memory. The plugin writes them.
 
     Args:
         nanoseconds: The clock [ns].
         times: Where the times go, int64, a number for each `Stage`; None: memory of its own.
 
     Attributes:
+        nanoseconds: See above.
         times: Time of each `Stage` in the newest cycle [ns]; zero for a stage that it did not reach.
     """
 
     def __init__(self, nanoseconds: Callable[[], int] = time.monotonic_ns, times: memoryview | None = None) -> None:
-        self._nanoseconds = nanoseconds
-        self._begin = 0
+        self.nanoseconds = nanoseconds
         self.times = times if times is not None else memoryview(bytearray(8 * len(Stage))).cast("q")
-
-    def start(self) -> None:
-        """Begin a cycle."""
-        self.times[:] = NO_TIMES
-        self._begin = self._nanoseconds()
-
-    def mark(self, stage: Stage) -> None:
-        """End a stage: it began with the cycle, or with the mark before."""
-        now = self._nanoseconds()
-        self.times[stage] = now - self._begin
-        self._begin = now

@@ -10,7 +10,7 @@ from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.component_cycle import ComponentCycle
-from solfer.plugins.cycle_timing import CycleTiming, Stage
+from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
@@ -168,21 +168,25 @@ class Plugin:
             OutOfLimits: The component would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
+        timing = self.timing
         now = self._now()
-        mark = self.timing.mark
-        self.timing.start()
+        # each `times[...]` is the time since the one before; a call for it takes a microsecond more in a cold cycle
+        times = timing.times
+        clock = timing.nanoseconds
+        times[:] = NO_TIMES
+        mark = clock()
         gap = self._readiness.stall(now)
         if gap and (self.life is STARTING or self.life is RUNNING):
             self.overload.advance(gap)
             self._awake(now)
         self.inbox.apply()
-        mark(CALLS)
+        times[CALLS] = -mark + (mark := clock())
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
         self._readiness.feedbacks.read(now, self.outputs.joints.distance)
         verdict = self._readiness.judge(now, life is RUNNING)
-        mark(READ)
+        times[READ] = -mark + (mark := clock())
         if verdict is not WORK:
             self._obey(verdict, now)
             return
@@ -199,18 +203,18 @@ class Plugin:
             work.jump()
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
-        mark(ROBOT)
+        times[ROBOT] = -mark + (mark := clock())
         work.work()
-        mark(COMPONENT)
+        times[COMPONENT] = -mark + (mark := clock())
         if component.modify:
             # its pipes publish joints that follow others; who reads the State next computes what it needs
             self.robot.follow()
         self.outputs.collect()
-        mark(GATE)
+        times[GATE] = -mark + (mark := clock())
         self.outputs.send(self._now())
         for publish in work.publish:
             publish()
-        mark(WRITE)
+        times[WRITE] = -mark + (mark := clock())
         if work.logger is not None:
             work.log(now)
 
