@@ -10,9 +10,9 @@ from solfer.errors import Overtaken
 from solfer.middleware.ros import RosMiddleware, middleware, services
 from solfer.plugins.generation.config_service import answer_at_once
 from solfer.plugins.tuning import Tuning
-from solfer.srv import GetParametersRequest, SetParametersRequest
+from solfer.srv import ClaimJointsRequest, GetParametersRequest, SetParametersRequest
 from solfer.transport import Inbox
-from solfer.transport.lower_level import Answer, answered
+from solfer.transport.lower_level import CLAIM_INTERFACE, Answer, ClaimAnswer, ClaimRequest, answered
 from solfer.transport.middleware import TRIGGER, NoFields
 
 
@@ -72,3 +72,15 @@ def test_a_request_that_is_overtaken_is_tried_again(offered, overtaken, success)
     RosMiddleware(node).serve("legs", [rest], answer_at_once)
     assert offered["legs/rest"](TriggerRequest()).success is success
     assert len(tried) == 3
+
+
+@pytest.mark.parametrize(
+    ("runs", "reason"), [(False, "lower_level ends"), (True, "no answer of its loop within 0.01 s")]
+)
+def test_a_claim_that_finds_no_lower_level_may_be_repeated(offered, runs, reason):
+    """A simulator that ends, or stands still, does not judge the claim: the plugin waits for the next one."""
+    claim = Service("claim", CLAIM_INTERFACE, ClaimRequest, ClaimAnswer, lambda request: ClaimAnswer(), timeout=0.01)
+    node = SimpleNamespace(name="/simulator", clock=None, running=lambda: runs)
+    RosMiddleware(node).serve("lower_level", [claim], Inbox().submit)
+    reply = offered["lower_level/claim"](ClaimJointsRequest(owner="/legs"))
+    assert not reply.success and reply.later and reason in reply.message

@@ -105,7 +105,7 @@ class RosService:
         if isinstance(request, _Instead):
             return self._refuse(request.reason)
         if not self._running():
-            return self._refuse(f"{self._owner} ends")
+            return self._refuse(f"{self._owner} ends", later=True)
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
         future: Future[Any] = Future()
         try:
@@ -122,12 +122,17 @@ class RosService:
             return self._refuse(described(error, lines=True))
         except (FutureTimeout, CancelledError):
             future.cancel()
-            return self._refuse(f"{self._owner} does not run: no answer of its loop within {self._service.timeout:g} s")
+            reason = f"no answer of its loop within {self._service.timeout:g} s"
+            return self._refuse(f"{self._owner} does not run: {reason}", later=True)
         except BaseException as error:  # no signal comes to this thread
             logger.exception("service %s/%s fails", self._owner, self._service.name)
             return self._refuse(located(error))
         self.done()
         return self._interface._response_class(**values)
 
-    def _refuse(self, message: str) -> Any:
-        return self._interface._response_class(success=False, message=message)
+    def _refuse(self, message: str, later: bool = False) -> Any:
+        """Return a response without success; `later`: nothing is wrong with the request, it may be repeated."""
+        response = self._interface._response_class(success=False, message=message)
+        if hasattr(response, "later"):
+            response.later = later
+        return response
