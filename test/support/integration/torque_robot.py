@@ -55,6 +55,11 @@ class Legged:
     base: str = "base_link"
 
 
+def _quadruped(urdf: str, srdf: str, foot: str, legs: str, base: str) -> Legged:
+    """Make a robot on four points, which begins standing."""
+    return Legged(urdf, srdf, "standing", tuple(foot.format(leg) for leg in legs.split()), 3, base=base)
+
+
 LEGGED = {
     "talos": Legged(
         "talos_data/robots/talos_reduced.urdf",
@@ -72,14 +77,29 @@ LEGGED = {
         3,
         contact={"offset": [0.0, 0.0, -0.0165]},
     ),
-    "anymal": Legged(
+    "anymal": _quadruped(
         "anymal_b_simple_description/robots/anymal.urdf",
         "anymal_b_simple_description/srdf/anymal.srdf",
-        "standing",
-        tuple(f"{leg}_FOOT" for leg in ("LF", "RF", "LH", "RH")),
-        3,
+        "{}_FOOT",
+        legs="LF RF LH RH",
         base="base",
     ),
+    "hyq": _quadruped(
+        "hyq_description/robots/hyq_no_sensors.urdf",
+        "hyq_description/srdf/hyq.srdf",
+        "{}_foot",
+        legs="lf rf lh rh",
+        base="base_link",
+    ),
+} | {
+    name: _quadruped(
+        f"{name}_description/urdf/{name}.urdf",
+        f"{name}_description/srdf/{name}.srdf",
+        "{}_foot",
+        legs="FL FR RL RR",
+        base="base",
+    )
+    for name in ("go1", "go2", "b1")
 }
 
 

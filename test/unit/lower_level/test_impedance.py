@@ -73,6 +73,54 @@ def test_stiff_springs_on_a_light_link_are_stable():
     assert abs(explicit_q[0]) > 1e6
 
 
+@pytest.mark.parametrize("gain", [0.1, 1.0, 100.0], ids=["soft", "as stiff as a step allows", "beyond a step"])
+@pytest.mark.parametrize("rows", [1, 3], ids=["one row", "three rows"])
+def test_what_is_sent_is_done_on_rigid_contacts(dynamics, rng, gain, rows):
+    """Contacts J a = 0 answer within the step, and the law finds that out, whatever its damping."""
+    law = ImplicitImpedance(dynamics, FREE, FREE)
+    law.effort[:] = rng.standard_normal(SIZE)
+    law.damping[:] = gain / np.linalg.inv(dynamics.inertia(0)).diagonal() / DT
+    jacobian = rng.standard_normal((rows, SIZE))
+    mobility = np.linalg.inv(dynamics.inertia(0))
+    toward = mobility @ jacobian.T @ np.linalg.inv(jacobian @ mobility @ jacobian.T)
+    velocity = np.zeros(SIZE)
+    for _ in range(5000):
+        torque = law.update(np.zeros(SIZE), velocity, DT)
+        free = velocity + DT * mobility @ (torque - dynamics.bias(0, 0))
+        velocity = free - toward @ (jacobian @ free)
+    sent = law.effort - law.damping * velocity
+    scale = np.abs(law.effort).max()
+    np.testing.assert_allclose(torque, sent, atol=1e-2 * scale)
+
+
+def test_a_step_of_the_torque_is_done_within_five_milliseconds():
+    """With the damping of `default_gains`, D = m / (2 dt), and on a support that does not give way."""
+    law = ImplicitImpedance(ConstantDynamics(np.array([[0.02]]), np.zeros(1)), FREE[:1], FREE[:1])
+    law.damping[:], law.effort[:] = 0.5 * 0.02 / DT, 10.0
+    at_rest = np.zeros(1)
+    for _ in range(20):
+        law.update(at_rest, at_rest, DT)
+    assert law.torque[0] == pytest.approx(10.0, rel=1e-6)
+    law.effort[:] = 13.0
+    done = [float(law.update(at_rest, at_rest, DT)[0]) for _ in range(5)]
+    assert done[-1] == pytest.approx(13.0, abs=0.01 * 3.0)
+
+
+def test_a_push_is_no_reason_to_brake_less(dynamics, rng):
+    """In free motion the law is that of a robot without contacts, also after steps with pushes."""
+    pushed, free = (ImplicitImpedance(dynamics, FREE, FREE) for _ in range(2))
+    for law in (pushed, free):
+        law.damping[:], law.effort[:] = 5.0, 1.0
+    mobility, velocity = np.linalg.inv(dynamics.inertia(0)), np.zeros(SIZE)
+    for step in range(6):
+        outside = np.where(step == 2, 50.0, 0.0)
+        torque = pushed.update(np.zeros(SIZE), velocity, DT).copy()
+        velocity = velocity + DT * mobility @ (torque + outside - dynamics.bias(0, 0))
+    np.testing.assert_allclose(
+        pushed.update(np.zeros(SIZE), velocity, DT), free.update(np.zeros(SIZE), velocity, DT), rtol=1e-6
+    )
+
+
 def test_torques_stay_within_the_effort_limits(dynamics, rng):
     limit = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     law = ImplicitImpedance(dynamics, limit, FREE)
@@ -109,6 +157,7 @@ def test_the_law_stays_implicit_where_the_chart_of_the_base_is_singular():
     position, torques = np.zeros(8), []
     for tilt in (0.01, 0.0):
         position[4] = 0.5 * np.pi + tilt
+        law.place(position)
         torques.append(law.update(position, np.zeros(8), DT)[6:].copy())
     np.testing.assert_allclose(*torques, rtol=1e-3)
     assert np.abs(torques).max() < 2500.0

@@ -77,8 +77,7 @@ class Drives:
 
     def place(self, q: np.ndarray) -> None:
         """Put all motors where the joints are, q of shape (model size,), at rest: the robot was put there."""
-        if self.two_mass is not None:
-            self.two_mass.place(q)
+        self._law.place(q)
 
     def rest(self) -> None:
         """Set torques and speeds to zero until the next `update`."""

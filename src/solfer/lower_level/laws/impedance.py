@@ -32,11 +32,15 @@ class ImplicitImpedance:
     With the springs' target position q_d, target velocity v_d, diagonal stiffness K and damping D:
 
         r = K (q_d - q - dt v) + D (v_d - v) + tau_ff
-        (M + dt D) a = r - nle
+        (M + dt D) a = r - nle + f
         tau = r - dt D a
 
     It is stable for any stiffness and damping, where the explicit law with a robot's own gains diverges on light links.
-    Rows without an actuator (a floating base) have K = D = tau_ff = 0. External forces are not in the prediction.
+    Rows without an actuator (a floating base) have K = D = tau_ff = 0.
+
+    f is what contacts and pushes did in the last step, M dv / dt + nle - tau. It vanishes in free motion. Rigid
+    contacts answer with f = -P (tau - nle), where P is a projection, orthogonal in the norm of M^-1. In that norm f
+    changes tau by dt D (M + dt D)^-1, which is below one: f converges for all D, and at rest tau is r.
 
     Source: J. Tan, K. Liu, G. Turk, "Stable Proportional-Derivative Controllers", IEEE Computer Graphics and
     Applications 31(4), 2011.
@@ -70,22 +74,41 @@ class ImplicitImpedance:
         self.damping = table[kernel.DAMPING]
         self.torque = table[kernel.TORQUE]
         self._dynamics = dynamics
-        self._force, self._loss, self._right = (table[row] for row in (kernel.FORCE, kernel.LOSS, kernel.RIGHT))
+        self._is_placed = True
+        self._force, self._loss, self._right, self._outside = (
+            table[row] for row in (kernel.FORCE, kernel.LOSS, kernel.RIGHT, kernel.OUTSIDE)
+        )
         self._matrix = np.zeros((size, size), order="F")
         self._diagonal = self._matrix.reshape(-1, order="F")[:: size + 1]
 
+    def place(self, q: np.ndarray) -> None:
+        """Begin with a robot that was put to q, shape (size,): what acted on it before does not count."""
+        self._is_placed = True
+
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque` for the step of `dt` [s] that begins at position q and velocity v, shape (size,)."""
+        inertia, bias = self._feel(q, v, dt)
         self._kernel.pull(self._table, q, v, dt)
-        self._kernel.damp(self._table, self._accelerations(q, v))
+        self._kernel.damp(self._table, self._accelerations(inertia, bias))
         self._kernel.limit(self._table, v)
         return self.torque
 
-    def _accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Solve (M + W) a = r - nle, with the force r and the diagonal W in the table, for a, shape (size,)."""
+    def _feel(self, q: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """Write what contacts and pushes did in the last step; return M and nle."""
+        inertia = self._dynamics.inertia(q)
+        bias = self._dynamics.bias(q, v)
+        self._kernel.feel(self._table, inertia, bias, v, dt)
+        if self._is_placed:  # what happened before is not known
+            self._outside[:] = 0.0
+            self._is_placed = False
+        return inertia, bias
+
+    def _accelerations(self, inertia: np.ndarray, bias: np.ndarray) -> np.ndarray:
+        """Solve (M + W) a = r + f - nle, with r, f and the diagonal W in the table, for a, shape (size,)."""
         diagonal = self._diagonal
-        np.copyto(self._matrix, self._dynamics.inertia(q))
-        np.subtract(self._force, self._dynamics.bias(q, v), out=self._right)
+        np.copyto(self._matrix, inertia)
+        np.subtract(self._force, bias, out=self._right)
+        np.add(self._right, self._outside, out=self._right)
         np.add(diagonal, self._loss, out=diagonal)
         np.add(diagonal, REGULARISATION * diagonal.max(), out=diagonal)
         _, acceleration, failed = dposv(self._matrix, self._right, lower=1, overwrite_a=1, overwrite_b=1)

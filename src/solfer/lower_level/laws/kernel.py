@@ -3,16 +3,17 @@
 All numbers of a law are rows of one table, so that a call has few arguments.
 """
 
-from solfer.numerics.compilation import cached
+from solfer.numerics.compilation import REORDERED, cached
 
-POSITION, VELOCITY, EFFORT, STIFFNESS, DAMPING, TORQUE, UPPER, FASTEST, FORCE, LOSS, RIGHT = range(11)
+POSITION, VELOCITY, EFFORT, STIFFNESS, DAMPING, TORQUE, UPPER, FASTEST, FORCE, LOSS, RIGHT, BEFORE, OUTSIDE = range(13)
 # only of the law with two masses
-MOTOR_POSITION, MOTOR_VELOCITY, DRIVE, SPRING, DAMPER, FRICTION, COUPLING, SLOW, COMPLIANCE = range(11, 20)
-TENSION, PULLED, TAKEN, LINKS, MOTORS, FREE, INERT, BEFORE, EXPECTED, SURPRISE = range(20, 30)
-LAW_ROWS = 30
+MOTOR_POSITION, MOTOR_VELOCITY, DRIVE, SPRING, DAMPER, FRICTION, COUPLING, SLOW, COMPLIANCE = range(13, 22)
+TENSION, PULLED, TAKEN, LINKS, MOTORS, FREE, INERT = range(22, 29)
+LAW_ROWS = 29
 """Numbers for each DoF: rows of the table of a law."""
 
 _TABLE = "float64[:, ::1]"
+_MATRIX = "float64[:, :]"
 _NUMBERS = "float64[::1]"
 _FLAGS = "boolean[::1]"
 
@@ -24,6 +25,22 @@ def _pull(table, position, velocity, dt):
         force = table[STIFFNESS, k] * away + table[DAMPING, k] * (table[VELOCITY, k] - velocity[k])
         table[FORCE, k] = force + table[EFFORT, k]
         table[LOSS, k] = table[DAMPING, k] * dt
+
+
+def _feel(table, inertia, bias, velocity, dt):
+    """Write the force that contacts and pushes had in the last step, M dv/dt + nle less the torque.
+
+    BEFORE is then the velocity at which the next step begins.
+    """
+    size = table.shape[1]
+    for j in range(size):
+        table[RIGHT, j] = (velocity[j] - table[BEFORE, j]) / dt
+        table[BEFORE, j] = velocity[j]
+    for k in range(size):
+        outside = bias[k] - table[TORQUE, k]
+        for j in range(size):
+            outside += inertia[j, k] * table[RIGHT, j]  # symmetric, and Pinocchio's columns are contiguous
+        table[OUTSIDE, k] = outside
 
 
 def _damp(table, acceleration):
@@ -44,17 +61,11 @@ def _limit(table, velocity):
         table[TORQUE, k] = torque
 
 
-def _stretch(table, elastic, position, velocity, dt, share):
-    """Learn which acceleration contacts and pushes cause, and write the torques of the springs.
-
-    Motors of joints without two masses are where the joints are. `share` of what was not expected is learned.
-    """
+def _stretch(table, elastic, position, velocity):
+    """Write the torques of the springs; motors of joints without two masses are where the joints are."""
     for k in range(table.shape[1]):
         if not elastic[k]:
             table[MOTOR_POSITION, k], table[MOTOR_VELOCITY, k] = position[k], velocity[k]
-        new = (velocity[k] - table[BEFORE, k]) / dt - table[EXPECTED, k]
-        table[SURPRISE, k] += new * share
-        table[BEFORE, k] = velocity[k]
         tension = table[SPRING, k] * (table[MOTOR_POSITION, k] - position[k])
         table[TENSION, k] = tension + table[DAMPER, k] * (table[MOTOR_VELOCITY, k] - velocity[k])
 
@@ -84,8 +95,7 @@ def _move(table, elastic, acceleration):
     """Write the accelerations of links and motors, and the force of the law at these."""
     for k in range(table.shape[1]):
         links = motors = acceleration[k]
-        links += table[SURPRISE, k]
-        table[LINKS, k] = table[EXPECTED, k] = links
+        table[LINKS, k] = links
         if elastic[k]:
             motors = (table[FREE, k] + table[COUPLING, k] * links) / (table[INERT, k] + table[COUPLING, k])
         table[MOTORS, k] = motors
@@ -123,9 +133,10 @@ def _release(table, elastic, dt):
 
 
 pull = cached(f"void({_TABLE}, {_NUMBERS}, {_NUMBERS}, float64)", _pull)
+feel = cached(f"void({_TABLE}, {_MATRIX}, {_NUMBERS}, {_NUMBERS}, float64)", _feel, fastmath=REORDERED)
 damp = cached(f"void({_TABLE}, {_NUMBERS})", _damp)
 limit = cached(f"void({_TABLE}, {_NUMBERS})", _limit)
-stretch = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS}, {_NUMBERS}, float64, float64)", _stretch)
+stretch = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS}, {_NUMBERS})", _stretch)
 soften = cached(f"void({_TABLE}, {_FLAGS}, float64)", _soften)
 balance = cached(f"void({_TABLE}, {_FLAGS})", _balance)
 move = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS})", _move)

@@ -8,12 +8,6 @@ from solfer.lower_level.laws.springs import Springs, mobility_of
 ACCURATE = 1.0 / 12.0
 """Share beta of the springs' acceleration with which periods are right to the fourth order of the step."""
 
-LEARNING = 0.001
-"""Share of an acceleration that was not expected by which the next is expected.
-
-After a second most is learned. Faster would shake wheels on the ground: it takes damping from their springs.
-"""
-
 HOLDING = 1e7
 """Damping with which a motor holds its speed; beside it nothing counts [Nms/rad]."""
 
@@ -35,8 +29,8 @@ class TwoMassImpedance(ImplicitImpedance):
     With gamma = 1/2 and beta = 1/12 that is Newmark's method of fourth order, which keeps the energy of an undamped
     oscillation. Its frequency w is right up to (w dt)^4 / 480, its damping up to (w dt)^2 / 12. gamma grows towards 1
     where D alone would stop the joint within a step. delta'' is found for all motors and links together, from one
-    linear system of the size of M. It knows contacts only by what they did in the last second: while they change, the
-    spring of a link that they hold is softer than K by up to (w dt)^2 / 12. Link and motor feel opposite torques.
+    linear system of the size of M, with what contacts and pushes did in the last step. Link and motor feel opposite
+    torques.
 
     A spring that swings faster than a step resolves only yields, theta = q + tau / K: its rotor has no inertia, and
     the impedance acts on the joint, with spring, damper and torque of the law times 1 / (1 + stiffness / K),
@@ -90,9 +84,9 @@ class TwoMassImpedance(ImplicitImpedance):
 
     def place(self, q: np.ndarray) -> None:
         """Put the motors where the joints are, at rest; q has the shape (size,)."""
+        super().place(q)
         self.motor_position[:] = q
-        row = self._kernel
-        self._table[[row.MOTOR_VELOCITY, row.BEFORE, row.EXPECTED, row.SURPRISE]] = 0.0
+        self.motor_velocity[:] = 0.0
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque`, and move the motors on, for the step that begins at position q and velocity v.
@@ -104,11 +98,12 @@ class TwoMassImpedance(ImplicitImpedance):
         """
         table = self._table
         elastic = self._elastic
-        self._kernel.stretch(table, elastic, q, v, dt, LEARNING)
+        inertia, bias = self._feel(q, v, dt)
+        self._kernel.stretch(table, elastic, q, v)
         self._kernel.pull(table, self.motor_position, self.motor_velocity, dt)
         self._kernel.soften(table, elastic, dt)
-        if self._solve(q, v):  # then some drives do not follow their law, and all is different
-            self._solve(q, v)
+        if self._solve(inertia, bias):  # then some drives do not follow their law, and all is different
+            self._solve(inertia, bias)
         self._kernel.release(table, elastic, dt)
         return self.torque
 
@@ -123,12 +118,12 @@ class TwoMassImpedance(ImplicitImpedance):
         gamma = np.maximum(0.5, 1.0 - np.divide(1.0, damped, out=np.full(len(damped), np.inf), where=damped > 0.0))
         return ACCURATE * dt**2 * spring + gamma * dt * damper
 
-    def _solve(self, q: np.ndarray, v: np.ndarray) -> bool:
+    def _solve(self, inertia: np.ndarray, bias: np.ndarray) -> bool:
         """Write accelerations and torques of the drives, for the law p - l alpha of force p and loss l.
 
         With the spring's gain c and m = B + dt d + l a motor has alpha = (p - d theta' - tension + c a) / (m + c). What
-        remains is (M + W) a = tension + c / (m + c) (p - d theta' - tension) - nle with W = c m / (m + c). Without two
-        masses W is m, and p - d q' acts on the link.
+        remains is (M + W) a = tension + c / (m + c) (p - d theta' - tension) - nle + f with W = c m / (m + c). Without
+        two masses W is m, and p - d q' acts on the link.
 
         Returns:
             Whether drives behind a spring reach their limits; they are constant from now on.
@@ -136,6 +131,6 @@ class TwoMassImpedance(ImplicitImpedance):
         table = self._table
         elastic = self._elastic
         self._kernel.balance(table, elastic)
-        self._kernel.move(table, elastic, self._accelerations(q, v))
+        self._kernel.move(table, elastic, self._accelerations(inertia, bias))
         self._kernel.limit(table, self.motor_velocity)
         return self._kernel.clip(table, self._sprung)
