@@ -24,7 +24,7 @@ class StudyProgress:
 
     Args:
         folder: The study.
-        total: How many runs there are in all.
+        total: How many rows there are in the end.
         log: Prints a line.
     """
 
@@ -34,17 +34,15 @@ class StudyProgress:
         self._log = log
         self._begin = time.monotonic()
         self._shown = 0.0
-        self._before = sum(folder.is_done(run) for run in folder.runs)
-        self._seen = {run.id for run in folder.runs if folder.is_done(run)}
-        self.failures = 0
-        for run in folder.runs:
-            if run.id in self._seen and (result := folder.result(run)) is not None:
-                self.failures += not result.done
+        results = {run.id: folder.result(run) for run in folder.distinct_runs if folder.is_done(run)}
+        self._seen = set(results)
+        self._before = len(results)
+        self.failures = sum(result is not None and not result.done for result in results.values())
 
     def look(self) -> list[tuple[PlannedRun, Result]]:
         """Return the runs that are done since the last look."""
         found = []
-        for run in self._folder.runs:
+        for run in self._folder.distinct_runs:
             if run.id in self._seen or (result := self._folder.result(run)) is None:
                 continue
             self._seen.add(run.id)
@@ -65,8 +63,9 @@ class StudyProgress:
             return
         self._shown = now
         new = done - self._before
-        left = f", {(now - self._begin) / new * (self._total - done):.0f} s left" if new and not is_last else ""
-        self._log(f"{done} of {self._total} runs, {self.failures} failed{left}")
+        total = self._total - len(self._folder.runs) + len(self._folder.distinct_runs)
+        left = f", {(now - self._begin) / new * (total - done):.0f} s left" if new and not is_last else ""
+        self._log(f"{done} of {total} runs, {self.failures} failed{left}")
 
 
 def carry_out_all(
@@ -82,7 +81,7 @@ def carry_out_all(
         SolferError: Workers cannot work, or the folder cannot be written; the study goes on later.
     """
     progress = StudyProgress(folder, len(folder.runs), log)
-    left = sum(not folder.is_done(run) for run in folder.runs)
+    left = sum(not folder.is_done(run) for run in folder.distinct_runs)
     if left:
         started = engine_of(engine, folder.path, min(workers, left), follow=False, options=options)
         try:
@@ -112,10 +111,10 @@ def find_run(folder: StudyFolder, name: str) -> PlannedRun:
     Raises:
         SolferError: There is none, or there are several.
     """
-    found = [run for run in folder.runs if run.id.startswith(name) or str(run.index) == name]
-    exact = [run for run in found if name in (run.id, str(run.index))]
+    found = {run.id: run for run in folder.runs if run.id.startswith(name) or str(run.index) == name}
+    exact = {run.id: run for run in found.values() if name in (run.id, str(run.index))}
     if len(exact or found) != 1:
         raise SolferError(
             f"{len(found)} runs are named '{name}'", where=str(folder.path), expected="the id of one, as in table.csv"
         )
-    return (exact or found)[0]
+    return next(iter((exact or found).values()))

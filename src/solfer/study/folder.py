@@ -107,7 +107,9 @@ class StudyFolder:
         try:
             (path / RUNS).mkdir(parents=True, exist_ok=True)
             if (path / STUDY).exists():
-                data["runs"] = _continued(cls(path), plan, force)
+                before = cls(path)
+                data["runs"] = _continued(before, plan, force)
+                before.repeat_interrupted()
             write_whole(path / STUDY, json.dumps(data, indent=1))
         except OSError as error:
             raise _unwritten(path, error) from None
@@ -134,6 +136,11 @@ class StudyFolder:
             raise StudyError(
                 f"its study cannot be read: {error}", where=str(file), expected="what `solfer study` wrote"
             ) from None
+
+    @property
+    def distinct_runs(self) -> tuple[PlannedRun, ...]:
+        """The runs of the plan, of equal ones the first: they have one folder and one result, and a row each."""
+        return tuple({run.id: run for run in reversed(self.runs)}.values())[::-1]
 
     def add(self, run: PlannedRun) -> None:
         """Add a run to the plan.
@@ -209,6 +216,16 @@ class StudyFolder:
             raise _unwritten(folder, error) from None
         finally:
             temporary.unlink(missing_ok=True)
+
+    def repeat_interrupted(self) -> None:
+        """Remove results that an earlier version wrote of runs that a signal had ended, so that these are repeated.
+
+        Raises:
+            OSError: One cannot be removed.
+        """
+        for run in self.distinct_runs:
+            if (result := self.result(run)) is not None and result.is_interrupted:
+                (self.of(run) / RESULT).unlink(missing_ok=True)
 
     def attempts(self, run: PlannedRun) -> int:
         """Return how often a run was taken up."""

@@ -1,9 +1,18 @@
 """The result of a run."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+FAULTS = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS")
+"""Signals of a fault of a run; others come from outside, and leave no result."""
+
+_INTERRUPTED = re.compile(
+    rf"SystemExit: 143\b|KeyboardInterrupt\b|its process ended by signal (?!{'|'.join(FAULTS)}\b)"
+)
+"""Failures that 0.2.0 wrote of runs that a signal from outside had ended."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +33,11 @@ class Result:
     def done(self) -> bool:
         """Whether the run came to its end."""
         return not self.failure
+
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether an earlier version counted as a failure that the run was ended by a signal."""
+        return _INTERRUPTED.match(self.failure) is not None
 
     def as_json(self) -> dict[str, Any]:
         """Return it for JSON, which has no NaN."""

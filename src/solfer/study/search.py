@@ -43,19 +43,19 @@ def search(
         study_name="search",
         load_if_exists=True,
         direction="minimize" if record.minimize else "maximize",
-        sampler=optuna.samplers.TPESampler(seed=folder.study.record.seed + len(folder.runs)),
     )
-    waiting: dict[str, int] = {run.id: run.index for run in folder.runs if not _is_reported(study, run.index)}
+    waiting = {run.index: run for run in folder.runs if not _is_reported(study, run.index)}  # trials may be equal
     progress = StudyProgress(folder, record.trials, log)
     started = engine_of(engine, folder.path, workers, follow=True, options=options)
     try:
         while True:
-            for run in [each for each in folder.runs if each.id in waiting]:
+            for trial, run in list(waiting.items()):
                 if (result := folder.result(run)) is not None:
-                    _report(study, waiting.pop(run.id), record, result=result)
+                    del waiting[trial]
+                    _report(study, trial, record, result=result)
             while len(waiting) < workers and len(folder.runs) < record.trials:
                 run = _search(study, folder, record)
-                waiting[run.id] = run.index
+                waiting[run.index] = run
             progress.look()
             progress.show()
             if not waiting:
@@ -67,13 +67,20 @@ def search(
     progress.show(is_last=True)
     if any(trial.value is not None for trial in study.trials):
         best = study.best_trial
-        log(f"best of {len(study.trials)}: {best.value:.6g} with {best.params}, run {folder.runs[best.number].id}")
+        run = folder.runs[best.number]
+        log(f"best of {len(study.trials)}: {best.value:.6g} with {dict(run.variations)}, run {run.id}")
     return folder.write_table()
 
 
 def _search(study: Any, folder: StudyFolder, record: SearchRecord) -> PlannedRun:
-    """Add the run of a new trial to the plan; a trial that a killed search has left without a run is used first."""
+    """Add the run of a new trial to the plan; a trial that a killed search has left without a run is used first.
+
+    Each trial has a seed of its own, so that a search that was ended goes on as it would have without that.
+    """
+    import optuna
+
     number = len(folder.runs)
+    study.sampler = optuna.samplers.TPESampler(seed=folder.study.record.seed + number)
     trial = study.ask() if len(study.trials) <= number else _resumed(study, number)
     values = {name: _suggested(trial, name, each) for name, each in record.parameters.items()}
     run = folder.study.planned(number, folder.study.record.seed, values)

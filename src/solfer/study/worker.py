@@ -9,9 +9,10 @@ import resource
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn
 
 from solfer.config.yaml.nodes import YamlNode
@@ -28,7 +29,7 @@ from solfer.study.folder import (
 )
 from solfer.study.plan import PlannedRun
 from solfer.study.records import RunLimitsRecord, StudyRecord
-from solfer.study.result import Result
+from solfer.study.result import FAULTS, Result
 from solfer.supervision import end_with_parent
 
 WORKER_POLL_PERIOD = 0.02
@@ -40,7 +41,8 @@ WORKER_REPEAT_PERIOD = 0.5
 KILLED = 3
 """How often a run is begun that is killed from outside, as by the kernel where memory is short."""
 
-FROM_OUTSIDE = (-signal.SIGKILL, -signal.SIGTERM)
+ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Signals that end a worker and its run from outside, which leaves no result."""
 
 UNFINISHED = 3
 """Exit code of a run whose result could not be written."""
@@ -77,11 +79,9 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
     if claim is None:
         return False
     for _ in range(KILLED):
-        child = os.fork()
-        if not child:
-            _child(study, run)
+        child = _start(study, run)
         try:
-            failure = _watch(study.study.record.limits, claim, child)
+            failure, code = _watch(study.study.record.limits, claim, child)
         except BaseException:
             with suppress(ProcessLookupError):
                 os.kill(child, signal.SIGKILL)
@@ -90,12 +90,40 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
             return True
         if failure:
             break
-    study.finish(run, Result(failure or f"its process was killed {KILLED} times; see {STDERR_FILE}"))
+    else:
+        failure = f"its process was killed {KILLED} times; see {STDERR_FILE}"
+        if code != -signal.SIGKILL:  # which the kernel sends where memory is short; others say nothing about the run
+            raise StudyError(
+                f"a run was ended {KILLED} times by {_name(code)}", where=str(claim.folder), expected="no signals to it"
+            )
+    study.finish(run, Result(failure))
     return True
 
 
-def _watch(limits: RunLimitsRecord, claim: Claim, child: int) -> str:
-    """Wait for the end of a run, and end it where it takes too much; return why it failed, empty: it was killed.
+def _start(study: StudyFolder, run: PlannedRun) -> int:
+    """Start the process of a run, which a signal ends like any other program; return its id."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in the child the handlers of this worker never run
+    child = os.fork()
+    if not child:
+        _handle_ending(signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    if not child:
+        _child(study, run)
+    return child
+
+
+def _handle_ending(handler: Callable[[int, FrameType | None], NoReturn] | signal.Handlers) -> None:
+    """Set what the signals do that end a worker, but those that it ignores, as below `nohup`."""
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def _watch(limits: RunLimitsRecord, claim: Claim, child: int) -> tuple[str, int]:
+    """Wait for the end of a run, and end it where it takes too much.
+
+    Returns:
+        Why it failed, empty: it was ended from outside; and its exit code, of a signal the negative number.
 
     Raises:
         StudyError: It could not be carried out on this machine.
@@ -122,10 +150,15 @@ def _watch(limits: RunLimitsRecord, claim: Claim, child: int) -> str:
             where=str(claim.folder),
             expected="a folder with room, and PyBullet",
         )
-    if failure or code in FROM_OUTSIDE:
-        return failure
-    ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    return f"its process ended by {ending}; see {STDERR_FILE}"
+    if not failure and (code >= 0 or _name(code) in FAULTS):
+        ending = f"exit code {code}" if code >= 0 else f"signal {_name(code)}"
+        failure = f"its process ended by {ending}; see {STDERR_FILE}"
+    return failure, code
+
+
+def _name(code: int) -> str:
+    """Return the name of the signal of an exit code; those for real time have none."""
+    return next((each.name for each in signal.Signals if each == -code), str(-code))
 
 
 def _excess(limits: RunLimitsRecord, process: int, took: float) -> str:
@@ -155,11 +188,14 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
         code = 0
     except (SolferError, SolferErrors) as error:
         print(f"error: {error}", file=sys.stderr)
-    except BaseException as error:
+    except Exception as error:
         logging.getLogger(__name__).exception("the run has failed")
         with suppress(SolferError):
             study.finish(run, Result(located(error)))
             code = 0
+    except BaseException:  # code of the user ends the process, which is no result of the run
+        logging.getLogger(__name__).exception("the run has ended its process")
+        code = 1
     finally:
         with suppress(OSError):
             sys.stderr.flush()
@@ -217,7 +253,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.with_parent:
         end_with_parent()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    _handle_ending(lambda number, _: sys.exit(128 + number))
     logging.basicConfig(level=logging.WARNING)
     try:
         work(options.folder, options.follow)

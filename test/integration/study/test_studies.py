@@ -1,6 +1,7 @@
 """Studies of CENTAURO in PyBullet: repeatable, killed, by every engine, and what fails in them."""
 
 import csv
+import importlib.util
 import json
 import os
 import random
@@ -12,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -94,28 +96,57 @@ def test_a_repeated_run_says_what_the_folder_says(undisturbed, tmp_path):
     assert code == 0 and f"{float(row['tilt']):.9g}" in output
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.soak)])
-def test_a_study_that_is_killed_has_the_same_table(undisturbed, tmp_path, seed):
-    """Workers and the coordinator are killed at random moments; no run is done twice but those that were killed."""
-    draw, file, out = random.Random(seed), written(tmp_path, vary=VARY, runs=2), tmp_path / "out"
-    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(out), "--workers", "2"]
-    killed = 0
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    for _ in range(4):
-        time.sleep(draw.uniform(1.0, 4.0))
-        workers = descendants(process.pid)
-        victim = draw.choice([process.pid, *workers])
-        if process.poll() is None:
-            killed += 1
-            os.kill(victim, signal.SIGKILL)
-        if victim == process.pid:
-            process.wait()
-            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    assert process.wait(200.0) == 0
+def end_by_signal(command, out, draw):
+    """Start a study, and send a drawn signal to all of it, or to one of its processes, at a drawn moment; wait for it.
+
+    That of a whole group is what a closed terminal, Ctrl-C, `timeout` and a batch system send.
+    """
+    begun = len(list(out.glob("runs/*/claim.*")))
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    is_early = draw.random() < 0.2
+    while not is_early and len(list(out.glob("runs/*/claim.*"))) == begun and process.poll() is None:
+        time.sleep(0.01)
+    time.sleep(draw.uniform(0.0, 1.5))
+    number = draw.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR2, signal.SIGKILL])
+    with suppress(ProcessLookupError):
+        if draw.random() < 0.7:
+            os.killpg(process.pid, number)
+        else:
+            os.kill(draw.choice([process.pid, *descendants(process.pid)]), number)
+    process.wait(200.0)
+
+
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("seed", range(20))
+def test_a_study_that_is_ended_has_the_same_table(undisturbed, tmp_path, seed):
+    """Signals end it, on any engine of this machine; no run is done twice but those that were ended."""
+    draw = random.Random(seed)
+    engine = draw.choice(["local", "dask"] if importlib.util.find_spec("distributed") else ["local"])
+    file, out = written(tmp_path, vary=VARY, runs=2), tmp_path / "out"
+    arguments = [str(file), "--out", str(out), "--workers", "2", "--engine", engine]
+    for _ in range(2):
+        end_by_signal([sys.executable, str(SOLFER), "study", *arguments], out, draw=draw)
+    code, output = study(*arguments)
+    assert code == 0, output
     assert table(out) == undisturbed
     folder = StudyFolder(out)
-    again = sum(folder.attempts(each) - 1 for each in folder.runs)
-    assert again <= 2 * killed  # the coordinator takes two workers along
+    assert sum(folder.attempts(each) - 1 for each in folder.runs) <= 4  # two workers, ended twice
+
+
+@pytest.mark.parametrize("ending", ["os.kill(os.getpid(), signal.SIGHUP)", "sys.exit(4)"])
+def test_a_run_that_is_ended_again_and_again_has_no_result_unless_it_ends_itself(tmp_path, ending):
+    (tmp_path / "ends.py").write_text(f"import os, signal, sys\ndef move(run, record):\n    {ending}\n")
+    file = written(tmp_path, motion={"function": "ends:move"})
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}
+    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(tmp_path / "out"), "--workers", "1"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=200, env=environment, check=False)
+    assert "Traceback" not in ended.stderr
+    if "kill" in ending:
+        assert ended.returncode == 2 and "a run was ended 3 times by SIGHUP" in ended.stderr
+        assert not list(tmp_path.glob("out/runs/*/result.json"))
+    else:
+        (row,) = csv.DictReader(table(tmp_path / "out").splitlines())
+        assert ended.returncode == 1 and row["failure"] == "its process ended by exit code 1; see stderr"
 
 
 @pytest.mark.slow
@@ -165,26 +196,23 @@ def test_what_exceeds_its_limits_has_failed_and_the_others_go_on(tmp_path):
     assert "(noise 4.0): greedy:move: ValueError: four" in ended.stderr
 
 
-def test_a_search_finds_the_least_measure_and_goes_on_when_it_was_killed(tmp_path):
+def test_a_search_finds_the_least_measure_and_goes_on_when_it_was_ended(tmp_path):
+    """Some of its trials are equal: they are one run, and have a row each. One worker makes the same table each time."""
     pytest.importorskip("optuna")
-    search = {
-        "minimize": "off",
-        "trials": 8,
-        "parameters": {"mass": {"path": "simulation/mass", "uniform": [0.9, 1.1]}},
-    }
+    parameters = {"mass": {"path": "simulation/mass", "choice": [1.02, 0.9, 1.1]}}
+    search = {"minimize": "off", "trials": 8, "parameters": parameters}
     measure = {"z": {"columns": "simulation/base/z", "reduce": "end"}, "off": {"derive": "abs(mass - 1.02)"}}
     file, out = written(tmp_path, search=search, measure=measure), tmp_path / "out"
-    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(out), "--workers", "2"]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while not out.exists() or sum(1 for _ in out.rglob("result.json")) < 2:
-        time.sleep(0.1)
-        assert process.poll() is None
-    process.kill()
-    process.wait()
-    code, output = study(file, "--out", out, "--workers", 2)
-    assert code == 0 and "best of 8" in output, output
-    rows = list(csv.DictReader(table(out).splitlines()))
-    assert len(rows) == 8 and min(float(row["off"]) for row in rows) < 0.05
+    code, output = study(file, "--out", tmp_path / "undisturbed", "--workers", 1)
+    assert code == 0 and "best of 8: 0 with {'mass': 1.02}" in output, output
+    assert "3 of 3 runs, 0 failed" in output
+    rows = list(csv.DictReader(table(tmp_path / "undisturbed").splitlines()))
+    assert [row["run"] for row in rows] == list("01234567") and len({row["id"] for row in rows}) == 3
+    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(out), "--workers", "1"]
+    end_by_signal(command, out, draw=random.Random(1))
+    code, output = study(file, "--out", out, "--workers", 1)
+    assert code == 0, output
+    assert table(out) == table(tmp_path / "undisturbed")
 
 
 def test_a_report_is_one_file_with_all_runs(tmp_path):

@@ -13,6 +13,7 @@ from support.unit.studies import made
 
 from solfer.errors import StudyError
 from solfer.study import Result
+from solfer.study.drive import StudyProgress, find_run
 from solfer.study.folder import DEAD, STUDY, StudyFolder
 
 VARY = {"mass": {"path": "simulation/mass", "grid": [0.9, 1.0, 1.1]}}
@@ -68,6 +69,39 @@ def test_the_first_result_counts(folder):
     assert folder.result(run) == Result("", {"tilt": 0.1}, 1.0)
     assert folder.claim(run) is None
     assert sorted(path.name for path in folder.of(run).iterdir()) == ["result.json"]
+
+
+@pytest.mark.parametrize(
+    ("failure", "is_kept"),
+    [
+        ("SystemExit: 143 (at /src/solfer/study/worker.py:220 in <lambda>)", False),
+        ("KeyboardInterrupt (at /src/solfer/numerics/qp.py:7 in solve)", False),
+        ("its process ended by signal SIGUSR2; see stderr", False),
+        ("its process ended by signal SIGSEGV; see stderr", True),
+        ("move: SystemExit: 143", True),
+    ],
+)
+def test_runs_that_an_earlier_version_counted_as_failed_by_a_signal_are_repeated(folder, tmp_path, failure, is_kept):
+    folder.finish(folder.runs[0], Result(failure))
+    folder.finish(folder.runs[1], Result("", {"tilt": 0.1}, 1.0))
+    study = made(tmp_path, vary=VARY)
+    again = StudyFolder.create(folder.path, study, study.plan())
+    assert [again.is_done(run) for run in again.runs] == [is_kept, True, False]
+
+
+def test_equal_runs_are_one_run_with_a_row_each(tmp_path):
+    """Of a grid with a value that repeats: progress counts it once, and its name or number finds it."""
+    study = made(tmp_path, vary={"mass": {"path": "simulation/mass", "grid": [0.9, 1.0, 0.9]}})
+    folder = StudyFolder.create(tmp_path / "out", study, study.plan())
+    lines: list[str] = []
+    progress = StudyProgress(folder, len(folder.runs), lines.append)
+    for run in folder.distinct_runs:
+        folder.finish(run, Result("fallen"))
+    assert len(progress.look()) == 2
+    progress.show(is_last=True)
+    assert lines[-1] == "2 of 2 runs, 2 failed"
+    assert [(row["run"], row["mass"]) for row in folder.rows()] == [(0, 0.9), (1, 1.0), (2, 0.9)]
+    assert find_run(folder, folder.runs[0].id).id == find_run(folder, "2").id == folder.runs[2].id
 
 
 def test_the_table_has_the_order_of_the_plan_and_no_wall_times(folder):
