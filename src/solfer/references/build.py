@@ -15,7 +15,7 @@ from solfer.config.tasks.references import (
 from solfer.config.yaml.files import located
 from solfer.errors import ConfigError, SizeMismatch, UnknownName
 from solfer.references.generator import QUANTITY_SIZES, LineReference, ReferenceGenerator, Swing
-from solfer.references.table import header_of, read_table, require_length
+from solfer.references.table import joints_in, read_table, require_length
 from solfer.references.timed import TimedReference
 
 POSTURE = "posture"
@@ -87,7 +87,7 @@ def joints_of(record: ReferenceRecord) -> list[str]:
         names = list(dict.fromkeys(name for point in record.waypoints for name in point.joints or ()))
     elif record.file is not None:
         where = record.where("file")
-        names = header_of(located(record.file, record.folder("file"), where), where)
+        names = joints_in(located(record.file, record.folder("file"), where), where)
     if not names:
         raise ConfigError(
             "it names no joint",
@@ -185,7 +185,7 @@ def _table(record: ReferenceRecord, quantity: str, columns: Sequence[str]) -> tu
     """Return times and values of a CSV file, shape (k,) and (k, n)."""
     where = record.where("file")
     path = located(record.file or "", record.folder("file"), where)
-    times, numbers, found = read_table(path, columns, where, named=quantity == POSTURE)
+    times, numbers, found = read_table(path, columns, where, is_partial=quantity == POSTURE)
     if found == list(columns):
         return times, numbers
     values = np.full((len(times), len(columns)), math.nan if record.absolute else 0.0)

@@ -8,83 +8,90 @@ import numpy as np
 
 from solfer.config.records.bounds import COORDINATE
 from solfer.config.yaml.files import read_text
-from solfer.errors import ConfigError, SizeMismatch, UnknownName
+from solfer.errors import ConfigError, SizeMismatch
+from solfer.references.header import TIME, Field, Header, fields_of, is_header, names_of, read_header
 
 TABLE_ROWS = 20_000
 """Rows of a table."""
 
+LONGEST = 1e5
+"""Largest time [s]."""
+
 UNIT_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's length from one."""
 
+Line = tuple[int, list[Field]]
+"""The number of a line, and its fields."""
 
-def read_table(path: Path, columns: Sequence[str], where: str, named: bool) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Read a CSV file: a time [s], then the numbers of a reference; empty lines and those with `#` do not count.
 
-    A first line without numbers names the columns.
+def read_table(
+    path: Path, columns: Sequence[str], where: str, is_partial: bool
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Read a CSV file: times, and the numbers of a reference; empty lines do not count.
+
+    A first line without numbers, or a comment before the first row, names the columns, see `read_header`. Without it
+    they are the time [s], then `columns`.
 
     Args:
         path: The file.
         columns: Names of the numbers.
         where: Place that named the file.
-        named: Whether its first line may name some of the columns, in any order; else it says nothing.
+        is_partial: Whether the columns are joints, of which some suffice.
 
     Returns:
-        Times, shape (k,), numbers, shape (k, n), and the names of their columns.
+        Times, shape (k,) [s], numbers in SI units, shape (k, n), and the names of their columns.
 
     Raises:
-        ConfigError: The file cannot be read, a number is none, or times do not increase.
-        SizeMismatch: A line has too few or too many numbers.
-        UnknownName: There is no such column.
+        ConfigError: The file cannot be read, a number is none, or times do not increase. SizeMismatch: A line has too
+            few or too many numbers. UnknownName: There is no such column.
     """
-    found = list(columns)
-    is_first = True
+    names, lines = _parts(path, columns, where)
+    header = Header.plain(columns)
+    if names is not None:
+        header = read_header(f"{path}:{names[0]}", names[1], columns, is_partial=is_partial)
     rows: list[list[float]] = []
-    for line, text in enumerate(read_text(str(path), where).splitlines(), 1):
-        if not text.strip() or text.lstrip().startswith("#"):
-            continue
-        fields = text.split(",")
-        is_header = is_first and not any(map(_is_number, fields))
-        is_first = False
-        if is_header:
-            if named:
-                found = _header(f"{path}:{line}", fields, columns)
-            continue
-        if len(fields) != 1 + len(found):
+    begin = header.names.index(TIME)
+    turn = [header.names.index(name) for name in ("qx", "qy", "qz", "qw") if name in header.names]
+    for line, fields in lines:
+        if len(fields) != len(header.names):
             raise SizeMismatch(
                 f"{len(fields)} numbers",
                 where=f"{path}:{line}:1",
-                expected=f"{1 + len(found)}: time, {', '.join(found)}",
+                expected=f"{len(header.names)}: {', '.join(header.names)}",
             )
-        row = [_number(f"{path}:{line}", fields, index) for index in range(len(fields))]
-        if row[0] < 0.0 or (rows and row[0] <= rows[-1][0]):
-            after = f" after one of {rows[-1][0]:g} s" if rows else ""
+        row = [
+            _number(f"{path}:{line}", *each, is_time=index == begin)
+            for index, each in enumerate(zip(fields, header.factors, strict=True))
+        ]
+        time = row[begin]
+        if time < 0.0 or (rows and time <= rows[-1][begin]):
+            after = f" after one of {rows[-1][begin]:g} s" if rows else ""
             raise ConfigError(
-                f"a time of {row[0]:g} s{after}", where=f"{path}:{line}:1", expected="times that increase, from 0 s on"
+                f"a time of {time:g} s{after}",
+                where=f"{path}:{line}:{fields[begin].column}",
+                expected="times that increase, from 0 s on",
             )
-        if "qw" in found:
-            require_length(row[-4:], f"{path}:{line}:{_column(fields, len(fields) - 4)}")
+        if turn:
+            require_length([row[index] for index in turn], f"{path}:{line}:{fields[min(turn)].column}")
         rows.append(row)
         if len(rows) > TABLE_ROWS:
             raise ConfigError("too many lines", where=f"{path}:{line}:1", expected=f"{TABLE_ROWS} at most")
-    if not rows or (len(rows) == 1 and rows[0][0] == 0.0):
+    if not rows or (len(rows) == 1 and rows[0][begin] == 0.0):
         raise ConfigError(
             f"'{path}' has no motion", where=f"{path}:1:1", expected="a line of numbers after 0 s, or several"
         )
     numbers = np.array(rows)
-    return numbers[:, 0], numbers[:, 1:], found
+    return numbers[:, begin], np.delete(numbers, begin, axis=1), [name for name in header.names if name != TIME]
 
 
-def header_of(path: Path, where: str) -> list[str]:
-    """Return the names of the columns behind the time, as the first line of a CSV file has them; empty: it has none.
+def joints_in(path: Path, where: str) -> list[str]:
+    """Return the names of the columns beside the time, as the first line of a CSV file has them; empty: it has none.
 
     Raises:
         ConfigError: The file cannot be read; `where` is the place that named it.
     """
-    for text in read_text(str(path), where).splitlines():
-        if text.strip() and not text.lstrip().startswith("#"):
-            fields = text.split(",")
-            return [] if any(map(_is_number, fields)) else [field.strip() for field in fields[1:]]
-    return []
+    names, _ = _parts(path, (), where)
+    return [] if names is None else names_of(names[1])
 
 
 def require_length(quaternion: Sequence[float], where: str) -> None:
@@ -93,17 +100,28 @@ def require_length(quaternion: Sequence[float], where: str) -> None:
         raise ConfigError(f"the quaternion {list(quaternion)}", where=where, expected="a quaternion of length 1")
 
 
-def _header(place: str, fields: Sequence[str], columns: Sequence[str]) -> list[str]:
-    names = [field.strip() for field in fields][1:]
-    for index, name in enumerate(names, 1):
-        where = f"{place}:{_column(fields, index)}"
-        if name not in columns:
-            raise UnknownName("joint", name, columns, where=where)
-        if name in names[: index - 1]:
-            raise ConfigError(f"joint '{name}' is there twice", where=where, expected="each joint once")
-    if not names:
-        raise ConfigError("there is one column", where=f"{place}:1", expected="the time, then the joints")
-    return names
+def _parts(path: Path, columns: Sequence[str], where: str) -> tuple[Line | None, list[Line]]:
+    """Return the line that names the columns, None: there is none, and those of numbers.
+
+    Raises:
+        ConfigError: The file cannot be read; `where` is the place that named it.
+    """
+    names = comment = None
+    lines: list[Line] = []
+    for line, text in enumerate(read_text(str(path), where).split("\n"), 1):
+        fields = fields_of(text) if text.strip() else []
+        if text.lstrip().startswith("#"):
+            if not lines and is_header(fields, columns):
+                comment = (line, fields)
+        elif names is None and not lines and fields and not any(_is_number(field.text) for field in fields):
+            names = (line, fields)
+        elif fields:
+            lines.append((line, fields))
+            if len(lines) > TABLE_ROWS:
+                break
+    if names is None and comment is not None and lines and len(comment[1]) == len(lines[0][1]):
+        names = comment
+    return names, lines
 
 
 def _is_number(field: str) -> bool:
@@ -114,18 +132,11 @@ def _is_number(field: str) -> bool:
     return True
 
 
-def _number(place: str, fields: Sequence[str], index: int) -> float:
-    value = float(fields[index]) if _is_number(fields[index]) else math.nan
-    if not abs(value) <= COORDINATE["le"] and not (index == 0 and 0.0 <= value <= 1e5):
+def _number(place: str, field: Field, factor: float, is_time: bool) -> float:
+    value = float(field.text) * factor if _is_number(field.text) else math.nan
+    most = LONGEST if is_time else COORDINATE["le"]
+    if not abs(value) <= most:
         raise ConfigError(
-            f"'{fields[index].strip()}'",
-            where=f"{place}:{_column(fields, index)}",
-            expected=f"a number up to {COORDINATE['le']:g}",
+            f"'{field.text}'", where=f"{place}:{field.column}", expected=f"a number up to {most / factor:g}"
         )
     return value
-
-
-def _column(fields: Sequence[str], index: int) -> int:
-    """Return the column at which a field begins, from 1 on."""
-    before = sum(len(field) + 1 for field in fields[:index])
-    return before + len(fields[index]) - len(fields[index].lstrip()) + 1

@@ -197,7 +197,7 @@ def test_what_exceeds_its_limits_has_failed_and_the_others_go_on(tmp_path):
 
 
 def test_a_search_finds_the_least_measure_and_goes_on_when_it_was_ended(tmp_path):
-    """Some of its trials are equal: they are one run, and have a row each. One worker makes the same table each time."""
+    """Trials that are equal are one run, and have a row each. One worker makes the same table each time."""
     pytest.importorskip("optuna")
     parameters = {"mass": {"path": "simulation/mass", "choice": [1.02, 0.9, 1.1]}}
     search = {"minimize": "off", "trials": 8, "parameters": parameters}

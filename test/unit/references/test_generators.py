@@ -192,6 +192,60 @@ def test_tables_are_followed(table):
     assert_allclose(sampled(joints, START["posture"], [1.0])[0][0] - START["posture"], (0.0, 0.5), atol=1e-12)
 
 
+HALF_TURN = (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5))
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "end"),
+    [
+        ("z,time,y,x\n0.3,1,0.2,0.1\n", "position", (0.1, 0.2, 0.3)),
+        ("time [ms],x (mm), y [cm],z[m]\n1000,100,20,0.3\n", "position", (0.1, 0.2, 0.3)),
+        ('\ufeff"stamp","position.y","position.x",z\r\n1,0.2,0.1,0.3\r\n', "position", (0.1, 0.2, 0.3)),
+        ("# time: by hand\n1,0.1,0.2,0.3\n", "position", (0.1, 0.2, 0.3)),
+        ("t,w,x,y,z\n1,0.70710678,0,0,0.70710678\n", "orientation", HALF_TURN),
+        ("time,qw,qz,qy,qx\n1,0.70710678,0.70710678,0,0\n", "orientation", HALF_TURN),
+        (
+            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n"
+            "1000000000,0.1,0.2,0.3,0.70710678,0,0,0.70710678\n",
+            "pose",
+            (0.1, 0.2, 0.3, *HALF_TURN),
+        ),
+        (
+            "# ground truth of a walk\n# timestamp tx ty tz qx qy qz qw\n1.0 0.1 0.2 0.3 0 0 0.70710678 0.70710678\n",
+            "pose",
+            (0.1, 0.2, 0.3, *HALF_TURN),
+        ),
+        ("wrist [deg],time\n90,1\n", "posture", (np.nan, np.pi / 2.0)),
+    ],
+)
+def test_names_and_units_of_columns_count(table, text, quantity, end):
+    start = START[quantity].copy()
+    found = sampled(table(text, quantity, absolute=True), start, [1.0])[0][0]
+    assert_allclose(found, np.where(np.isnan(end), start, end), atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "what"),
+    [
+        ("time,x,y,q\n1,0,0,0\n", "position", r":1:10: unknown column 'q'.*expected: time, x, y, z"),
+        ("time,x,y,zz\n1,0,0,0\n", "position", r":1:10: unknown column 'zz'.*z"),
+        ("timme,x,y,z\n1,0,0,0\n", "position", r":1:1: unknown column 'timme'.*time"),
+        ("time,x,y,v_z\n1,0,0,0\n", "position", ":1:10: unknown column 'v_z'"),
+        ("time,x,z\n1,0,0\n", "position", ":1:1: there is no column 'y'"),
+        ("x,y,z\n1,0,0\n", "position", ":1:1: there is no column 'time'"),
+        ("time,x,tx,z\n1,0,0,0\n", "position", ":1:8: column 'x' is there twice"),
+        ("time,x [ft],y,z\n1,0,0,0\n", "position", ":1:6: 'x' in 'ft'.*expected: one of m, cm, mm"),
+        ("time [min],x,y,z\n1,0,0,0\n", "position", ":1:1: 'time' in 'min'"),
+        ("time,qx,qy,qz,qw [deg]\n1,0,0,0,1\n", "orientation", ":1:15: 'qw' in 'deg'"),
+        ("# time, x, y, hz\n1,0,0,0\n", "position", ":1:15: unknown column 'hz'"),
+        ("#timestamp [ns],x,y,z\n1403636580838555648,0,0,0\n", "position", ":2:1: .14036365808"),
+    ],
+)
+def test_columns_that_are_unknown_or_missing_have_their_place(table, text, quantity, what):
+    with pytest.raises(SolferError, match=f"(?s)way.csv{what}"):
+        table(text, quantity)
+
+
 @pytest.mark.parametrize(
     ("text", "place", "kind"),
     [
