@@ -6,21 +6,21 @@ from dataclasses import dataclass
 
 from solfer.errors import ConfigError, UnknownName
 
-TIME = "time"
+TIME_COLUMN = "time"
 """Name of the column of times."""
 
-_TIMES = re.compile(r"(?:header[._])?(?:t|time|timestamp|time_?stamp|stamp|secs?|seconds)", re.IGNORECASE)
-_POSITION = re.compile(r"(?:t_?|p_?|p_\w+_|(?:pose[._])?(?:pos|position|translation)[._])?([xyz])", re.IGNORECASE)
-_QUATERNION = re.compile(
+_TIME_NAMES = re.compile(r"(?:header[._])?(?:t|time|timestamp|time_?stamp|stamp|secs?|seconds)", re.IGNORECASE)
+_POSITION_NAMES = re.compile(r"(?:t_?|p_?|p_\w+_|(?:pose[._])?(?:pos|position|translation)[._])?([xyz])", re.IGNORECASE)
+_QUATERNION_NAMES = re.compile(
     r"(?:q_?|q_\w+_|(?:pose[._])?(?:quat|quaternion|orientation|rotation)[._])([xyzw])", re.IGNORECASE
 )
-_FIELD = re.compile(r"\S+?(?:\s*[\[(][^\])]*[\])])?(?=\s|$)")
-_UNIT = re.compile(r"(.*?)\s*(?:\[(.*)\]|\((.*)\))")
+_SPACED_FIELD = re.compile(r"\S+?(?:\s*[\[(][^\])]*[\])])?(?=\s|$)")
+_NAME_AND_UNIT = re.compile(r"(.*?)\s*(?:\[(.*)\]|\((.*)\))")
 
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-_ANGLES = {"rad": 1.0, "deg": 0.017453292519943295}
-_PURE = {"1": 1.0, "-": 1.0}
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_ANGLE_UNITS = {"rad": 1.0, "deg": 0.017453292519943295}
+_NO_UNITS = {"1": 1.0, "-": 1.0}
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Header:
     """What the columns of a table are.
 
     Attributes:
-        names: Name of each column; one is `TIME`.
+        names: Name of each column; one is `TIME_COLUMN`.
         factors: What makes SI units of the numbers of each column.
     """
 
@@ -51,14 +51,14 @@ class Header:
     @classmethod
     def plain(cls, columns: Sequence[str]) -> "Header":
         """Return that of a table without names: the time, then the columns."""
-        return cls((TIME, *columns), (1.0,) * (1 + len(columns)))
+        return cls((TIME_COLUMN, *columns), (1.0,) * (1 + len(columns)))
 
 
 def fields_of(text: str) -> list[Field]:
     """Split a line at its commas, or at blanks if it has none; `#` at its begin does not count."""
     text = re.sub(r"^(\s*)#", r"\1 ", text)
     if "," not in text:
-        return [Field(each.group(), each.start() + 1) for each in _FIELD.finditer(text)]
+        return [Field(each.group(), each.start() + 1) for each in _SPACED_FIELD.finditer(text)]
     places = [each.span(1) for each in re.finditer(r"(?:^|,)\s*([^,]*)", text)]
     return [Field(text[begin:end].strip().strip('"'), begin + 1) for begin, end in places]
 
@@ -85,9 +85,9 @@ def read_header(place: str, fields: Sequence[Field], columns: Sequence[str], is_
     for field in fields:
         where = f"{place}:{field.column}"
         name, unit = _resolved(field, columns)
-        if name not in (TIME, *columns):
-            known = list(columns) if is_partial and TIME in names else [TIME, *columns]
-            raise UnknownName(kind, name, known, where=where, expected=", ".join((TIME, *columns)))
+        if name not in (TIME_COLUMN, *columns):
+            known = list(columns) if is_partial and TIME_COLUMN in names else [TIME_COLUMN, *columns]
+            raise UnknownName(kind, name, known, where=where, expected=", ".join((TIME_COLUMN, *columns)))
         if name in names:
             raise ConfigError(f"{kind} '{name}' is there twice", where=where, expected=f"each {kind} once")
         units = _units(name)
@@ -95,41 +95,41 @@ def read_header(place: str, fields: Sequence[Field], columns: Sequence[str], is_
             raise ConfigError(f"'{name}' in '{unit}'", where=where, expected=f"one of {', '.join(units)}")
         names.append(name)
         factors.append(units.get(unit, 1.0))
-    missing = [name for name in (TIME, *columns) if name not in names]
-    if TIME in missing or (missing and not is_partial):
+    missing = [name for name in (TIME_COLUMN, *columns) if name not in names]
+    if TIME_COLUMN in missing or (missing and not is_partial):
         raise ConfigError(
-            f"there is no column '{missing[0]}'", where=f"{place}:1", expected=", ".join((TIME, *columns))
+            f"there is no column '{missing[0]}'", where=f"{place}:1", expected=", ".join((TIME_COLUMN, *columns))
         )
     if len(names) == 1:
-        raise ConfigError("there is one column", where=f"{place}:1", expected=f"the {TIME}, then the {kind}s")
+        raise ConfigError("there is one column", where=f"{place}:1", expected=f"the {TIME_COLUMN}, then the {kind}s")
     return Header(tuple(names), tuple(factors))
 
 
 def is_header(fields: Sequence[Field], columns: Sequence[str]) -> bool:
     """Return whether a comment names columns: a time, and one at least that is known."""
     found = [_resolved(field, columns)[0] for field in fields]
-    return found[:1] == [TIME] and any(name in columns for name in found)
+    return found[:1] == [TIME_COLUMN] and any(name in columns for name in found)
 
 
 def names_of(fields: Sequence[Field]) -> list[str]:
     """Return the names of a line, without units and without the time, whichever the columns are."""
     found = [_resolved(field, ()) for field in fields]
-    return [name for name, _ in found if name != TIME]
+    return [name for name, _ in found if name != TIME_COLUMN]
 
 
 def _resolved(field: Field, columns: Sequence[str]) -> tuple[str, str]:
     """Return the name of a column as solfer writes it, or as it is if it is unknown, and its unit; empty: none."""
     if field.text in columns:
         return field.text, ""
-    split = _UNIT.fullmatch(field.text)
+    split = _NAME_AND_UNIT.fullmatch(field.text)
     text = split[1] if split else field.text
     unit = (split[2] or split[3] or "").strip() if split else ""
     if text in columns:
         return text, unit
-    if _TIMES.fullmatch(text):
-        return TIME, unit
-    position = _POSITION.fullmatch(text)
-    quaternion = _QUATERNION.fullmatch(text) or (re.fullmatch("([xyzw])", text) if "x" not in columns else None)
+    if _TIME_NAMES.fullmatch(text):
+        return TIME_COLUMN, unit
+    position = _POSITION_NAMES.fullmatch(text)
+    quaternion = _QUATERNION_NAMES.fullmatch(text) or (re.fullmatch("([xyzw])", text) if "x" not in columns else None)
     for match, prefix in ((position, ""), (quaternion, "q")):
         if match and prefix + match[1].lower() in columns:
             return prefix + match[1].lower(), unit
@@ -138,8 +138,8 @@ def _resolved(field: Field, columns: Sequence[str]) -> tuple[str, str]:
 
 def _units(name: str) -> dict[str, float]:
     """Return the units in which a column may be, and their values in SI."""
-    if name == TIME:
-        return _SECONDS
+    if name == TIME_COLUMN:
+        return _TIME_UNITS
     if name in ("x", "y", "z"):
-        return _METRES
-    return _PURE if name in ("qx", "qy", "qz", "qw") else _ANGLES | _METRES
+        return _LENGTH_UNITS
+    return _NO_UNITS if name in ("qx", "qy", "qz", "qw") else _ANGLE_UNITS | _LENGTH_UNITS

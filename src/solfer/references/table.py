@@ -9,7 +9,7 @@ import numpy as np
 from solfer.config.records.bounds import COORDINATE
 from solfer.config.yaml.files import read_text
 from solfer.errors import ConfigError, SizeMismatch
-from solfer.references.header import TIME, Field, Header, fields_of, is_header, names_of, read_header
+from solfer.references.header import TIME_COLUMN, Field, Header, fields_of, is_header, names_of, read_header
 
 TABLE_ROWS = 20_000
 """Rows of a table."""
@@ -50,7 +50,7 @@ def read_table(
     if names is not None:
         header = read_header(f"{path}:{names[0]}", names[1], columns, is_partial=is_partial)
     rows: list[list[float]] = []
-    begin = header.names.index(TIME)
+    begin = header.names.index(TIME_COLUMN)
     turn = [header.names.index(name) for name in ("qx", "qy", "qz", "qw") if name in header.names]
     for line, fields in lines:
         if len(fields) != len(header.names):
@@ -81,7 +81,7 @@ def read_table(
             f"'{path}' has no motion", where=f"{path}:1:1", expected="a line of numbers after 0 s, or several"
         )
     numbers = np.array(rows)
-    return numbers[:, begin], np.delete(numbers, begin, axis=1), [name for name in header.names if name != TIME]
+    return numbers[:, begin], np.delete(numbers, begin, axis=1), [name for name in header.names if name != TIME_COLUMN]
 
 
 def joints_in(path: Path, where: str) -> list[str]:
