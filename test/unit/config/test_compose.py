@@ -82,6 +82,17 @@ def test_places_count_from_one_and_characters_not_bytes():
     assert str(value.head) == "x.yaml:3:12: läufer.äö[1].b"
 
 
+@pytest.mark.parametrize("character", ["\x85", "\u2028", "\u2029"])
+def test_lines_end_where_those_of_yaml_1_2_do(character):
+    """In a comment, a text in quotes and a key; the place of a mistake below is that of an editor."""
+    text = f"# one{character}two: 3\na: 'b{character}\ue000c'\nd{character}e: 5  # f{character}\n"
+    node = node_of(text)
+    assert node.plain() == {"a": f"b{character}\ue000c", f"d{character}e": 5}
+    assert str(dict(node.items())[f"d{character}e"].mark) == f"x.yaml:3:6: d{character}e"
+    with pytest.raises(ConfigError, match=r"^x.yaml:4:5: not YAML: a colon where no key can be"):
+        node_of(f"{text}g: h: i\n")
+
+
 def test_aliases_keep_the_places_of_their_content():
     node = node_of("one: &one {a: 1}\ntwo: *one\n")
     assert str(node.get("two").mark) == "x.yaml:2:6: two"

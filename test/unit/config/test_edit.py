@@ -67,6 +67,11 @@ def test_what_has_no_place_is_refused(path):
         edited(TEXT, "file", {path: 1})
 
 
+def test_lines_of_yaml_1_1_do_not_move_the_place():
+    text = "# a\u2028b\nc: 'd\x85e'\nf: 1\n"
+    assert edited(text, "x.yaml", {("f",): 2}) == text.replace("f: 1", "f: 2")
+
+
 def test_a_new_text_is_a_tree():
     values = {("a", "b", "c"): 1.5, ("a", "d"): [1, 2]}
     assert yaml.safe_load(edited("", "file", values)) == {"a": {"b": {"c": 1.5}, "d": [1, 2]}}

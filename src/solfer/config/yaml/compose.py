@@ -20,6 +20,30 @@ _DEEPEST = 64  # levels; the grammar needs eight
 _FILE_LARGEST = 200_000  # values, aliases counted as often as they are used
 
 
+_BREAKS = "\x85\u2028\u2029"
+"""Characters that end a line for libyaml, as in YAML 1.1, but not in YAML 1.2."""
+
+
+def without_breaks(text: str) -> tuple[str, dict[int, str]]:
+    """Replace characters that only YAML 1.1 takes for the end of a line by others that the text does not have.
+
+    Returns:
+        The text, of which each character has its place, and the table that makes the characters again.
+    """
+    found = [each for each in _BREAKS if each in text]
+    free = (each for each in range(0xE000, 0xF8FF) if chr(each) not in text)
+    shown = dict(zip(free, found, strict=False))
+    return text.translate({ord(each): code for code, each in shown.items()}), shown
+
+
+def _events(text: str) -> Iterator[Any]:
+    text, shown = without_breaks(text)
+    for event in yaml.parse(text, LOADER):
+        if shown and isinstance(event, yaml.ScalarEvent):
+            event.value = event.value.translate(shown)
+        yield event
+
+
 def compose(text: str, file: str, problems: Problems, later: tuple[Key, ...] | None = None) -> YamlNode:
     """Compose the Node of a text with one YAML document.
 
@@ -56,7 +80,7 @@ class _Composer:
         self._file = file
         self._problems = problems
         self._later = None if later is None else list(later)
-        self._events: Iterator[Any] = yaml.parse(text, LOADER)
+        self._events: Iterator[Any] = _events(text)
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._path: list[Key] = []
         self._size = 0

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from solfer.config.yaml.compose import LOADER, compose
+from solfer.config.yaml.compose import LOADER, compose, without_breaks
 from solfer.config.yaml.nodes import Key, dotted
 from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.syntax import not_yaml
@@ -69,7 +69,7 @@ def _no_place(file: str, path: tuple[Key, ...]) -> ConfigError:
 def _with(text: str, file: str, path: tuple[Key, ...], value: Any) -> str:
     """Return a text with one other value; where that has no place of its own, a text with other values."""
     try:
-        node = yaml.compose(text, LOADER)
+        node = yaml.compose(without_breaks(text)[0], LOADER)
     except yaml.MarkedYAMLError as error:
         raise not_yaml(error, text, file) from error
     for depth, key in enumerate(path):

@@ -34,6 +34,10 @@ _FAULTS = (
 _ODD = r"(?:(?![ \t\r\n])\s|[\u200b\u2060\ufeff])"
 """Characters that look like a blank, or like nothing, and are none for YAML."""
 
+_LINE_END = re.compile(r"\r\n|\r|\n")
+"""What ends a line for YAML 1.2; `str.splitlines` knows more."""
+
+_COMMENT_BEGIN = re.compile(r"(?:^|[ \t])#")
 _MISPLACED = re.compile(rf"^[ \t]*({_ODD})|:({_ODD})|({_ODD})\s*$")
 
 
@@ -46,8 +50,8 @@ def odd_blank(text: str, file: str, first: int, last: int) -> ConfigError | None
         first: The first line to search, from zero on.
         last: The last line.
     """
-    for number, line in enumerate(text.splitlines()[first : last + 1], start=first + 1):
-        found = _MISPLACED.search(line.partition(" #")[0])
+    for number, line in enumerate(_LINE_END.split(text)[first : last + 1], start=first + 1):
+        found = _MISPLACED.search(_COMMENT_BEGIN.split(line, maxsplit=1)[0])
         if found is not None:
             column = found.start(found.lastindex or 0)
             character = line[column]
@@ -61,7 +65,7 @@ def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
     """Make the error of a text that is not YAML, with its place."""
     mark = error.problem_mark or error.context_mark
     line, column = (mark.line, mark.column) if mark else (0, 0)
-    lines = text.splitlines()
+    lines = _LINE_END.split(text)
     written = lines[line] if line < len(lines) else ""
     where = f"{file}:{line + 1}:{column + 1}"
     if "\t" in written[: len(written) - len(written.lstrip())]:
