@@ -9,9 +9,9 @@ import numpy as np
 import trimesh
 from trimesh import creation
 
-from solfer.model.documents import parse
+from solfer.model.documents import PlacedElement, parse
 from solfer.model.urdf.description import Description
-from solfer.model.urdf.mesh_files import find_mesh
+from solfer.model.urdf.mesh_files import find_mesh, unit_of
 from solfer.numerics.rotations import rotation_from_rpy
 
 DEFAULT_GREY = (0.7, 0.7, 0.7, 1.0)
@@ -38,23 +38,31 @@ class Visual:
 def visuals_of(description: Description) -> dict[str, list[Visual]]:
     """Make what is seen of each link, one surface for each colour; collision shapes where a link has nothing else.
 
-    Meshes that cannot be read are left out, and logged.
+    Meshes that cannot be read are left out, and logged; so is a colour that is none.
     """
     robot = parse(description.text)
     materials = {each.get("name", ""): each for each in robot.findall("material")}
     found: dict[str, list[Visual]] = {}
     absent: list[str] = []
+    wrong: list[str] = []
     for name, link in description.links.items():
         parts: dict[Color, list[trimesh.Trimesh]] = {}
         for shape in link.visuals or link.collisions:
             meshes = list(_meshes(shape, description.where, absent))
             if meshes:
-                parts.setdefault(_color(shape, materials), []).extend(meshes)
+                color, fault = _color(shape, materials)
+                parts.setdefault(color, []).extend(meshes)
+                wrong += [f"{description.where}:{fault}: link '{name}'"] if fault else []
         found[name] = [Visual(_one(meshes), color) for color, meshes in parts.items()]
-    if absent:
-        more = f" and {len(absent) - 1} more" if len(absent) > 1 else ""
-        logger.warning("meshes that cannot be read are left out: %s%s", absent[0], more)
+    _warn("meshes that cannot be read are left out", absent)
+    _warn("a colour has four numbers from 0 to 1", wrong)
     return found
+
+
+def _warn(what: str, named: list[str]) -> None:
+    if named:
+        more = f" and {len(named) - 1} more" if len(named) > 1 else ""
+        logger.warning("%s: %s%s", what, named[0], more)
 
 
 def _one(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
@@ -92,26 +100,38 @@ def _mesh(geometry: Element, where: str) -> trimesh.Trimesh | None:
         return None
     try:
         mesh = trimesh.load_mesh(path)
+        unit = unit_of(path)
     except Exception:  # whatever a reader of a format raises
         return None
     scale = np.eye(4)
-    scale[(0, 1, 2), (0, 1, 2)] = _numbers(geometry, "scale", (1.0, 1.0, 1.0))
+    scale[(0, 1, 2), (0, 1, 2)] = unit * np.array(_numbers(geometry, "scale", (1.0, 1.0, 1.0)))
     mesh.apply_transform(scale)
     return mesh
 
 
-def _color(shape: Element, materials: dict[str, Element]) -> Color:
+def _color(shape: Element, materials: dict[str, Element]) -> tuple[Color, str]:
+    """Return the colour of a shape, and the place and the text of its numbers where they are none; else empty."""
     own = shape.find("material")
     if own is None:
-        return DEFAULT_GREY
+        return DEFAULT_GREY, ""
     color = own.find("color")
     if color is None:
         named = materials.get(own.get("name", ""))
         color = None if named is None else named.find("color")
-    if color is None:
-        return DEFAULT_GREY
-    red, green, blue, opacity = _numbers(color, "rgba", DEFAULT_GREY)
-    return red, green, blue, opacity
+    text = None if color is None else color.get("rgba")
+    if text is None:
+        return DEFAULT_GREY, ""
+    try:
+        numbers = np.array(text.split(), dtype=float)
+    except ValueError:
+        numbers = np.empty(0)
+    assert isinstance(color, PlacedElement)
+    fault = f'{color.line}:{color.column}: rgba="{text}"'
+    if len(numbers) not in (3, 4) or not np.isfinite(numbers).all():
+        return DEFAULT_GREY, fault
+    red, green, blue, opacity = (*np.clip(numbers, 0.0, 1.0).tolist(), 1.0)[:4]
+    is_right = len(numbers) == 4 and numbers.min() >= 0.0 and numbers.max() <= 1.0
+    return (red, green, blue, opacity), "" if is_right else fault
 
 
 def _numbers(element: Element, attribute: str, default: tuple[float, ...] = ()) -> list[float]:

@@ -10,7 +10,11 @@ from functools import partial
 
 import numpy as np
 import pytest
+from support.unit.colladas import COLLADA, SIZE
 
+from solfer import Robot
+from solfer.errors import ModelError
+from solfer.model.collisions.distances import _geometry
 from solfer.simulation import Simulation, read_bundle
 from solfer.simulation.robot_body import body
 from solfer.simulation.robot_body.differences import differences
@@ -120,6 +124,28 @@ def test_what_differs_from_the_urdf_is_named(tmp_path, before, after, named):
             differences(run._engine, run.body.id, text.replace('<link name="world"/>', "").replace(before, after))
         )
     assert len(found) == len(named) and all(map(str.__contains__, found, named))
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("0.01", "10 10 10"), ("0.3048", "0.5 0.5 -0.5")])
+def test_physics_and_collisions_read_a_mesh_in_one_unit(tmp_path, unit, scale):
+    (tmp_path / "box.dae").write_text(COLLADA.format(unit=unit))
+    shape = f'<collision><geometry><mesh filename="box.dae" scale="{scale}"/></geometry></collision>'
+    run = simulated(tmp_path, door(shapes=shape))
+    size = float(unit) * abs(np.array(scale.split(), dtype=float)) * SIZE
+    _, corners = run._engine.bullet.getMeshData(run.body.id, 0, physicsClientId=run._engine.client)
+    np.testing.assert_allclose(np.ptp(corners, axis=0), size, atol=1e-5)
+    kinematics = Robot.load(tmp_path / "door.urdf", None, floating_base=False).kinematics
+    box = _geometry(kinematics, {"leaf"}).geometryObjects[0].geometry
+    box.computeLocalAABB()
+    np.testing.assert_allclose(box.aabb_local.max_ - box.aabb_local.min_, size, atol=1e-5)
+
+
+@pytest.mark.parametrize("unit", ["-1", "inch"])
+def test_a_mesh_without_a_unit_is_one_error(tmp_path, unit):
+    (tmp_path / "box.dae").write_text(COLLADA.format(unit=unit))
+    shape = '<collision><geometry><mesh filename="box.dae"/></geometry></collision>'
+    with pytest.raises(ModelError, match=rf'box.dae: <unit meter="{unit}">\n  expected: a number above 0'):
+        simulated(tmp_path, door(shapes=shape))
 
 
 def test_differences_are_logged_when_a_robot_is_loaded(tmp_path, caplog, monkeypatch):

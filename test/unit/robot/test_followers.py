@@ -73,6 +73,18 @@ def test_limits_of_followers_bound_their_leaders(robot):
         Robot.load(apart)
 
 
+@pytest.mark.parametrize(("velocity", "limit"), [("0", 3.0), ("1", 0.5), ("9", 3.0)])
+def test_a_follower_without_a_speed_leaves_that_of_its_leader(velocity, limit):
+    joint = (
+        '<joint name="{0}" type="revolute"><parent link="a"/><child link="{0}"/>'
+        '<limit lower="-1" upper="1" velocity="{1}" effort="1"/>{2}</joint><link name="{0}"/>'
+    )
+    follower = joint.format("follower", velocity, '<mimic joint="leader" multiplier="-2"/>')
+    text = f'<robot name="r"><link name="a"/>{joint.format("leader", 3, "")}{follower}</robot>'
+    kinematics = Kinematics(Description.from_text(text, "r.urdf"))
+    assert kinematics.velocity_limit[kinematics.dofs.index("leader")] == limit
+
+
 def test_torque_limits_leave_followers_alone(robot):
     put(robot, *next(states(robot)))
     limits = TorqueLimits(robot.dynamics, 0.002)

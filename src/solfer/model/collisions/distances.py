@@ -11,6 +11,7 @@ import pinocchio as pin
 from solfer.errors import ModelError
 from solfer.model.documents import parse
 from solfer.model.kinematics import Kinematics
+from solfer.model.urdf.mesh_files import find_mesh, unit_of
 
 LinkPair = tuple[str, str]
 """Names of two links."""
@@ -157,6 +158,11 @@ def _geometry(kinematics: Kinematics, links: set[str]) -> pin.GeometryModel:
     for link in robot.findall("link"):
         for shape in link.findall("visual") + ([] if link.get("name") in links else link.findall("collision")):
             link.remove(shape)
+    for mesh in robot.iter("mesh"):  # Pinocchio reads no units
+        path = find_mesh(description.where, mesh.get("filename", ""))
+        if path is not None:
+            scale = np.array(mesh.get("scale", "1 1 1").split(), dtype=float) * unit_of(path)
+            mesh.set("scale", " ".join(map(repr, scale.tolist())))
     folders = [str(folder) for folder in Path(description.where).absolute().parents]
     try:
         geometry = pin.buildGeomFromUrdfString(

@@ -79,7 +79,7 @@ class JointInfo:
         axis: Unit vector of the motion in the child link's frame.
         lower: Lower limit [rad, m]; None if the joint has none, or follows another one and has no range.
         upper: Upper limit [rad, m]; None if the joint has none.
-        velocity: Velocity limit [rad/s, m/s]; None if the joint has none.
+        velocity: Velocity limit [rad/s, m/s]; None if the joint has none, or follows another one and has 0.
         effort: Effort limit [Nm, N]; None if the joint has none.
         damping: Effort against the motion for each unit of its velocity [Nms/rad, Ns/m].
         friction: Effort against the motion at any velocity [Nm, N].
@@ -264,8 +264,10 @@ def read_joint(reader: ElementReader) -> JointInfo:
         reader.fault("the axis is zero", expected="a direction")
     mimic = _read_mimic(reader, kind)
     limits = _read_limits(reader, kind)
-    if mimic is not None and limits.get("lower") == limits.get("upper"):
-        limits = {name: value for name, value in limits.items() if name not in ("lower", "upper")}
+    if mimic is not None:  # files give one that they do not mean, which would bound the leader
+        absent = {"lower", "upper"} if limits.get("lower") == limits.get("upper") else set()
+        absent |= set() if limits.get("velocity") else {"velocity"}
+        limits = {name: value for name, value in limits.items() if name not in absent}
     return JointInfo(
         element.get("name"),
         kind,

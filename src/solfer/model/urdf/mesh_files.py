@@ -1,12 +1,17 @@
 """Where the meshes are that a URDF names."""
 
+import math
+import re
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from solfer.config.yaml.files import is_file, located
-from solfer.errors import MissingDependency, UnknownName
+from solfer.errors import MissingDependency, ModelError, UnknownName
 
 PACKAGE_SCHEME = "package://"
+
+_XML_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_METER = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']([^\"']*)[\"']")
 
 
 def find_mesh(urdf: str | Path, name: str) -> Path | None:
@@ -20,6 +25,27 @@ def find_mesh(urdf: str | Path, name: str) -> Path | None:
         name: What the URDF names.
     """
     return next((path for path in mesh_candidates(urdf, name) if is_file(path)), None)
+
+
+def unit_of(path: Path) -> float:
+    """Return the length of a mesh's unit [m]: that of COLLADA's `<unit meter>`, which PyBullet alone reads; else 1.
+
+    Raises:
+        ModelError: It is no number above 0.
+    """
+    if path.suffix.lower() != ".dae":
+        return 1.0
+    found = _METER.search(_XML_COMMENT.sub(b"", path.read_bytes().partition(b"</asset>")[0]))
+    if found is None:
+        return 1.0
+    text = found[1].decode(errors="replace")
+    try:
+        meter = float(text)
+    except ValueError:
+        meter = math.nan
+    if not 0.0 < meter < math.inf:
+        raise ModelError(f'<unit meter="{text}">', where=str(path), expected="a number above 0")
+    return meter
 
 
 def mesh_candidates(urdf: str | Path, name: str) -> list[Path]:

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from solfer.errors import SimulationError
-from solfer.model.urdf.mesh_files import PACKAGE_SCHEME, find_mesh, mesh_candidates
+from solfer.model.urdf.mesh_files import PACKAGE_SCHEME, find_mesh, mesh_candidates, unit_of
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle of a binary STL."""
@@ -45,6 +45,7 @@ class Meshes:
 
         Raises:
             SimulationError: The mesh of a `<collision>` is missing, or PyBullet reads nothing of it.
+            ModelError: The unit of a mesh is no number.
         """
         for mesh in shape.iter("mesh"):
             name = mesh.get("filename", "")
@@ -78,6 +79,7 @@ class Meshes:
 
         None: PyBullet finds nothing in the file.
         """
+        unit_of(path)
         kind = path.suffix.lower()
         content = path.read_bytes()
         if kind != ".stl":
