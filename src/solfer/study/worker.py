@@ -102,9 +102,13 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
 
 def _start(study: StudyFolder, run: PlannedRun) -> int:
     """Start the process of a run, which a signal ends like any other program; return its id."""
+    worker = os.getpid()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in the child the handlers of this worker never run
     child = os.fork()
     if not child:
+        end_with_parent()
+        if os.getppid() != worker:
+            os._exit(UNFINISHED)  # it had ended before
         _handle_ending(signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
     if not child:
@@ -176,7 +180,6 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
     """Carry out a run in this process, which ends with it."""
     code = UNFINISHED
     try:
-        end_with_parent()
         folder = study.of(run)
         stderr = os.open(folder / STDERR_FILE, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o644)
         for stream in (1, 2):
