@@ -1,11 +1,12 @@
 """Robots on the torques of `inverse_dynamics`: they squat, and their feet keep their grip."""
 
 import contextlib
+import shutil
 
 import numpy as np
 import pinocchio
 import pytest
-from support.integration.torque_robot import FRICTION, LEGGED, opened
+from support.integration.torque_robot import ARMS, FRICTION, LEGGED, opened
 from support.integration.world import CONFIG, World
 from support.integration.xbot_world import XbotWorld
 
@@ -217,3 +218,90 @@ def test_a_fault_is_named_and_the_robot_held(fault, text, caplog):
         if fault is not stretch:  # there the stops of joints take more than their drives
             assert (np.abs(torques) <= world.simulation.kinematics.effort_limit).all()
             assert world.squatting.component.is_holding and np.abs(world.simulation.v).max() < 0.05
+
+
+class Circle:
+    """How far a tip is from the circle that it draws, and torques from those of Pinocchio.
+
+    Args:
+        bus: The bus of plugin and simulation.
+        plugin: The plugin, with a task `tip` whose point and reference have the same axes.
+    """
+
+    def __init__(self, bus, plugin):
+        self._plugin = plugin
+        self._model, self._data = plugin.robot.kinematics.pinocchio[0], plugin.robot.kinematics.pinocchio[0].createData()
+        self.ways, self.errors, self.differences = [], [], []
+        bus.every(0.005, self._look)
+
+    def _look(self):
+        component, robot = self._plugin.component, self._plugin.robot
+        tip = component.tasks["tip"]
+        self.ways.append(tip.point.value[:3].copy())
+        self.errors.append(np.linalg.norm(tip.point.value - tip.reference.value))
+        state, problem = robot.state, component.problem
+        followers, acceleration = robot.kinematics.followers, problem.acceleration.copy()
+        acceleration[followers.dofs] = followers.ratios * acceleration[followers.leaders]
+        torque = followers.fold(pinocchio.rnea(self._model, self._data, state.position, state.velocity, acceleration))
+        driven = np.setdiff1d(robot.actuated, followers.dofs)
+        self.differences.append(np.abs(torque - problem.torque)[driven].max())
+
+    def check(self):
+        """Check that the tip has gone around, within 2 mm, by the torques of Pinocchio."""
+        assert np.ptp(self.ways, axis=0).max() > 0.09
+        print(np.max(self.errors), np.max(self.differences), np.ptp(self.ways, axis=0))
+        assert np.max(self.errors) < 0.002
+        assert np.max(self.differences) < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ARMS)
+def test_an_arm_needs_no_contact(name, tmp_path):
+    with opened(name, tmp_path, 0.0) as robot:
+        robot.run(0.5)
+        circle = Circle(robot.bus, robot.plugin)
+        robot.run(5.0)
+        circle.check()
+        assert robot.plugin.life is PluginState.RUNNING and not robot.plugin.component.is_holding
+
+
+UPPER_BODY = """
+    upper_squat:
+      <<: *torques
+      secondary_file: {file: support/upper_torques.yaml}
+      robot: simulated
+      controller: [position_controller]
+      track: all
+      speed_driven:
+      stack:
+        tasks:
+          tip: {point: position, link: arm1_7, gain: 4, reference: {circle: {radius: 0.05, period: 4.0, plane: yz}}}
+          posture: {point: posture, gain: 5}
+        levels: [[tip], [posture]]
+"""
+PART = """mwoibn:
+  ros: {source: {urdf: /robot_upper_body}}
+  feedbacks: {simulated: [link_side_online]}
+  controller: {position_controller: {interface: {velocity: true, stiffness: true, damping: true}}}
+"""
+
+
+def test_hands_in_the_air_hold_nothing(tmp_path):
+    """The contacts of both hands are in the robot's file; by the measured torques they bear nothing."""
+    for name in ("robots", "references"):
+        (tmp_path / name).symlink_to(CONFIG / name)
+    shutil.copytree(CONFIG / "support", tmp_path / "support")
+    (tmp_path / "support/upper_torques.yaml").write_text(PART)
+    file = tmp_path / "centauro.yaml"
+    text = (CONFIG / "centauro.yaml").read_text()
+    file.write_text(text.replace("\n    squat: &squat", f"{UPPER_BODY}\n    squat: &squat", 1))
+    with contextlib.closing(World()) as world:
+        world.run(1.0)
+        plugin = world.plugin("upper_squat", file, target="solfer.components.inverse_dynamics:InverseDynamics")
+        world.run(0.5)
+        assert plugin.component.ground.names == ("left_arm", "right_arm")
+        assert not plugin.component.ground.shares.any()
+        circle = Circle(world.bus, plugin)
+        world.run(5.0)
+        circle.check()
+        assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding

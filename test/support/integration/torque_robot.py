@@ -38,11 +38,12 @@ class Legged:
     Attributes:
         urdf, srdf: Its files, relative to those of `example-robot-data`, or absolute.
         state: Named state in which it begins.
-        feet: Links of its feet.
+        feet: Links of its feet; none: its base is fixed.
         rows: Rows that a foot holds.
         contact: Further keys of a contact.
         tags: Further tags of the component.
         base: Link whose orientation stays.
+        tip: Link that draws a circle of 5 cm, where the base is fixed.
     """
 
     urdf: str
@@ -53,6 +54,12 @@ class Legged:
     contact: dict[str, Any] = field(default_factory=dict)
     tags: dict[str, Any] = field(default_factory=dict)
     base: str = "base_link"
+    tip: str = ""
+
+
+def _arm(urdf: str, srdf: str, state: str, tip: str) -> Legged:
+    """Make an arm on a fixed base."""
+    return Legged(urdf, srdf, state, (), 3, tip=tip)
 
 
 def _quadruped(urdf: str, srdf: str, foot: str, legs: str, base: str) -> Legged:
@@ -101,6 +108,11 @@ LEGGED = {
     )
     for name in ("go1", "go2", "b1")
 }
+ARMS = {
+    "panda": _arm("panda_description/urdf/panda.urdf", "panda_description/srdf/panda.srdf", "default", "panda_hand_tcp"),
+    "z1": _arm("z1_description/urdf/z1.urdf", "z1_description/srdf/z1.srdf", "arm_up", "link06"),
+}
+CIRCLE = {"radius": 0.05, "period": 4.0, "plane": "yz"}
 
 
 def hand_task(link: str, base: str) -> dict[str, Any]:
@@ -114,13 +126,14 @@ def write(name: str, folder: Path, amplitude: float, hand: str | None = None) ->
 
     A link `hand` draws a circle meanwhile.
     """
-    legged = LEGGED[name]
+    legged = (LEGGED | ARMS)[name]
     try:
         share = Path(str(distribution("example-robot-data").locate_file(ROBOTS)))
     except PackageNotFoundError:
         pytest.skip("example-robot-data is not installed")
     files = ["--urdf", str(share / legged.urdf), "--srdf", str(share / legged.srdf)]
-    assert main(["new", "robot", name, *files, "--floating-base", "--package", str(folder / name)]) == 0
+    base = ["--floating-base"] if legged.feet else []
+    assert main(["new", "robot", name, *files, *base, "--package", str(folder / name)]) == 0
     configuration = folder / name / f"config/{name}.yaml"
     bundle = configuration.parent / f"robots/{name}/robot.yaml"
     contact = {"type": "contact_point", "position": [0.0, 0.0, 0.0], "constraint_matrix": _rows(legged.rows)}
@@ -138,8 +151,9 @@ def write(name: str, folder: Path, amplitude: float, hand: str | None = None) ->
 
     def add(tree: dict[str, Any]) -> None:
         main_tree = tree["mwoibn"]
-        main_tree["robot"]["standing"]["contacts"] = {"read": True}
-        main_tree["ros"]["source"]["contacts"] = {"file": f"robots/{name}/contacts.yaml"}
+        if legged.feet:
+            main_tree["robot"]["standing"]["contacts"] = {"read": True}
+            main_tree["ros"]["source"]["contacts"] = {"file": f"robots/{name}/contacts.yaml"}
         main_tree["controller"]["position_controller"]["interface"] = dict.fromkeys(COMMANDED, True)
         tasks = {
             "com": {
@@ -150,10 +164,13 @@ def write(name: str, folder: Path, amplitude: float, hand: str | None = None) ->
             "base": {"point": "orientation", "link": legged.base, "gain": 8},
             "posture": {"point": "posture", "gain": 5},
         } | ({} if hand is None else {"hand": hand_task(hand, legged.base)})
+        if legged.tip:
+            tip = {"point": "position", "link": legged.tip, "gain": 8, "reference": {"circle": CIRCLE}}
+            tasks = {"tip": tip, "posture": tasks["posture"]}
         main_tree["modules"]["squat"] = {
             "class": "solfer.components.inverse_dynamics:InverseDynamics",
             "layer": "NRT",
-            "robot": "standing",
+            "robot": "standing" if legged.feet else "whole_body",
             "controller": "direct",
             "mode": "full",
             "kinematics": True,

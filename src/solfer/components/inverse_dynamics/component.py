@@ -166,7 +166,8 @@ class InverseDynamics(ReferenceFollower):
         self._demand.stack.update()
         self._configured.start()
         self._start_references()
-        self.ground.start()
+        if absent := self.ground.start():
+            log.info("%s: contacts that touch nothing do not count: %s", self.name, ", ".join(absent))
         self._watch.start()
         self._fault = ""
         self._reason = ""
@@ -195,7 +196,7 @@ class InverseDynamics(ReferenceFollower):
             np.copyto(self._torques.value, self.problem.torque)
             self._motion.advance(self.problem.acceleration, step)
         else:
-            self._torques.hold(self.ground.rows.jacobian)
+            self._torques.hold(self.ground.jacobian)
         self._torques.blend(step)
         for target in self._list:
             target.measure()

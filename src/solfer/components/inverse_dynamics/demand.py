@@ -102,6 +102,6 @@ class DemandedAccelerations:
         np.multiply(self.roots, self._fed, out=self._rates)
         self.tasks += self._rates
         self.tasks -= self._drift.value
-        np.dot(ground.rows.jacobian, state.velocity, out=self.slip)
+        np.dot(ground.jacobian, state.velocity, out=self.slip)
         np.multiply(self.slip, -self.settle, out=self.contacts)
         self.contacts -= ground.rows.offset

@@ -16,6 +16,10 @@ from solfer.robot import Robot
 INNER_FRICTION = math.sqrt(0.5)
 """Share of the friction with which a pyramid of four sides lies within the cone."""
 
+PRESSED, CARRYING = 0.05, 0.2
+"""Share of a contact's part of the weight from which on it touches something at a start: by its measured force, and by
+the torques of the joints, of which friction takes some."""
+
 
 class Ground:
     """Contacts with unknown forces f along the rows that they hold.
@@ -23,7 +27,7 @@ class Ground:
     A contact that holds a point has three forces in world axes, another one a force along each row of its constraint,
     in its own frame with z along the normal. Forces keep G f <= 0: a pyramid of four sides within the friction cone,
     and for a flat foot the centre of pressure in its sole, and the torque about the normal. The normal forces N f lie
-    between zero and `most`, which grows and shrinks while contacts come and go.
+    between zero and `most`, which grows and shrinks while contacts come and go. A robot on a fixed base needs none.
 
     Args:
         robot: The Robot.
@@ -32,6 +36,7 @@ class Ground:
     Attributes:
         contacts: The contacts by name.
         rows: What they hold: the Handler of their accelerations.
+        jacobian: Its Jacobian Jc, shape (k, n); live.
         starts: First force of each contact, and the end of the last one, shape (c + 1,).
         cones: G, shape (g, k).
         owners: Contact of each row of G, shape (g,).
@@ -43,7 +48,7 @@ class Ground:
         fade: Time in which the force of a contact comes or goes [s]; may be set before each `update`.
 
     Raises:
-        ComponentError: There is no contact, or a flat foot has no sole.
+        ComponentError: A base that floats has no contact, or a flat foot has no sole.
     """
 
     def __init__(self, robot: Robot, tags: InverseDynamicsTags):
@@ -53,6 +58,7 @@ class Ground:
         self.starts = np.cumsum([0, *(each.rows for each in accelerations)])
         count = len(accelerations)
         size = int(self.starts[-1])
+        self.jacobian = self.rows.jacobian.reshape(size, robot.size)  # that of no point has no columns
         blocks = [_cone(name, contact, tags) for name, contact in self.contacts.items()]
         self.owners = np.repeat(np.arange(count), [len(block) for block in blocks])
         self.cones = self.cones_of(tags)
@@ -62,8 +68,10 @@ class Ground:
         self._weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         self.unit = self._weight / max(count, 1)
         self.fade = tags.fade
-        self._goals = np.array([contact.active for contact in self.contacts.values()], dtype=float)
-        self.shares = self._goals.copy()
+        self._robot = robot
+        self._tracked = [robot.contacts.names.index(name) for name in self.contacts]
+        self._placed = np.array([contact.active for contact in self.contacts.values()], dtype=float)
+        self._goals, self.shares = self._placed.copy(), self._placed.copy()
         self._spans = np.full(count, self._weight)
         self.most = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
@@ -93,17 +101,41 @@ class Ground:
             lifted: Whether it is lifted.
             force: The present forces, shape (k,); the normal one of the contact is where it begins [N].
         """
-        if lifted is not bool(self._goals[index]):
+        self._placed[index] = 0.0 if lifted else 1.0
+        if self._placed[index] == self._goals[index]:
             return
-        self._goals[index] = 0.0 if lifted else 1.0
+        self._goals[index] = self._placed[index]
         pressed = max(float(self.normals[index] @ force), 0.0)
         self._spans[index] = pressed if lifted else self._weight
         self.shares[index] = 1.0 if lifted else min(pressed / self._weight, 1.0)
 
-    def start(self) -> None:
-        """Let all contacts have come where they are to be."""
-        self.shares[:] = self._goals
+    def start(self) -> tuple[str, ...]:
+        """Let all contacts have come where they are to be, but those that touch nothing; return the names of these."""
+        self.shares[:] = self._placed
         self._change()
+        absent = (self._placed > 0.0) & ~self._touching()
+        self.shares[absent] = 0.0
+        self._goals[:] = self.shares
+        self._change()
+        return tuple(name for name, is_absent in zip(self.contacts, absent, strict=True) if is_absent)
+
+    def _touching(self) -> np.ndarray:
+        """Find the contacts that bear a load, the robot being at rest, shape (c,).
+
+        Their measured forces count; without these, those that the measured torques leave to them, h = tau + Jc' f. If
+        nothing is measured, a floating base stands on all of them, and a fixed base on none.
+        """
+        robot = self._robot
+        forces = robot.contacts.wrenches[self._tracked, :3]
+        if forces.any():
+            return np.linalg.norm(forces, axis=1) >= PRESSED * self.unit
+        torque = robot.state.torque
+        if not torque.any():
+            return np.full(len(self.contacts), robot.kinematics.base is not None)
+        self.rows.update()
+        left = robot.kinematics.bias(robot.state.position, np.zeros(robot.size)) - torque
+        borne, *_ = np.linalg.lstsq(self.jacobian.T, left)
+        return self.normals @ borne >= CARRYING * self.unit
 
     def update(self, step: float) -> None:
         """Advance by `step` [s], and compute the rows at the state of the last update of the Robot."""
@@ -129,7 +161,7 @@ def _tracked(robot: Robot, tags: InverseDynamicsTags) -> Mapping[str, Contact]:
         tracked = contacts.group(tags.track)
     except SolferError as error:
         raise error.at(tags.where("track")) from None
-    if not tracked:
+    if not tracked and robot.kinematics.base is not None:
         raise ComponentError(
             f"no contact of '{tags.track}' carries '{robot.name}'",
             where=tags.where("track"),

@@ -125,7 +125,7 @@ class WholeBodyProblem:
         solved = self._elimination
         inertia = dynamics.inertia
         bias = dynamics.bias
-        held = ground.rows.jacobian
+        held = ground.jacobian
         is_sound = build(
             inertia,
             bias,

@@ -50,7 +50,7 @@ class DynamicsWatch:
         self._sent, self._difference = np.zeros((2, robot.size))
         self._moved = np.zeros((count, 3))
         self._missing = np.zeros(count)
-        self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()])
+        self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()], dtype=bool)
         self._time = 0.0
 
     def start(self) -> None:
