@@ -7,32 +7,7 @@ from solfer.errors import PipeError, UnknownName
 from solfer.model import BidirectionalMap
 from solfer.robot import Robot
 from solfer.robot.names import UNACTUATED
-
-TYPES = ("all", "actuated", UNACTUATED, "body")
-"""Types of DoFs beside the names of maps."""
-
-
-def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
-    """Select the Robot's DoFs of a chain that are of a type, in joint space.
-
-    Args:
-        dofs: The record; its `type` is `all`, `actuated`, `unactuated`, or the name of a map: the DoFs in that map.
-        robot: The Robot.
-
-    Raises:
-        PipeError: The type is `body`, which does not belong to joint space.
-        UnknownName: An unknown chain, type or map.
-    """
-    chain = _chain(dofs, robot)
-    if dofs.type == "all":
-        return chain
-    if dofs.type in ("actuated", UNACTUATED):
-        return np.intersect1d(chain, robot.actuated) if dofs.type == "actuated" else np.setdiff1d(chain, robot.actuated)
-    if dofs.type == "body":
-        raise PipeError("type 'body' in joint space", where=dofs.where("type"), expected="space: OPERATIONAL")
-    if dofs.type not in robot.maps:
-        raise UnknownName("type of DoFs", dofs.type, (*TYPES, *robot.maps), where=dofs.where("type"))
-    return np.intersect1d(chain, robot.maps[dofs.type].robot_indices)
+from solfer.robot.selection import chain_of, select
 
 
 def joint_map(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> BidirectionalMap:
@@ -72,7 +47,7 @@ def require_base(record: FeedbackRecord, robot: Robot) -> str:
             expected="a URDF with a floating joint",
         )
     base = np.arange(6)
-    if not np.isin(base, _chain(dofs, robot)).all():
+    if not np.isin(base, chain_of(dofs, robot)).all():
         raise PipeError(
             f"the chain '{dofs.chain}' lacks DoFs of the floating base",
             where=dofs.where("chain"),
@@ -107,7 +82,3 @@ def _known_link(link: str, robot: Robot, where: str) -> str:
     if link not in robot.description.links:
         raise UnknownName("link", link, robot.description.links, where=where)
     return link
-
-
-def _chain(dofs: DofsRecord, robot: Robot) -> np.ndarray:
-    return robot.selectors.get(dofs.chain, dofs.where("chain")).indices

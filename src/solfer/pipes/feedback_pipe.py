@@ -66,7 +66,7 @@ class FeedbackPipe(abc.ABC):
         accepted: Number of accepted messages.
         received: Whether all values of the pipe have been received since the start or the last `restart`.
         arrival: Arrival of the newest accepted message, in the pipe's own clock [s]; infinity while there is none since
-            the start or the last `restart`.
+            the start or the last `restart`. If several publishers are required it is that of the stalest of them.
         stamp: When its numbers were true, by the sender's clock [s]; zero before the first.
         handovers: How often another publisher replaced one that had timed out.
         changed: Arrival of the newest message that changed any number of the State [s]; infinity: that is not known.
@@ -125,6 +125,15 @@ class FeedbackPipe(abc.ABC):
     def place(self) -> str:
         """The pipe's name and topic."""
         return f"'{self.name}' ({self.reader.topic})"
+
+    @property
+    def silent(self) -> str:
+        """Name of the publisher that has been silent for the longest time; empty: there are not several that count."""
+        return ""
+
+    def require(self, dofs: np.ndarray) -> None:
+        """Require the pipe at a start; from then on each publisher of some of the Robot's `dofs` has to go on."""
+        self.required = True
 
     def run(self) -> MessageStatus:
         """Read and accept the newest message: NEW if there was one that fits, OLD or NONE if not."""
@@ -348,6 +357,18 @@ class StateFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.dropped`."""
         return 0 if self.history is None else self.history.dropped
 
+    @property
+    def silent(self) -> str:
+        """See `FeedbackPipe.silent`."""
+        stalest = None if self._precedence is None else self._precedence.stalest
+        return "" if stalest is None else stalest.name
+
+    def require(self, dofs: np.ndarray) -> None:
+        """See `FeedbackPipe.require`."""
+        super().require(dofs)
+        if self._precedence is not None:
+            self._precedence.watch(np.isin(self.state_fields[0].dofs, dofs))
+
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
         precedence = self._precedence
@@ -465,6 +486,9 @@ class StateFeedbackPipe(FeedbackPipe):
         """Let `part` be all that the messages of this cycle had; return whether there were any."""
         if not parts:
             return NONE if self.reader.message is None else OLD
+        stalest = self._precedence.stalest
+        if stalest is not None:
+            self.arrival = stalest.arrival
         self.part = None if any(part is None for part in parts) else np.unique(np.concatenate(parts))
         return NEW
 

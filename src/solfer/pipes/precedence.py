@@ -1,6 +1,7 @@
 """Decides which publisher of a topic counts for which DoFs of a measured State, where several publish the same."""
 
 import math
+from operator import attrgetter
 
 import numpy as np
 
@@ -65,8 +66,19 @@ class Precedence:
         self.handovers = 0
         self.sole: Owner | None = None
         self._size = size
+        self._watched = np.zeros(size, dtype=bool)
         self._owners: dict[str, Owner] = {}
         self._rivalries: dict[str, tuple[float, tuple[Owner, ...]]] = {}
+
+    def watch(self, dofs: np.ndarray) -> None:
+        """Watch DoFs, flags of shape (size,): each of their publishers has to go on, see `stalest`."""
+        self._watched |= dofs
+
+    @property
+    def stalest(self) -> Owner | None:
+        """The publisher of DoFs that are watched that was silent for longest; None: there are not two publishers."""
+        watched = [owner for owner in self._owners.values() if (owner.dofs & self._watched).any()]
+        return min(watched, key=attrgetter("arrival")) if len(self._owners) > 1 and watched else None
 
     def admits(self, name: str, part: np.ndarray | None, arrival: float) -> bool:
         """Decide whether a message of a publisher with the DoFs `part` that arrived at `arrival` [s] counts.

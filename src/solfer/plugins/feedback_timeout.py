@@ -191,11 +191,12 @@ class FeedbackTimeout:
         self.timed_out = True
         self.timeouts = self.timeouts + 1
         feedback = self.feedback
+        silent = f" of {feedback.silent}" if feedback.silent else ""
         logger.warning(
             "feedback '%s' (%s): %s for %.3f s: %s",
             feedback.name,
             feedback.reader.topic,
-            "no number has changed, though joints were commanded to move," if frozen else "nothing new",
+            "no number has changed, though joints were commanded to move," if frozen else f"nothing new{silent}",
             now - (feedback.changed if frozen else feedback.arrival),
             TIMEOUT_ACTIONS[self.action],
         )

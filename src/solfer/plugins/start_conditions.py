@@ -185,7 +185,7 @@ class StartConditions:
         elif now > self._latest and not rivalries:
             raise ReceiveTimeout(
                 f"plugin '{self._plugin}' has waited {FIRST_MESSAGES_PATIENCE:g} s {self.lacks}",
-                expected="a publisher, or `initialize: false`",
+                expected="a publisher; `initialize: false`, or `open_loop: true` of joints that are not measured",
             )
         return WAIT
 

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from typing import Any
 
+import numpy as np
+
 from solfer.config import (
     CalibrationRecord,
     Configuration,
@@ -31,6 +33,7 @@ from solfer.robot.names import (
     controller_map,
 )
 from solfer.robot.robot import Robot
+from solfer.robot.selection import commanded_dofs, select
 from solfer.robot.shipped import with_bundled_base
 from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
@@ -50,7 +53,8 @@ def build(
 
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
     for each lower-level controller that the plugin commands, and `LOWER_LEVEL` for all of them together; and
-    `FEEDBACK`, the order of the first feedback of the measured joints. In a real-time layer `XBOT` is the order in
+    `FEEDBACK`, the order of the first feedback of the measured joints, then the commanded ones that it lacks: the
+    plugin waits until they are measured, too. In a real-time layer `XBOT` is the order in
     which the lower level publishes and receives its joints. A predefined map that no pipe uses is left out
     if its source is not there. In mode `idle`, which sends no command, all actuated DoFs in the Robot's order replace
     the joints of a controller that does not answer.
@@ -96,8 +100,8 @@ class _Builder:
         self._waits = not self.faults
         for name, model in models.items():
             self._add_model(robot, name, model)
-        self._add_topic_maps(robot)
         self._add_lower_level(robot)
+        self._add_topic_maps(robot)
         self._add_middleware_map(robot)
         self._raise()
         return robot
@@ -147,7 +151,7 @@ class _Builder:
             self._add(robot, name, dofs, where=where)
 
     def _add_topic_maps(self, robot: Robot) -> None:
-        """Add maps in the order of a message; a map in use waits for the first one."""
+        """Add maps in the order of messages; a map in use waits for the first one."""
         for name, record in self._configuration.mappings.items():
             if record.loading == "topic" and self._used(name):
                 self._add_topic(robot, name, record, where=record.where("source"))
@@ -172,7 +176,20 @@ class _Builder:
         if order is not None and pipe is not None and pipe.calibration is not None:
             order = self._try(lambda: received_joints(pipe, self._calibration(pipe), robot, order=order))
         if order is not None:
+            if pipe is not None and pipe.measures_joints and pipe.source == record.source:
+                order = tuple(dict.fromkeys((*order, *self._commanded(robot, name, pipe))))
             self._add(robot, name, self._with_base(robot, name, order), where=where)
+
+    def _commanded(self, robot: Robot, name: str, feedback: FeedbackRecord) -> list[str]:
+        """List the joints of a `feedback` in the map `name` that are commanded and that no other map measures."""
+        if self._configuration.module.mode == "idle":
+            return []
+        free = select(feedback.dofs, robot)
+        for other in self._configuration.feedbacks:
+            if other.measures_joints and other.dofs.mapping != name:
+                free = np.setdiff1d(free, select(other.dofs, robot))
+        commanded = [commanded_dofs(record, robot) for record in self._lower_level()]
+        return [robot.dofs[dof] for dof in np.intersect1d(free, np.concatenate(commanded))] if commanded else []
 
     def _with_base(self, robot: Robot, name: str, order: tuple[str, ...]) -> tuple[str, ...]:
         """Add the floating base's DoFs to the order of a robot, where a pipe carries them in it.

@@ -102,6 +102,28 @@ class Reader(abc.ABC):
         return sorted(publisher.name for publisher in self.publishers if publisher.arrival >= since)
 
 
+class JointOrder:
+    """Names of the joints in the messages of a joint-space topic: those of the first message, then others as they come.
+
+    Args:
+        reader: Receives the messages.
+
+    Attributes:
+        names: The names.
+    """
+
+    def __init__(self, reader: Reader):
+        self._reader = reader
+        self.names: dict[str, None] = {}
+
+    def read(self) -> bool:
+        """Read the newest message of each publisher; return whether all known publishers have published."""
+        for publisher in self._reader.update():
+            if self._reader.read_from(publisher) is NEW:
+                self.names |= dict.fromkeys(self._reader.message.names)
+        return bool(self.names) and not self._reader.awaited()
+
+
 class Queue(abc.ABC):
     """Every message of a topic, in order of arrival; when the queue is full the oldest is dropped and counted.
 

@@ -194,9 +194,9 @@ class Middleware(abc.ABC):
         """Make a writer to a topic."""
 
     def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
-        """Return the names of the joints, in the order of the first message on a joint-space topic.
+        """Return the names of the joints on a joint-space topic: those of its first message, then those of others.
 
-        Warns after a second when the topic has no publisher.
+        All publishers count that are known by then. Warns after a second when the topic has no publisher.
 
         Raises:
             MiddlewareError: Nothing arrived within `timeout` [s]; names what is wrong with the topic.
@@ -220,7 +220,10 @@ class Middleware(abc.ABC):
 
     @abc.abstractmethod
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
-        """Resolve a joint-space topic, and wait up to `timeout` [s] for the names in its first message; None: none."""
+        """Resolve a joint-space topic, and wait up to `timeout` [s] for the names in its messages; None: there is none.
+
+        See `JointOrder`.
+        """
 
     def _missing_publisher(self, topic: str, message: str) -> Missing | None:
         """Look up what is wrong with a topic, see `Topics.missing_publisher`; waits for the answer.

@@ -155,6 +155,7 @@ RUNS: dict[str, dict[str, Change]] = {
                 ("acceleration", "heard"),
             )
         },
+        "open_loop": Change(SETS, {OUT + "arm_controller/open_loop": True}),
         "ff_service": Change(WALK, {OUT + "arm_controller/ff_service": "/ff"}),
         "load_service": Change(
             WALK, {OUT + "arm_controller/load_service": "/load"}, {ROS + "source/controller": {"file": "gains.yaml"}}

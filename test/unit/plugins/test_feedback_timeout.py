@@ -310,7 +310,7 @@ def test_a_restart_forgets_strikes():
 class Frozen:
     """A feedback whose messages go on, while their numbers stay."""
 
-    name, measures, required, received, handovers = "joints", True, True, True, 0
+    name, silent, measures, required, received, handovers = "joints", "", True, True, True, 0
     reader = type("Reader", (), {"topic": "joint_states"})
 
     def __init__(self):

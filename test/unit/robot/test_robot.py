@@ -237,7 +237,7 @@ def test_builder_makes_the_paper_s_maps(configured, outside):
     }
     assert robot.maps["FEEDBACK"].external == ("camera", "torso_yaw", *WHEELS)
     assert robot.maps["LOWER_LEVEL"].external == robot.maps["ros_control::wheels"].external == WHEELS
-    assert outside.waited == ["joint_states", "wheels"]
+    assert outside.waited == ["wheels", "joint_states"]
     assert len(robot.actuators) == 42
     assert [contact.link for contact in robot.contacts] == [
         "wheel_1",
@@ -262,7 +262,7 @@ def test_listing_1_maps_to_other_models(configured, outside):
 def test_a_topic_map_in_use_is_loaded(configured, outside):
     robot = build(configured(mapping="PYTHON", initialize="false"), outside)
     assert robot.maps["PYTHON"].external == ("torso_yaw", "hip_yaw_1")
-    assert "FEEDBACK" not in robot.maps and outside.waited == ["order", "wheels"]
+    assert "FEEDBACK" not in robot.maps and outside.waited == ["wheels", "order"]
 
 
 def test_idle_plugins_need_no_controller(configured, outside, caplog):
@@ -321,8 +321,8 @@ def test_missing_sources_are_reported_at_once(configured, outside):
     with pytest.raises(SolferErrors) as caught:
         build(configured(), outside)
     assert [str(error.what) for error in caught.value.errors] == [
-        "nothing on topic 'joint_states' within 10 s",
         "there is no controller 'wheels'",
+        "nothing on topic 'joint_states' within 0.5 s",
     ]
     assert all("main.yaml:" in error.where for error in caught.value.errors)
 

@@ -340,6 +340,11 @@ class ControllerRecord(PipeRecord):
         description="controller of the lower level that gets the commands, so that plugins on disjoint joints have "
         "pipes of their own to it; default: the one with the pipe's name",
     )
+    open_loop: bool = Field(
+        default=False,
+        description="lower level: whether its joints may be commanded though no feedback measures them: each starts "
+        "where the first command is, at once; left out: the plugin waits until all of them are measured",
+    )
     sink: str | None = Field(
         default=None, description="topic; of a lower-level controller it follows the controller's name"
     )
@@ -368,8 +373,9 @@ class ControllerRecord(PipeRecord):
             raise ValueError(f"a controller of the lower level in {self.space} space; it has joints only: space: JOINT")
         if self.lower_level and self.function != "reference":
             raise ValueError("a controller of the lower level cannot be sent measurements: function: reference")
-        if self.controller is not None and not self.lower_level:
-            raise ValueError("'controller' is for pipes to the lower level: type: impedance, or velocity")
+        for name in ("controller", "open_loop"):
+            if getattr(self, name) and not self.lower_level:
+                raise ValueError(f"'{name}' is for pipes to the lower level: type: impedance, or velocity")
         return self
 
     @property

@@ -10,7 +10,7 @@ from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, Unkn
 from solfer.interfaces.declaration import Service
 from solfer.middleware.memory.bus import Bus, SenderState, Topic
 from solfer.transport.backlog import Backlog
-from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Queue, Reader, Writer
+from solfer.transport.endpoints import NEW, NONE, OLD, JointOrder, MessageStatus, Publisher, Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import Message, copied
 from solfer.transport.middleware import HealthReport, Middleware, Submit
@@ -210,8 +210,9 @@ class MemoryMiddleware(Middleware):
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
         """See `Middleware._first_order`; time passes until the first message."""
         source = self.bus.topic(topic, message)
-        self._wait(lambda: source.newest is not None, timeout)
-        return source.name, None if source.newest is None else source.newest.names
+        order = JointOrder(MemoryReader(self.bus, source, 0))
+        self._wait(order.read, timeout)
+        return source.name, tuple(order.names) or None
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`; time passes until the reply is there."""

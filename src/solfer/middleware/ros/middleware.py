@@ -28,6 +28,7 @@ from solfer.middleware.ros.reconfigure import ReconfigureServer
 from solfer.middleware.ros.services import RosService
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
+from solfer.transport.endpoints import JointOrder
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
@@ -189,8 +190,9 @@ class RosMiddleware(Middleware):
         """
         reader = RosReader(topic, message)
         try:
-            received = wait_for(lambda: bool(reader.read()), timeout, self.running)
-            return reader.topic, reader.message.names if received else None
+            order = JointOrder(reader)
+            wait_for(order.read, timeout, self.running)
+            return reader.topic, tuple(order.names) or None
         finally:
             reader.close()
 

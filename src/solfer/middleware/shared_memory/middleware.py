@@ -18,7 +18,7 @@ from solfer.middleware.shared_memory.rpc.services import ServiceServer
 from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
 from solfer.middleware.shared_memory.topics.ears import Ears
 from solfer.middleware.shared_memory.topics.endpoints import XbotMail, XbotQueue, XbotReader, XbotWriter
-from solfer.transport.endpoints import Queue
+from solfer.transport.endpoints import JointOrder, Queue
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
@@ -211,13 +211,11 @@ class XbotMiddleware(Middleware):
 
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
         """See `Middleware._first_order`."""
-        reader = XbotReader(self.namespace, topic, message, now=self.now)
+        order = JointOrder(XbotReader(self.namespace, topic, message, now=self.now))
         end = self.now() + timeout
-        while not reader.read():
-            if self.now() >= end or not self.running():
-                return topic, None
+        while not order.read() and self.now() < end and self.running():
             self.sleep_until(self.now() + CHECK_PERIOD)
-        return topic, reader.message.names
+        return topic, tuple(order.names) or None
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`."""

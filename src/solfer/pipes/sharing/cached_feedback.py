@@ -97,6 +97,7 @@ class CachedFeedbackPipe(FeedbackPipe):
     changed = property(attrgetter("_pipe.changed"))
     ignored = property(attrgetter("_pipe.ignored"))
     dropped = property(attrgetter("_pipe.dropped"))
+    silent = property(attrgetter("_pipe.silent"))
     lacks = property(attrgetter("_pipe.lacks"))
 
     def rivalry(self, now: float) -> str:
@@ -110,6 +111,11 @@ class CachedFeedbackPipe(FeedbackPipe):
     def be_patient(self, timeout: float, strikes: int) -> None:
         """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
         self.source.be_patient(timeout, strikes)
+
+    def require(self, dofs: np.ndarray) -> None:
+        """See `FeedbackPipe.require`."""
+        super().require(dofs)
+        self._pipe.require(dofs)
 
     def check_start(self) -> None:
         """See `FeedbackPipe.check_start`."""

@@ -35,6 +35,7 @@ from solfer.recording.log import RunDocuments
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
 from solfer.robot.names import RobotNames, check_tags
+from solfer.robot.selection import commanded_dofs
 from solfer.transport import Inbox, Middleware
 from solfer.transport.declared import Bindings, bind
 from solfer.transport.endpoints import Reader, Writer
@@ -256,7 +257,7 @@ class Generator:
             if component is not None:
                 errors += self._without_effort(robot, component.efforts, [pipe for pipe, _ in controllers])
             if len(feedbacks) == len(self._records(robot)) and any(gate for _, gate in controllers):
-                errors += self._require_state(feedbacks)
+                errors += self._require_state(robot, feedbacks)
         errors += self._shared_topics(robot, feedbacks, [pipe for pipe, _ in controllers])
         raise_all(errors)
         return watches, controllers
@@ -412,10 +413,11 @@ class Generator:
                 errors.append(PipeError(what, where=where, expected="one message on each topic"))
         return errors
 
-    def _require_state(self, feedbacks: list[FeedbackPipe]) -> list[SolferError]:
+    def _require_state(self, robot: Robot, feedbacks: list[FeedbackPipe]) -> list[SolferError]:
         """Require a State before the plugin commands: the feedbacks marked to initialise, else all States.
 
-        Motors are not enough: only the link side measures where the joints are.
+        Those of joints that are commanded are required in any case: a joint that is not measured would be driven from
+        zero. Motors are not enough: only the link side measures where the joints are.
         """
         module = self.configuration.module
         joints_or_base = (each for each in self.configuration.feedbacks if each.content.measures)
@@ -427,7 +429,26 @@ class Generator:
         if not any(feedback.required for feedback in states):
             for feedback in states:
                 feedback.required = True
-        return []
+        return self._unmeasured(robot, {each.name: each for each in states})
+
+    def _unmeasured(self, robot: Robot, states: dict[str, FeedbackPipe]) -> list[SolferError]:
+        """Require the feedbacks of commanded joints; return an error for each pipe that commands others, too."""
+        errors: list[SolferError] = []
+        records = [] if self.configuration.module.mode == "idle" else self.configuration.controllers
+        for record in records:
+            missing = commanded_dofs(record, robot)
+            for feedback in self.configuration.feedbacks:
+                if feedback.measures_joints and (feedback.interface.position or record.carried == ("velocity",)):
+                    mapped = joint_map(feedback.dofs, feedback.dofs.mapping, robot, pipe=feedback.name).robot_indices
+                    if np.isin(missing, mapped).any():
+                        states[feedback.name].require(missing)
+                    missing = np.setdiff1d(missing, mapped)
+            if len(missing):
+                names = ", ".join(robot.dofs[dof] for dof in missing)
+                what = f"the pipe '{record.name}' commands joints that no feedback measures: {names}"
+                expected = "a feedback of their position, other `dofs`, or `open_loop: true` in a pipe of their own"
+                errors.append(PipeError(what, where=record.where("dofs"), expected=expected))
+        return errors
 
     def init_callbacks(self, component: Component) -> None:
         """Bind what the component declares to the middleware: services, topics, actions and parameters, live or not."""

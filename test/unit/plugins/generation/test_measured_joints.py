@@ -1,0 +1,134 @@
+"""A plugin commands no joint that nothing measures: not at its start, nor after one of several drivers has ended."""
+
+import json
+import logging
+
+import numpy as np
+import pytest
+from support.walk import benches
+from support.walk.files import FILES, changed
+
+from solfer.config import load
+from solfer.errors import PipeError
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import Registry, generate
+from solfer.plugins.plugin import PluginState
+from solfer.transport.messages import JointMessage
+
+MAIN = "main/mwoibn/"
+IN, OUT = MAIN + "feedback/joints/", MAIN + "controller/"
+BOTH = ["arm_controller", "wheel_controller"]
+HALVES = {
+    MAIN + "ros/feedback/joints/source": "halves",
+    MAIN + "feedbacks/some": ["joints"],
+    MAIN + "controllers/few": BOTH,
+    OUT + "arm_controller/filter": None,
+    IN + "dofs/mapping": "FEEDBACK",
+    IN + "filter": None,
+    IN + "timeout": 0.1,
+}
+HOME = dict(zip(benches.JOINTS, (0.02, -0.03, 0.04), strict=True))  # [rad]
+DRIVERS = [(("shoulder", "elbow"), ("roll",)), (("roll",), ("elbow", "shoulder"))]
+
+
+@pytest.fixture(autouse=True)
+def holding(monkeypatch):
+    """Let the component hold all joints where they start."""
+
+    def hold(component):
+        component.model.command.position[:] = component.start_position
+
+    monkeypatch.setattr(benches.Walker, "update", hold)
+
+
+class Halves:
+    """A plugin on a robot whose joints have several drivers, which publish on one topic."""
+
+    def __init__(self, folder, first, **changes):
+        benches.write_robot(folder)
+        for name, content in changed(FILES, HALVES | changes).items():
+            (folder / f"{name}.yaml").write_text(json.dumps(content))
+        self.others = benches.Others(folder)
+        self._drivers = {}
+        self.publish(first)
+        self.sent = MemoryMiddleware(self.others.bus, "ear").queue("arm_controller/command", "solfer/JointCommand")
+        configuration = load(folder / "main.yaml", "sets")
+        generator = Registry().find("sets", configuration.module.class_)
+        self.plugin = generate(configuration, MemoryMiddleware(self.others.bus, "sets"), generator)
+
+    def publish(self, names):
+        """Publish joints where they are at home, by a driver of their own."""
+        bus, topic = self.others.bus, ("halves", "sensor_msgs/JointState")
+        driver = self._drivers.setdefault(names, MemoryMiddleware(bus, f"driver_of_{names[0]}").writer(*topic))
+        noise = 1e-6 * np.sin(1e3 * bus.time)  # a sensor whose numbers stay is frozen
+        position = np.array([HOME[name] + noise for name in names])
+        driver.write(JointMessage(names, position, np.zeros(len(names)), np.zeros(len(names)), stamp=bus.time))
+
+    def run(self, duration, *drivers):
+        """Let drivers publish and the plugin cycle so long [s]; return where the first command begins, by name."""
+        for _ in range(round(duration * self.plugin.rate)):
+            self.others.bus.run_until(self.others.bus.time + 1.0 / self.plugin.rate)
+            for names in drivers:
+                self.publish(names)
+            self.plugin.cycle()
+        return next((dict(zip(each.names, each.position, strict=True)) for each in self.sent.drain()), None)
+
+    @property
+    def at_home(self):
+        """Where the joints of the arm's controller are."""
+        return {name: HOME[name] for name in benches.JOINTS[:2]}
+
+    @property
+    def running(self):
+        return self.plugin.life is PluginState.RUNNING
+
+
+@pytest.mark.parametrize("drivers", DRIVERS)
+def test_a_start_waits_for_all_drivers(tmp_path, drivers, caplog):
+    """Whoever publishes first: the order is that of the first message, and all joints begin where they are."""
+    caplog.set_level(logging.INFO)
+    halves = Halves(tmp_path, drivers[0])
+    assert halves.plugin.robot.maps["FEEDBACK"].external[: len(drivers[0])] == drivers[0]
+    assert halves.run(0.5, drivers[0]) is None and not halves.running
+    missing = ", ".join(name for name in benches.JOINTS if name in drivers[1])
+    assert f"waits for feedback {missing} of 'joints' (halves)" in halves.plugin.health()[1]
+    assert f"waits for feedback {missing} of 'joints' (halves)" in caplog.text
+    assert halves.run(0.5, *drivers) == pytest.approx(halves.at_home, abs=1e-5) and halves.running
+
+
+@pytest.mark.parametrize("drivers", DRIVERS)
+def test_a_plugin_holds_without_one_of_its_drivers(tmp_path, drivers, caplog):
+    """It goes on when that driver is back, and after a restart it waits for all of them again."""
+    halves = Halves(tmp_path, drivers[0])
+    halves.run(0.5, *drivers)
+    assert halves.running
+    halves.run(0.5, drivers[0])
+    assert not halves.running and f"nothing new of driver_of_{drivers[1][0]} for 0.1" in caplog.text
+    halves.run(0.5, *drivers)
+    assert halves.running
+    halves.plugin.stop()
+    halves.plugin.restart()
+    halves.run(0.5, drivers[1])
+    assert not halves.running
+    halves.run(0.5, *drivers)
+    assert halves.running
+
+
+@pytest.mark.parametrize(
+    ("chain", "pipe", "missing"), [("arm", "wheel_controller", "roll"), ("wheels", "arm_controller", "shoulder, elbow")]
+)
+def test_joints_without_a_feedback_need_open_loop(tmp_path, chain, pipe, missing):
+    with pytest.raises(PipeError, match=f"'{pipe}' commands joints that no feedback measures: {missing}\\n"):
+        Halves(tmp_path, benches.JOINTS, **{IN + "dofs/chain": chain})
+    halves = Halves(tmp_path, benches.JOINTS, **{IN + "dofs/chain": chain, f"{OUT}{pipe}/open_loop": True})
+    halves.run(0.5, benches.JOINTS)
+    assert halves.running
+
+
+def test_a_driver_of_other_joints_may_end(tmp_path):
+    """The plugin commands the arm: it neither waits for the wheel nor needs it."""
+    halves = Halves(tmp_path, ("shoulder", "elbow"), **{MAIN + "controllers/few": BOTH[:1]})
+    assert halves.run(0.5, ("shoulder", "elbow")) and halves.running
+    halves.run(0.5, ("shoulder", "elbow"), ("roll",))
+    halves.run(0.5, ("shoulder", "elbow"))
+    assert halves.running
