@@ -1,5 +1,6 @@
 """Joint-space motions: the paper's `joint_states` (Listings 9 and 16)."""
 
+from copy import copy
 from typing import Annotated
 
 import numpy as np
@@ -72,6 +73,10 @@ class _JointRamp:
         np.copyto(position, self._position, where=self.moves)
         np.copyto(velocity, self._velocity, where=self.moves)
 
+    def coast(self, step: float, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Write what `advance` would write, and stay."""
+        copy(self).advance(step, position, velocity)
+
     def end(self) -> None:
         """End where the joints are."""
         self.moves[:] = True
@@ -136,7 +141,9 @@ class JointStates(Component):
         self._turns = robot.turns[self._joints]
         self._ramp = _JointRamp(len(self._joints))
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))
-        self._follower = TrajectoryFollower(robot, self._joints, self._position, velocity=self._velocity)
+        self._follower = TrajectoryFollower(
+            robot, self._joints, self._position, velocity=self._velocity, coast=self._ramp.coast
+        )
         self._speeds = _WheelSpeeds(len(self._wheels))
         self._error = np.zeros(len(self._joints))
 
@@ -162,6 +169,8 @@ class JointStates(Component):
     def update(self) -> None:
         """Follow the ramp and the trajectory of the joints, and bring the wheels nearer to their speed."""
         step = self.time_step
+        if self._follower.waiting:
+            self._take_turn(step)
         self._ramp.advance(step, self._position, self._velocity)
         self._follower.advance(step)
         if self._follower.violated:
@@ -237,7 +246,7 @@ class JointStates(Component):
             SolferError: It is wrong; see `TrajectoryCheck`.
         """
         if trajectory.points:
-            self._take_over(trajectory)
+            self._take(trajectory)
         else:
             self._follower.leave("a trajectory without points has stopped it")
             self._brake()
@@ -245,7 +254,7 @@ class JointStates(Component):
     def begin(self, goal: FollowGoal) -> Outcome | None:
         """Follow the trajectory of a goal; returns why not if any part of it is wrong, and then nothing changes."""
         try:
-            self._take_over(goal.trajectory, goal)
+            self._take(goal.trajectory, goal)
         except SolferError as error:
             why = described(error, lines=True)
             codes = {UnknownName: INVALID_JOINTS, StaleTrajectory: OLD_HEADER_TIMESTAMP}
@@ -283,13 +292,20 @@ class JointStates(Component):
             raise ComponentError(f"speed {speed:g} rad/s", expected="a positive number, or 0 for the configured speed")
         return speed or self.tags.speed
 
-    def _take_over(self, trajectory: JointTrajectory, goal: FollowGoal | None = None) -> None:
+    def _take(self, trajectory: JointTrajectory, goal: FollowGoal | None = None) -> None:
+        self._follower.begin(trajectory, self.clock(), goal)
+        self._take_turn(0.0)
+
+    def _take_turn(self, step: float) -> None:
+        """Let a trajectory take over whose time has come, within some time [s]."""
         before = self._follower.moving
-        end = self._follower.begin(trajectory, self.clock(), goal)
-        if before:
-            self._slow_down()
-        self._ramp.moves[self._follower.places] = False
-        self._goal[self._follower.places] = end
+        taken = self._follower.take_turn(step)
+        if taken is not None:
+            if before:
+                self._slow_down()
+            places, end = taken
+            self._ramp.moves[places] = False
+            self._goal[places] = end
 
     def _plan(self, goal: np.ndarray, limits: np.ndarray) -> None:
         """Begin a ramp of all joints, from how they move at present."""

@@ -249,3 +249,93 @@ def test_accelerations_make_a_quintic(scene):
     u = 0.25
     share = 10 * u**3 - 15 * u**4 + 6 * u**5
     assert scene.at(*NECK) == pytest.approx([0.2 * share, 0.1 * share], abs=1e-9)
+
+
+def ahead(scene, trajectory, lead, is_goal):
+    """Send a trajectory whose stamp is some time ahead [s], by the topic or as a goal."""
+    stamped = JointTrajectory(TrajectoryHeader(scene.bus.time + lead), trajectory.joint_names, trajectory.points)
+    return scene.client.send(FollowGoal(stamped)) if is_goal else scene.publish(stamped)
+
+
+@pytest.mark.parametrize("is_goal", [False, True])
+@pytest.mark.parametrize("others", [(), ("torso_yaw",)])
+def test_a_trajectory_waits_for_its_stamp(scene, is_goal, others):
+    """Until then joints rest, or go on with the present one; it begins in motion, and other joints come to rest."""
+    ahead(scene, BACK, 0.5, is_goal)
+    scene.run(0.4)
+    assert not np.any(scene.rows)
+    first = (*NECK, *others)
+    nod = tuple(TrajectoryPoint((0.2, 0.1, *(0.3 for _ in others)), (), time_from_start=2.0) for _ in range(1))
+    scene.publish(JointTrajectory(joint_names=first, points=nod))
+    ahead(scene, BACK, 1.0, is_goal)
+    scene.run(1.0)
+    assert scene.at(*first) == pytest.approx([0.1, 0.05, *(0.15 for _ in others)], abs=2e-3)
+    scene.run(1.1)
+    assert scene.at(*NECK) == pytest.approx([0.0, 0.0], abs=1e-9) and not scene.rows[-1].any()
+
+
+def test_a_stream_that_is_ahead_is_smooth(scene):
+    """Each message replaces those that wait only from its stamp on."""
+    for index in range(100):
+        angle = 0.4 * np.sin(0.03 * index)
+        ahead(scene, through((0.1, (angle, 0.0), (0.0, 0.0))), 0.05, False)
+        scene.run(0.02)
+    assert scene.at("neck_yaw")[0] == pytest.approx(0.4 * np.sin(2.85), abs=0.05) and scene.jerkiness() < 0.05
+    assert np.ptp([row[scene.robot.dof("neck_yaw")] for row in scene.rows[20:150]]) > 0.3
+
+
+def test_a_newer_trajectory_replaces_the_one_that_waits(scene):
+    for lead, angle, names in ((1.0, 0.4, NECK), (0.5, 0.2, NECK), (0.8, 0.1, ("torso_yaw",))):
+        ahead(scene, through((0.3, (angle, 0.0)[: len(names)], ()), names=names), lead, False)
+        scene.run(0.1)
+    scene.run(2.0)
+    assert scene.at("neck_yaw", "torso_yaw") == pytest.approx([0.0, 0.1], abs=1e-9)
+
+
+@pytest.mark.parametrize("end", ["cancel", "stop", "service", "topic"])
+def test_what_stops_joints_drops_what_waits(scene, end):
+    goal = ahead(scene, NOD, 0.5, True)
+    scene.run(0.2)
+    assert goal.status is GoalStatus.ACTIVE
+    if end == "cancel":
+        scene.client.cancel(goal)
+    elif end == "service":
+        scene.component.trajectory(MoveJoints(joints=("torso_yaw",), positions=(0.1,)))
+    else:
+        scene.publish(BACK if end == "topic" else JointTrajectory())
+    scene.run(3.0)
+    assert goal.status is (GoalStatus.PREEMPTED if end == "cancel" else GoalStatus.ABORTED)
+    assert scene.at(*NECK) == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_a_goal_ends_once_when_a_later_trajectory_takes_over(scene):
+    """By the topic: it is active until then. By a goal: that one takes over its status, and its motion at the stamp."""
+    first = scene.client.send(FollowGoal(NOD))
+    scene.run(0.1)
+    ahead(scene, BACK, 0.9, False)
+    scene.run(0.8)
+    assert first.status is GoalStatus.ACTIVE
+    scene.run(0.2)
+    assert first.status is GoalStatus.ABORTED and "another trajectory" in first.text
+    second = scene.client.send(FollowGoal(NOD))
+    scene.run(0.1)
+    third = ahead(scene, BACK, 0.5, True)
+    scene.run(0.1)
+    assert second.status is GoalStatus.PREEMPTED and third.status is GoalStatus.ACTIVE and scene.rows[-1].any()
+    scene.run(1.6)
+    assert third.status is GoalStatus.SUCCEEDED and scene.jerkiness() < 0.05
+
+
+@pytest.mark.parametrize("lead", [61.0, 7200.0])
+def test_a_stamp_of_another_clock_is_refused_with_both_times(scene, lead):
+    scene.run(1.0)
+    refused = ahead(scene, NOD, lead, True)
+    scene.run(0.1)
+    assert refused.status is GoalStatus.REJECTED
+    assert f"stamped {1.0 + lead:.3f} s, and now it is 1.005 s" in refused.text and "60 s ahead" in refused.text
+
+
+def test_a_point_at_the_stamp_is_reached_by_then(scene):
+    ahead(scene, through((0.0, (0.2, 0.1), (0.0, 0.0))), 1.0, False)
+    scene.run(1.0)
+    assert scene.at(*NECK) == pytest.approx([0.2, 0.1], abs=1e-9)

@@ -67,6 +67,21 @@ class TrajectoryCheck:
             raise ComponentError("a trajectory names no joint", expected="the joints that its points move")
         return np.array([self._place[name] for name in names])
 
+    def elapsed(self, trajectory: JointTrajectory, now: float) -> float:
+        """Return the time `now` since the stamp of a trajectory [s]; below zero: it is in the future.
+
+        Raises:
+            ComponentError: It is too far in the future, or no number.
+        """
+        stamp = trajectory.header.stamp
+        elapsed = now - stamp if stamp else 0.0
+        if not elapsed >= -LATEST_BEGIN:
+            raise ComponentError(
+                f"the trajectory is stamped {stamp:.3f} s, and now it is {now:.3f} s",
+                expected=f"a stamp by this clock, at most {LATEST_BEGIN:g} s ahead, or 0",
+            )
+        return elapsed
+
     def motion(
         self,
         trajectory: JointTrajectory,
@@ -75,9 +90,9 @@ class TrajectoryCheck:
         velocity: np.ndarray,
         measured: np.ndarray,
         *,
-        now: float,
-    ) -> tuple[ViaPoints, float]:
-        """Make the motion of a trajectory from a present state; points that have passed are left out.
+        elapsed: float,
+    ) -> ViaPoints:
+        """Make the motion of a trajectory from the state in which it begins; points that have passed are left out.
 
         The whole trajectory of a continuous joint is on the turn on which its first point that is left is nearest to
         where the joint is desired, as in ros_control's joint_trajectory_controller. If all points have passed, and
@@ -86,13 +101,10 @@ class TrajectoryCheck:
         Args:
             trajectory: The trajectory, with points.
             places: Its joints, see `places`.
-            start: Where they are desired at present, shape (m,) [rad, m].
+            start: Where they are desired then, shape (m,) [rad, m].
             velocity: How fast, shape (m,) [rad/s, m/s].
             measured: Where they are, shape (m,) [rad, m].
-            now: The time in which trajectories are stamped [s].
-
-        Returns:
-            The motion, which begins now, and its time at present [s]: below zero where its stamp is in the future.
+            elapsed: Time from its stamp until then [s].
 
         Raises:
             SizeMismatch: The numbers of joints and values differ.
@@ -103,10 +115,6 @@ class TrajectoryCheck:
         times = self._times(trajectory.points)
         if any(any(point.effort) for point in trajectory.points):
             raise ComponentError("points with efforts", expected="positions, velocities and accelerations: no effort")
-        stamp = trajectory.header.stamp
-        elapsed = now - stamp if stamp else 0.0
-        if elapsed < -LATEST_BEGIN:
-            raise ComponentError(f"the trajectory begins in {-elapsed:.6g} s", expected=f"{LATEST_BEGIN:g} s at most")
         rows = [self._row(trajectory, kind) for kind in ("positions", "velocities", "accelerations")]
         left = times > elapsed
         if rows[0] is not None:
@@ -120,7 +128,7 @@ class TrajectoryCheck:
                     f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
                     expected="a point in the future, or joints that are there already, at rest",
                 )
-            return ViaPoints(np.array([elapsed, elapsed + _INSTANT]), np.vstack([start, start])), elapsed
+            return ViaPoints(np.array([elapsed, elapsed + _INSTANT]), np.vstack([start, start]))
         starts = (start, velocity, np.zeros_like(start))
         positions, velocities, accelerations = (
             None if row is None else np.vstack([first, row[left]]) for row, first in zip(rows, starts, strict=True)
@@ -138,7 +146,7 @@ class TrajectoryCheck:
             )
         motion = ViaPoints(np.append(elapsed, times[left]), positions, velocities, accelerations=accelerations)
         self._require_limits(motion, places, start)
-        return motion, elapsed
+        return motion
 
     def tolerances(self, given: Sequence[JointTolerance], names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Return tolerances of position and velocity of the joints of a trajectory, shape (m,) each; inf: none.

@@ -1,5 +1,6 @@
-"""Moves joints along a trajectory, and supervises the goal of an action that requested it."""
+"""Moves joints along trajectories, one after the other, and supervises the goal of an action that requested one."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,25 +85,60 @@ class _Deviation:
         return f"joint '{names[index]}' is {self._error[index]:.6g} {unit} from its trajectory"
 
 
+@dataclass
+class _Course:
+    """A trajectory that is followed, or that waits.
+
+    Attributes:
+        motion: Its motion, by the time since its stamp.
+        time: That time [s].
+        start: That time at which it takes over [s].
+        names: Its joints.
+        places: The same, indices of those that may be moved, shape (m,).
+        limits: Tolerances of its goal; None: it has no goal.
+        deviation: How far its joints are from it.
+    """
+
+    motion: ViaPoints
+    time: float
+    start: float
+    names: tuple[str, ...]
+    places: np.ndarray
+    limits: _Limits | None
+    deviation: _Deviation
+
+
 class TrajectoryFollower:
-    """One trajectory of some joints, with or without a goal.
+    """One trajectory of some joints, with or without a goal, and those that wait for their stamps.
+
+    Until the stamp of the next one everything goes on; it begins in the state in which the joints are then. It is
+    checked, and its motion is made, when it comes.
 
     Args:
         robot: The Robot.
         joints: DoFs that may be moved, shape (n,).
         position: Where they are desired, shape (n,) [rad, m]; written.
         velocity: How fast, shape (n,) [rad/s, m/s]; written.
+        coast: Writes where joints without a trajectory will be after a time [s], shape (n,), and how fast.
 
     Attributes:
         moving: Whether a trajectory is in progress.
-        places: The joints that it moves, indices into `joints`.
+        waiting: Trajectories that are to take over, in the order of their stamps.
     """
 
-    def __init__(self, robot: Robot, joints: np.ndarray, position: np.ndarray, velocity: np.ndarray):
+    def __init__(
+        self,
+        robot: Robot,
+        joints: np.ndarray,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        coast: Callable[[float, np.ndarray, np.ndarray], None],
+    ):
         self._robot = robot
         self._joints = joints
         self._position = position
         self._velocity = velocity
+        self._coast = coast
         self._check = TrajectoryCheck(
             [robot.dofs[dof] for dof in joints],
             robot.lower_limits.position[joints],
@@ -111,24 +147,20 @@ class TrajectoryFollower:
             turns=robot.turns[joints],
         )
         self.moving = False
-        self.places = np.zeros(0, dtype=int)
-        self._motion: ViaPoints | None = None
-        self._time = 0.0
-        self._names: tuple[str, ...] = ()
-        self._supervised: _Limits | None = None
+        self.waiting: list[_Course] = []
+        self._course: _Course | None = None
+        self._goal: _Course | None = None
         self._outcome: Outcome | None = None
-        self._deviation = _Deviation(robot, joints[self.places])
 
-    def begin(self, trajectory: JointTrajectory, now: float, goal: FollowGoal | None = None) -> np.ndarray:
-        """Take over a trajectory; nothing changes if any part of it is wrong.
+    def begin(self, trajectory: JointTrajectory, now: float, goal: FollowGoal | None = None) -> None:
+        """Let a trajectory wait for its turn, see `take_turn`; nothing changes if any part of it is wrong.
+
+        It replaces those that wait: from its stamp on those of the same joints, and all of others.
 
         Args:
             trajectory: The trajectory.
             now: The time in which trajectories are stamped [s].
-            goal: The goal that it belongs to; None: a topic's.
-
-        Returns:
-            Where the joints of the trajectory end, shape (m,) [rad, m].
+            goal: The goal that it belongs to, in place of the one before; None: a topic's.
 
         Raises:
             SolferError: See `TrajectoryCheck`.
@@ -137,48 +169,71 @@ class TrajectoryFollower:
             raise ComponentError("a trajectory without points", expected="one point or more")
         names = trajectory.joint_names
         places = self._check.places(names)
-        supervised = None if goal is None else self._limits(goal, names)
-        start = self._position[places]
-        velocity = self._velocity[places]
-        measured = self._robot.state.position[self._joints[places]]
-        motion, elapsed = self._check.motion(trajectory, places, start, velocity=velocity, measured=measured, now=now)
-        self.leave("another trajectory has taken over")
-        self._motion = motion
-        self._time = elapsed
+        limits = None if goal is None else self._limits(goal, names)
+        elapsed = self._check.elapsed(trajectory, now)
+        # joints have to be at a point at the stamp by then
+        start = elapsed if trajectory.points[-1].time_from_start == 0.0 else max(elapsed, 0.0)
+        kept = [each for each in self.waiting if each.names == names and each.start - each.time < start - elapsed]
+        position, velocity = self._after(start - elapsed, kept)
+        motion = self._check.motion(
+            trajectory,
+            places,
+            position[places],
+            velocity=velocity[places],
+            measured=self._robot.state.position[self._joints[places]],
+            elapsed=start,
+        )
+        deviation = _Deviation(self._robot, self._joints[places])
+        course = _Course(motion, elapsed, start, names=names, places=places, limits=limits, deviation=deviation)
+        if goal is not None:
+            self._goal = course
+            self._outcome = None
+        elif any(each is self._goal for each in self.waiting) and not any(each is self._goal for each in kept):
+            self._abort("another trajectory has taken over")
+        self.waiting = [*kept, course]
+
+    def take_turn(self, period: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Let a trajectory take over that begins within some time [s].
+
+        Returns:
+            Its joints, and where they end, shape (m,) each [rad, m]; None: none begins.
+        """
+        due = [each for each in self.waiting if each.time + period >= each.start]
+        if not due:
+            return None
+        self.waiting = self.waiting[len(due) :]
+        if self._goal is self._course or any(each is self._goal for each in due[:-1]):
+            self._abort("another trajectory has taken over")
+        self._course = course = due[-1]
         self.moving = True
-        self.places = places
-        self._names = names
-        self._supervised = supervised
-        self._outcome = None
-        self._deviation = _Deviation(self._robot, self._joints[places])
-        return motion.last
+        return course.places, course.motion.last
 
     def advance(self, period: float) -> None:
         """Move the joints on by the time of a cycle [s], and supervise the goal."""
-        if self._motion is None:
+        for waiting in self.waiting:
+            waiting.time += period
+        course = self._course
+        if course is None:
             return
-        self._time += period
+        course.time += period
         if self.moving:
-            deviation = self._deviation
-            self._motion.at(self._time, deviation.desired, deviation.speed)
-            self._position[self.places] = deviation.desired
-            self._velocity[self.places] = deviation.speed
-            self.moving = self._time < self._motion.end
-        if self._supervised is not None and self._outcome is None:
-            self._supervise(self._supervised, self._motion)
+            deviation = course.deviation
+            course.motion.at(course.time, deviation.desired, deviation.speed)
+            self._position[course.places] = deviation.desired
+            self._velocity[course.places] = deviation.speed
+            self.moving = course.time < course.motion.end
+        if course.limits is not None and course is self._goal and self._outcome is None:
+            self._supervise(course, course.limits)
 
     def leave(self, why: str) -> None:
         """Leave the joints where they are, with their speed; a goal that is in progress ends with this reason."""
-        self.moving = False
-        self._motion = None
-        if self._supervised is not None and self._outcome is None:
-            self._outcome = Outcome(FollowResult(INVALID_GOAL, why), False, why)
+        self._drop()
+        self._abort(why)
 
     def forget(self) -> None:
         """Leave the trajectory, and the goal without an outcome."""
-        self.moving = False
-        self._motion = None
-        self._supervised = None
+        self._drop()
+        self._goal = None
         self._outcome = None
 
     def outcome(self) -> Outcome | None:
@@ -188,23 +243,50 @@ class TrajectoryFollower:
     @property
     def violated(self) -> bool:
         """Whether the joints have left the path of the goal while they move."""
-        return self.moving and self._outcome is not None
+        return self.moving and self._outcome is not None and self._course is self._goal
 
     def report(self) -> FollowFeedback:
-        """Return where the joints are desired and where they are."""
-        deviation = self._deviation
+        """Return where the joints of the goal are desired and where they are."""
+        course = self._goal
+        if course is None:
+            raise ComponentError("there is no goal", expected="a goal in progress")
+        deviation = course.deviation
         deviation.measure()
-        time = max(self._time, 0.0)
-        desired = self._position[self.places]
-        speed = self._velocity[self.places]
+        time = max(course.time, 0.0)
+        desired = self._position[course.places]
+        speed = self._velocity[course.places]
         away = desired - deviation.actual
         away -= whole_turns(away, deviation.turn)
         return FollowFeedback(
-            self._names,
+            course.names,
             _point(desired, speed, time),
             _point(deviation.actual, deviation.turning, time),
             error=_point(away, speed - deviation.turning, time),
         )
+
+    def _after(self, lead: float, kept: Sequence[_Course]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute where all joints will be after a time [s], and how fast, with what waits until then."""
+        position = self._position.copy()
+        velocity = self._velocity.copy()
+        if lead > 0.0:
+            self._coast(lead, position, velocity)
+            last = kept[-1] if kept else self._course
+            if last is not None and (kept or self.moving):
+                desired, speed = np.zeros((2, len(last.places)))
+                last.motion.at(last.time + lead, desired, speed)
+                position[last.places] = desired
+                velocity[last.places] = speed
+        return position, velocity
+
+    def _drop(self) -> None:
+        self.moving = False
+        self.waiting = []
+        self._course = None
+
+    def _abort(self, why: str) -> None:
+        """End the goal with a reason, if it is in progress."""
+        if self._goal is not None and self._outcome is None:
+            self._outcome = Outcome(FollowResult(INVALID_GOAL, why), False, why)
 
     def _limits(self, goal: FollowGoal, names: tuple[str, ...]) -> _Limits:
         if not 0.0 <= goal.goal_time_tolerance < np.inf:
@@ -215,18 +297,18 @@ class TrajectoryFollower:
         supervises = [bool(np.isfinite(each).any()) for each in (path, end)]
         return _Limits(path if supervises[0] else None, end if supervises[1] else None, goal.goal_time_tolerance)
 
-    def _supervise(self, limits: _Limits, motion: ViaPoints) -> None:
+    def _supervise(self, course: _Course, limits: _Limits) -> None:
         if self.moving:
-            if limits.path is not None and not self._deviation.is_within(limits.path):
-                self._fail(PATH_TOLERANCE_VIOLATED, "on the way")
-        elif limits.goal is None or self._deviation.is_within(limits.goal):
+            if limits.path is not None and not course.deviation.is_within(limits.path):
+                self._fail(PATH_TOLERANCE_VIOLATED, course, "on the way")
+        elif limits.goal is None or course.deviation.is_within(limits.goal):
             self._outcome = Outcome(FollowResult(), True, "the joints are there")
-        elif self._time >= motion.end + limits.time:
-            self._fail(GOAL_TOLERANCE_VIOLATED, "at the end")
+        elif course.time >= course.motion.end + limits.time:
+            self._fail(GOAL_TOLERANCE_VIOLATED, course, "at the end")
 
-    def _fail(self, code: int, when: str) -> None:
+    def _fail(self, code: int, course: _Course, when: str) -> None:
         """End the goal: the first joint beyond its tolerance is named."""
-        why = f"{self._deviation.worst(self._names)} {when}"
+        why = f"{course.deviation.worst(course.names)} {when}"
         self._outcome = Outcome(FollowResult(code, why), False, why)
 
 
