@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.rotations import UNIT_TOLERANCE
 
 SPEED_LIMIT, ACCELERATION_LIMIT = 0, 1
 """Columns of the limits, of positions; those of orientations are behind them."""
@@ -15,9 +16,6 @@ STREAM = 0.1
 
 FILTER_PATIENCE = 2.0
 """A stream goes on until no target has come for so many of its periods."""
-
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of a quaternion's length from one."""
 
 REST_SUM = 1e-9
 """Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
@@ -229,7 +227,7 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
     length = 1.0
     if last == 7:
         length = math.sqrt(numbers[-4] ** 2 + numbers[-3] ** 2 + numbers[-2] ** 2 + numbers[-1] ** 2)
-        if abs(length - 1.0) > UNIT_TOLERANCE:
+        if abs(length * length - 1.0) > UNIT_TOLERANCE:
             return NOT_A_TURN
     new = work[0]
     turn = work[1]

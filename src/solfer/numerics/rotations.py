@@ -17,8 +17,8 @@ The same rotation has opposite vector parts in the two kinds. Source: J. Sola, "
 error-state Kalman filter", arXiv:1711.02508, section 3.
 """
 
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of an external quaternion's norm from one."""
+UNIT_TOLERANCE = 1e-2
+"""Largest deviation of the square of an external quaternion's length from one, as in tf2; it is made one."""
 
 ORTHONORMAL = 1e-6
 """Largest deviation of R^T R of a rotation matrix R from the identity."""
@@ -62,19 +62,25 @@ def rotation_from_quaternion(quaternion: Sequence[float] | np.ndarray) -> np.nda
     )
 
 
-def require_unit(quaternions: np.ndarray) -> None:
-    """Check that quaternions, shape (4,) or (n, 4), have the length 1.
+def is_unit(quaternion: Sequence[float]) -> bool:
+    """Return whether an external quaternion has about the length 1, so that it stands for an orientation."""
+    return abs(sum(number * number for number in quaternion) - 1.0) <= UNIT_TOLERANCE
+
+
+def normalize(quaternions: np.ndarray) -> None:
+    """Give external quaternions, shape (4,) or (n, 4), the length 1, in place.
 
     Raises:
-        PipeError: One has another length, or is not finite.
+        PipeError: One has not about this length, or is not finite.
     """
     if quaternions.ndim > 1:
         for quaternion in quaternions:
-            require_unit(quaternion)
+            normalize(quaternion)
         return
     norm = math.hypot(*quaternions.tolist())
-    if not abs(norm - 1.0) <= UNIT_TOLERANCE:
+    if not abs(norm * norm - 1.0) <= UNIT_TOLERANCE:
         raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
+    quaternions /= norm
 
 
 class QuaternionConvention:

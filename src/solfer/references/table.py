@@ -9,6 +9,7 @@ import numpy as np
 from solfer.config.records.bounds import COORDINATE
 from solfer.config.yaml.files import read_text
 from solfer.errors import ConfigError, SizeMismatch
+from solfer.numerics.rotations import is_unit
 from solfer.references.header import TIME_COLUMN, Field, Header, fields_of, is_header, names_of, read_header
 
 TABLE_ROWS = 20_000
@@ -16,9 +17,6 @@ TABLE_ROWS = 20_000
 
 LONGEST = 1e5
 """Largest time [s]."""
-
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of a quaternion's length from one."""
 
 Line = tuple[int, list[Field]]
 """The number of a line, and its fields."""
@@ -96,7 +94,7 @@ def joints_in(path: Path, where: str) -> list[str]:
 
 def require_length(quaternion: Sequence[float], where: str) -> None:
     """Check that a quaternion has the length 1; a ConfigError at `where` if not."""
-    if abs(math.hypot(*quaternion) - 1.0) > UNIT_TOLERANCE:
+    if not is_unit(quaternion):
         raise ConfigError(f"the quaternion {list(quaternion)}", where=where, expected="a quaternion of length 1")
 
 

@@ -8,8 +8,9 @@ from support.unit.golden import lower_body
 
 from solfer.components.odometry.imu_samples import IMU_SAMPLES_LAG
 from solfer.components.odometry.samples import SortedSamples
-from solfer.components.odometry.stamps import STAMP_PERSISTENT, StampCheck
+from solfer.components.odometry.stamps import StampCheck
 from solfer.components.odometry.streams import IMU_LEAD, Streams
+from solfer.components.stamp_faults import STAMP_PERSISTENT
 from solfer.model.history import History
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002

@@ -163,7 +163,7 @@ def test_an_unfit_message_is_refused_whole(message, match, caplog):
 @pytest.mark.parametrize(
     "wrong, match",
     [
-        ({"orientation": np.zeros(4)}, "norm 0"),
+        ({"orientation": np.zeros(4)}, "the sensor measures no orientation"),
         ({"orientation": np.array((0.0, 0.0, 0.0, math.nan))}, "norm nan"),
         ({"orientation": np.full(4, math.nan)}, "the sensor measures no orientation"),
         ({"angular": np.full(3, math.nan)}, "the sensor measures no angular velocity"),
@@ -312,3 +312,20 @@ def test_a_sensor_without_rates_measures_an_orientation_alone(link, turn):
     assert pipe.run() is MessageStatus.NEW
     assert_allclose(state.position[3:6], Q[3:6], atol=1e-12)
     assert not state.velocity[:6].any()
+
+
+@pytest.mark.parametrize("length", [0.9955, 1.0045])
+@pytest.mark.parametrize("message", ["nav_msgs/Odometry", "sensor_msgs/Imu"])
+def test_an_orientation_of_almost_the_length_one_is_made_one(message, length):
+    """Within what tf2 allows: the messages of many drivers are rounded."""
+    turn = Rotation.from_euler("XYZ", (0.1, -0.2, 0.3)).as_quat()
+    states = []
+    for factor in (length, 1.0):
+        pipe, reader, state = make(message, "base", position={"type": "FULL" if message[0] == "n" else "NONE"})
+        sent = factor * turn
+        reader.publish(
+            BodyMessage("world", "/base", orientation=sent) if message[0] == "n" else ImuMessage("/base", sent)
+        )
+        assert pipe.run() is MessageStatus.NEW and np.array_equal(sent, factor * turn)
+        states.append(state.position.copy())
+    assert_allclose(*states, atol=1e-12)

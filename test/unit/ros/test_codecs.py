@@ -245,3 +245,18 @@ def test_an_imu_may_lack_each_quantity(lacks):
         assert getattr(again, f"{name}_covariance")[0] == (-1.0 if lacking else 0.0)
         was, now = (getattr(each, name) for each in (message, again))
         assert now == (type(was)() if lacking else was)
+
+
+@pytest.mark.parametrize("covariance", [0.0, 0.01])
+def test_an_orientation_of_zeros_is_not_measured(covariance):
+    message = sensor_messages.Imu()
+    message.angular_velocity.z, message.orientation_covariance = 0.3, [covariance] * 9
+    read = codec("sensor_msgs/Imu").decode(packed(message), "driver")
+    assert np.isnan(read.orientation).all() and read.angular.tolist() == [0.0, 0.0, 0.3]
+
+
+@pytest.mark.parametrize("length", [0.9955, 1.0045])
+def test_an_orientation_gets_the_length_one(body, length):
+    message = nav_messages.Odometry()
+    message.pose.pose.orientation.w = length
+    assert body.decode(packed(message), "driver").orientation.tolist() == [0.0, 0.0, 0.0, 1.0]

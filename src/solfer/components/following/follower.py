@@ -370,7 +370,7 @@ class ReferenceFollower(Component, abc.ABC):
     def _listener(self, target: Target) -> Callable[[Any], None]:
         def listen(message: Any) -> None:
             target.check(message.numbers)
-            target.check_header(message.header.frame_id, message.header.stamp)
+            target.check_header(message.header.frame_id, message.header.stamp, self.clock())
             target.want(message.numbers, stream=True)
 
         return listen

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import NotFinite, SizeMismatch
 from solfer.numerics.planar_move import PlanarMove
-from solfer.numerics.rotations import quaternion_product
+from solfer.numerics.rotations import is_unit, quaternion_product
 from solfer.points import Constant
 from solfer.points.space import ORIENTATION, POSE
 
@@ -68,7 +68,7 @@ class PoseNumbers:
         numbers = np.array(values, dtype=float)
         if not np.isfinite(numbers).all():
             raise NotFinite(f"a reference of {numbers.tolist()}", where=where)
-        if self.quantity != "position" and abs(np.linalg.norm(numbers[-4:]) - 1.0) > 1e-3:
+        if self.quantity != "position" and not is_unit(numbers[-4:].tolist()):
             raise NotFinite(
                 f"a reference with the quaternion {numbers[-4:].tolist()}",
                 where=where,

@@ -9,6 +9,7 @@ from solfer.components.following.generated import GeneratedReference
 from solfer.components.following.progress import Residual, TaskProgress
 from solfer.components.following.quantity import PoseNumbers
 from solfer.components.following.tags import MotionRecord
+from solfer.components.stamp_faults import StreamClock
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.port import Port
 from solfer.numerics.planar_move import PlanarMove
@@ -52,7 +53,7 @@ class Target:
         self._feed_forward = FeedForward(task)
         self._held = HeldPlace(task, reference)
         self._generated = None if generator is None else GeneratedReference(generator, self._numbers)
-        self._stamp = -math.inf
+        self._clock = StreamClock()
         self._filtered: FilteredReference
         self._residual: Residual
         self._progress: TaskProgress
@@ -141,7 +142,7 @@ class Target:
         self._filtered.start(value)
         if not np.array_equal(desired, value):
             self._filtered.aim(desired)
-        self._stamp = -math.inf
+        self._clock.start()
         self._forget()
         if self._generated is not None:
             self._generated.start(value)
@@ -199,22 +200,22 @@ class Target:
         """Check a reference; see `want`."""
         self._numbers.check(values, self.where)
 
-    def check_header(self, frame: str, stamp: float) -> None:
-        """Check frame and time [s] of a message; times are those of one sender.
+    def check_header(self, frame: str, stamp: float, arrival: float) -> None:
+        """Check frame and time [s] of a message by its arrival [s]; stamps that stay back are of a new clock.
 
         Raises:
             UnknownName: It is in another frame than the task's reference.
             ComponentError: It is older than the one before it, or its time is no number.
         """
+        frame = frame.lstrip("/")
         if frame not in ("", self.frame):
             raise UnknownName("frame of a reference", frame, (self.frame,), where=self.where)
-        if not stamp >= self._stamp and stamp != 0.0:
+        if not self._clock.accepts(stamp, arrival):
             raise ComponentError(
-                f"a reference of {stamp:g} s after one of {self._stamp:g} s",
+                f"a reference of {stamp:g} s after one of {self._clock.newest:g} s",
                 where=self.where,
                 expected="times that do not go back",
             )
-        self._stamp = max(stamp, self._stamp)
 
     def part_of(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Return what the task has of the seven numbers of a pose."""

@@ -2,14 +2,13 @@
 
 import math
 
+from solfer.components.stamp_faults import StampFault
+
 FUTURE = 0.05
 """A stamp is of the future that is this much earlier at its arrival than others [s]."""
 
 FOREIGN = 0.1
 """Largest difference of the newest stamps of two sensors that both send [s]."""
-
-STAMP_PERSISTENT = 0.2
-"""A clock was set, or is another, if its stamps jump or differ for so long [s]."""
 
 STAMP_FORGETTING_TIME = 1.0
 """Time in which a smallest delay is forgotten: a simulation that is slower than real time falls behind [s]."""
@@ -50,7 +49,9 @@ class StampCheck:
 
     def start(self) -> None:
         """Forget the delay and the clock."""
-        self._delay = self._jumped = self._apart = math.nan
+        self._delay = math.nan
+        self._jumped = StampFault()
+        self._apart = StampFault()
         self.first = self.newest = self.before = self.arrival = math.nan
 
     def begin_cycle(self) -> None:
@@ -71,7 +72,7 @@ class StampCheck:
         if not self._is_plausible(arrival - stamp, arrival):
             return self._refuse("of the future", sender)
         if not self._shares_clock(stamp + self._offset, arrival):
-            return arrival - self._apart >= STAMP_PERSISTENT and self._refuse("of another clock", sender)
+            return self._apart.persists(arrival) and self._refuse("of another clock", sender)
         if stamp < after:
             return self._refuse("older than the estimate", sender)
         if math.isnan(self.first):
@@ -90,15 +91,14 @@ class StampCheck:
         if reference is None:
             return True
         if math.isnan(reference.newest):  # nothing to compare with yet
+            self._apart.clear()
             return False
         # in the first cycle comes all that was sent while the plugin was made
         first = reference.first if math.isnan(reference.before) else reference.before
         passed = max(arrival - reference.arrival, 0.0)
         if first - FOREIGN <= stamp <= reference.newest + passed + FOREIGN:
-            self._apart = math.nan
+            self._apart.clear()
             return True
-        if math.isnan(self._apart):
-            self._apart = arrival
         return False
 
     def _is_plausible(self, delay: float, arrival: float) -> bool:
@@ -108,15 +108,13 @@ class StampCheck:
             known = delay if math.isnan(self._delay) else self._delay
             self._delay = min(delay, known + (delay - known) * -math.expm1(-passed / STAMP_FORGETTING_TIME))
             self._before = arrival
-            self._jumped = math.nan
+            self._jumped.clear()
             return True
-        if math.isnan(self._jumped):
-            self._jumped = arrival
-        if arrival - self._jumped < STAMP_PERSISTENT:
+        if not self._jumped.persists(arrival):
             return False
         self._delay = delay
         self._before = arrival
-        self._jumped = math.nan
+        self._jumped.clear()
         return True
 
     def _refuse(self, kind: str, sender: str) -> bool:

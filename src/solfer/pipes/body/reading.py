@@ -10,8 +10,8 @@ from solfer.config.records.conventions import AnglesRecord, ConventionRecord
 from solfer.errors import NotFinite, PipeError, nearest
 from solfer.numerics.rotations import (
     QuaternionConvention,
+    normalize,
     quaternion_from_rotation,
-    require_unit,
     rotation_from_angles,
     rotation_from_quaternion,
 )
@@ -102,7 +102,7 @@ class BodyReading(abc.ABC):
         """Read the values; those that are not in the orientation need no check."""
 
     def _check_name(self, name: str) -> None:
-        if name != self._body:
+        if name.lstrip("/") != self._body:
             raise PipeError(
                 f"it describes '{name}'",
                 expected=f"'{self._body}', or the key 'reference' in the pipe",
@@ -110,8 +110,8 @@ class BodyReading(abc.ABC):
             )
 
     def _orient(self, quaternion: np.ndarray) -> None:
-        require_unit(quaternion)
         self._convention.read(quaternion, self._quaternion)
+        normalize(self._quaternion)
 
 
 class OdometryReading(BodyReading):
@@ -142,7 +142,8 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        oriented = not np.isnan(message.orientation).all()
+        zeros = not message.orientation.any()  # no orientation: some drivers publish them instead of -1
+        oriented = not (zeros or np.isnan(message.orientation).all())
         turning = not np.isnan(message.angular).all()
         if oriented:
             self._orient(message.orientation)

@@ -9,7 +9,7 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError
 from solfer.interfaces.port import Port
 from solfer.numerics.kernels import finite
-from solfer.numerics.rotations import require_unit
+from solfer.numerics.rotations import normalize
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import FeedbackPipe
 from solfer.pipes.name_order import NameOrder
@@ -121,10 +121,10 @@ class PointFeedbackPipe(FeedbackPipe):
         if not finite(self._numbers):
             raise NotFinite(f"a {self._port.quantity} that is not finite")
         if self._oriented:
-            require_unit(self._values[..., -4:])
+            normalize(self._values[..., -4:])
 
     def _check_frame(self, message: Message) -> None:
-        if message.frame != self._frame:
+        if message.frame.lstrip("/") != self._frame:
             raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
 
     def _copy_named(self, message: Message) -> None:

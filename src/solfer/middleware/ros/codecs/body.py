@@ -9,10 +9,9 @@ from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH, PackedMessage
-from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.numerics.rotations import normalize, rotation_from_quaternion
 from solfer.transport.messages import (
     BODY_MESSAGES,
     IMU_MESSAGES,
@@ -21,9 +20,6 @@ from solfer.transport.messages import (
     ImuMessage,
     WrenchMessage,
 )
-
-UNIT_TOLERANCE = 1e-3
-"""How far the norm of a quaternion may be from one."""
 
 NOT_MEASURED = -1.0
 """First number of the covariance of a quantity that an inertial measurement unit does not measure."""
@@ -126,6 +122,7 @@ class ImuCodec(Codec):
         imu = unpack(Imu, packed)
         covariances = [getattr(imu, name) for name in COVARIANCES]
         lacks_orientation, lacks_angular, lacks_force = (covariance[0] == NOT_MEASURED for covariance in covariances)
+        lacks_orientation = lacks_orientation or not any(_get(imu.orientation))
         deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
         return ImuMessage(
             imu.header.frame_id,
@@ -166,10 +163,8 @@ class WrenchCodec(Codec):
 def _orientation(element: genpy.Message) -> np.ndarray:
     """Read a unit quaternion (x, y, z, w), shape (4,)."""
     orientation = _get(element)
-    norm = float(np.linalg.norm(orientation))
-    if not abs(norm - 1.0) <= UNIT_TOLERANCE:
-        raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
-    return orientation / norm
+    normalize(orientation)
+    return orientation
 
 
 def _get(element: genpy.Message) -> np.ndarray:
