@@ -230,7 +230,8 @@ class Circle:
 
     def __init__(self, bus, plugin):
         self._plugin = plugin
-        self._model, self._data = plugin.robot.kinematics.pinocchio[0], plugin.robot.kinematics.pinocchio[0].createData()
+        self._model, _ = plugin.robot.kinematics.pinocchio
+        self._data = self._model.createData()
         self.ways, self.errors, self.differences = [], [], []
         bus.every(0.005, self._look)
 
@@ -249,7 +250,6 @@ class Circle:
     def check(self):
         """Check that the tip has gone around, within 2 mm, by the torques of Pinocchio."""
         assert np.ptp(self.ways, axis=0).max() > 0.09
-        print(np.max(self.errors), np.max(self.differences), np.ptp(self.ways, axis=0))
         assert np.max(self.errors) < 0.002
         assert np.max(self.differences) < 1e-6
 

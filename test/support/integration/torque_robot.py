@@ -109,7 +109,7 @@ LEGGED = {
     for name in ("go1", "go2", "b1")
 }
 ARMS = {
-    "panda": _arm("panda_description/urdf/panda.urdf", "panda_description/srdf/panda.srdf", "default", "panda_hand_tcp"),
+    "panda": _arm("panda_description/urdf/panda.urdf", "panda_description/srdf/panda.srdf", "default", "panda_hand"),
     "z1": _arm("z1_description/urdf/z1.urdf", "z1_description/srdf/z1.srdf", "arm_up", "link06"),
 }
 CIRCLE = {"radius": 0.05, "period": 4.0, "plane": "yz"}
