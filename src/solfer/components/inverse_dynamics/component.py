@@ -16,6 +16,7 @@ from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.output import CommandedMotion, CommandedTorques
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
 from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
+from solfer.components.inverse_dynamics.touch import touching
 from solfer.components.inverse_dynamics.watch import DynamicsWatch
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
@@ -166,7 +167,8 @@ class InverseDynamics(ReferenceFollower):
         self._demand.stack.update()
         self._configured.start()
         self._start_references()
-        if absent := self.ground.start():
+        self.ground.start()
+        if absent := self.ground.leave_out(~touching(self.model, self.ground)):
             log.info("%s: contacts that touch nothing do not count: %s", self.name, ", ".join(absent))
         self._watch.start()
         self._fault = ""

@@ -16,10 +16,6 @@ from solfer.robot import Robot
 INNER_FRICTION = math.sqrt(0.5)
 """Share of the friction with which a pyramid of four sides lies within the cone."""
 
-PRESSED, CARRYING = 0.05, 0.2
-"""Share of a contact's part of the weight from which on it touches something at a start: by its measured force, and by
-the torques of the joints, of which friction takes some."""
-
 
 class Ground:
     """Contacts with unknown forces f along the rows that they hold.
@@ -65,14 +61,12 @@ class Ground:
         self.normals = np.zeros((count, size))
         for index, contact in enumerate(self.contacts.values()):
             self.normals[index, self.starts[index] : self.starts[index + 1]] = _local(contact)[2]
-        self._weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
-        self.unit = self._weight / max(count, 1)
+        weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
+        self.unit = weight / max(count, 1)
         self.fade = tags.fade
-        self._robot = robot
-        self._tracked = [robot.contacts.names.index(name) for name in self.contacts]
         self._placed = np.array([contact.active for contact in self.contacts.values()], dtype=float)
         self._goals, self.shares = self._placed.copy(), self._placed.copy()
-        self._spans = np.full(count, self._weight)
+        self._spans = np.full(count, weight)
         self.most = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
         self._change()
@@ -106,36 +100,25 @@ class Ground:
             return
         self._goals[index] = self._placed[index]
         pressed = max(float(self.normals[index] @ force), 0.0)
-        self._spans[index] = pressed if lifted else self._weight
-        self.shares[index] = 1.0 if lifted else min(pressed / self._weight, 1.0)
+        weight = self.unit * len(self.contacts)
+        self._spans[index] = pressed if lifted else weight
+        self.shares[index] = 1.0 if lifted else min(pressed / weight, 1.0)
 
-    def start(self) -> tuple[str, ...]:
-        """Let all contacts have come where they are to be, but those that touch nothing; return the names of these."""
-        self.shares[:] = self._placed
+    def start(self) -> None:
+        """Let all contacts have come where they are to be."""
+        self._goals[:] = self.shares[:] = self._placed
         self._change()
-        absent = (self._placed > 0.0) & ~self._touching()
-        self.shares[absent] = 0.0
-        self._goals[:] = self.shares
-        self._change()
-        return tuple(name for name, is_absent in zip(self.contacts, absent, strict=True) if is_absent)
 
-    def _touching(self) -> np.ndarray:
-        """Find the contacts that bear a load, the robot being at rest, shape (c,).
+    def leave_out(self, absent: np.ndarray) -> tuple[str, ...]:
+        """Let contacts not count until they are put down, or until the next start; return their names.
 
-        Their measured forces count; without these, those that the measured torques leave to them, h = tau + Jc' f. If
-        nothing is measured, a floating base stands on all of them, and a fixed base on none.
+        Args:
+            absent: Which contacts touch nothing, shape (c,).
         """
-        robot = self._robot
-        forces = robot.contacts.wrenches[self._tracked, :3]
-        if forces.any():
-            return np.linalg.norm(forces, axis=1) >= PRESSED * self.unit
-        torque = robot.state.torque
-        if not torque.any():
-            return np.full(len(self.contacts), robot.kinematics.base is not None)
-        self.rows.update()
-        left = robot.kinematics.bias(robot.state.position, np.zeros(robot.size)) - torque
-        borne, *_ = np.linalg.lstsq(self.jacobian.T, left)
-        return self.normals @ borne >= CARRYING * self.unit
+        left_out = absent & (self._goals > 0.0)
+        self._goals[left_out] = self.shares[left_out] = 0.0
+        self._change()
+        return tuple(name for name, is_absent in zip(self.contacts, left_out, strict=True) if is_absent)
 
     def update(self, step: float) -> None:
         """Advance by `step` [s], and compute the rows at the state of the last update of the Robot."""

@@ -20,10 +20,7 @@ class Dynamics(Protocol):
         """See above."""
 
     def inertia(self, q: np.ndarray, /) -> np.ndarray:
-        """Return the joint space inertia M(q), shape (size, size)."""
-
-    def bias(self, q: np.ndarray, v: np.ndarray, /) -> np.ndarray:
-        """Return the Coriolis, centrifugal and gravity forces, shape (size,)."""
+        """Return the joint space inertia M(q), shape (size, size), symmetric."""
 
 
 class ImplicitImpedance:
@@ -32,15 +29,15 @@ class ImplicitImpedance:
     With the springs' target position q_d, target velocity v_d, diagonal stiffness K and damping D:
 
         r = K (q_d - q - dt v) + D (v_d - v) + tau_ff
-        (M + dt D) a = r - nle + f
+        (M + dt D) a = r + f
         tau = r - dt D a
 
     It is stable for any stiffness and damping, where the explicit law with a robot's own gains diverges on light links.
     Rows without an actuator (a floating base) have K = D = tau_ff = 0.
 
-    f is what contacts and pushes did in the last step, M dv / dt + nle - tau. It vanishes in free motion. Rigid
-    contacts answer with f = -P (tau - nle), where P is a projection, orthogonal in the norm of M^-1. In that norm f
-    changes tau by dt D (M + dt D)^-1, which is below one: f converges for all D, and at rest tau is r.
+    f is everything that acts beside the torque, as it was in the last step, M dv / dt - tau: weight, contacts, pushes,
+    friction. Rigid contacts answer to tau by -P tau, where P is a projection, orthogonal in the norm of M^-1. In that
+    norm f changes tau by dt D (M + dt D)^-1, which is below one: f converges for all D, and at rest tau is r.
 
     Source: J. Tan, K. Liu, G. Turk, "Stable Proportional-Derivative Controllers", IEEE Computer Graphics and
     Applications 31(4), 2011.
@@ -48,7 +45,7 @@ class ImplicitImpedance:
     A drive at or beyond its speed limit only brakes.
 
     Args:
-        dynamics: Inertia and bias forces of the robot.
+        dynamics: Inertia of the robot.
         effort_limit: Largest torque of each DoF, zero where there is no actuator, shape (size,) [Nm, N].
         velocity_limit: Largest speed of each DoF's drive, shape (size,) [rad/s, m/s].
 
@@ -74,7 +71,6 @@ class ImplicitImpedance:
         self.damping = table[kernel.DAMPING]
         self.torque = table[kernel.TORQUE]
         self._dynamics = dynamics
-        self._is_placed = True
         self._force, self._loss, self._right, self._outside = (
             table[row] for row in (kernel.FORCE, kernel.LOSS, kernel.RIGHT, kernel.OUTSIDE)
         )
@@ -82,33 +78,23 @@ class ImplicitImpedance:
         self._diagonal = self._matrix.reshape(-1, order="F")[:: size + 1]
 
     def place(self, q: np.ndarray) -> None:
-        """Begin with a robot that was put to q, shape (size,): what acted on it before does not count."""
-        self._is_placed = True
+        """Begin with a robot at rest that was put to q, shape (size,), and is held there."""
+        self._table[[self._kernel.BEFORE, self._kernel.TORQUE]] = 0.0
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque` for the step of `dt` [s] that begins at position q and velocity v, shape (size,)."""
-        inertia, bias = self._feel(q, v, dt)
+        inertia = self._dynamics.inertia(q)
+        self._kernel.feel(self._table, inertia, v, dt)
         self._kernel.pull(self._table, q, v, dt)
-        self._kernel.damp(self._table, self._accelerations(inertia, bias))
+        self._kernel.damp(self._table, self._accelerations(inertia))
         self._kernel.limit(self._table, v)
         return self.torque
 
-    def _feel(self, q: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Write what contacts and pushes did in the last step; return M and nle."""
-        inertia = self._dynamics.inertia(q)
-        bias = self._dynamics.bias(q, v)
-        self._kernel.feel(self._table, inertia, bias, v, dt)
-        if self._is_placed:  # what happened before is not known
-            self._outside[:] = 0.0
-            self._is_placed = False
-        return inertia, bias
-
-    def _accelerations(self, inertia: np.ndarray, bias: np.ndarray) -> np.ndarray:
-        """Solve (M + W) a = r + f - nle, with r, f and the diagonal W in the table, for a, shape (size,)."""
+    def _accelerations(self, inertia: np.ndarray) -> np.ndarray:
+        """Solve (M + W) a = r + f, with r, f and the diagonal W in the table, for a, shape (size,)."""
         diagonal = self._diagonal
         np.copyto(self._matrix, inertia)
-        np.subtract(self._force, bias, out=self._right)
-        np.add(self._right, self._outside, out=self._right)
+        np.add(self._force, self._outside, out=self._right)
         np.add(diagonal, self._loss, out=diagonal)
         np.add(diagonal, REGULARISATION * diagonal.max(), out=diagonal)
         _, acceleration, failed = dposv(self._matrix, self._right, lower=1, overwrite_a=1, overwrite_b=1)

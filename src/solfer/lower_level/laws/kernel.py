@@ -13,7 +13,7 @@ LAW_ROWS = 29
 """Numbers for each DoF: rows of the table of a law."""
 
 _TABLE = "float64[:, ::1]"
-_MATRIX = "float64[:, :]"
+_ANY_MATRIX = "float64[:, :]"
 _NUMBERS = "float64[::1]"
 _FLAGS = "boolean[::1]"
 
@@ -27,17 +27,14 @@ def _pull(table, position, velocity, dt):
         table[LOSS, k] = table[DAMPING, k] * dt
 
 
-def _feel(table, inertia, bias, velocity, dt):
-    """Write the force that contacts and pushes had in the last step, M dv/dt + nle less the torque.
-
-    BEFORE is then the velocity at which the next step begins.
-    """
+def _feel(table, inertia, velocity, dt):
+    """Write the force that was there in the last step beside the torque, M dv/dt - tau, and the new BEFORE."""
     size = table.shape[1]
     for j in range(size):
         table[RIGHT, j] = (velocity[j] - table[BEFORE, j]) / dt
         table[BEFORE, j] = velocity[j]
     for k in range(size):
-        outside = bias[k] - table[TORQUE, k]
+        outside = -table[TORQUE, k]
         for j in range(size):
             outside += inertia[j, k] * table[RIGHT, j]  # symmetric, and Pinocchio's columns are contiguous
         table[OUTSIDE, k] = outside
@@ -133,7 +130,7 @@ def _release(table, elastic, dt):
 
 
 pull = cached(f"void({_TABLE}, {_NUMBERS}, {_NUMBERS}, float64)", _pull)
-feel = cached(f"void({_TABLE}, {_MATRIX}, {_NUMBERS}, {_NUMBERS}, float64)", _feel, fastmath=REORDERED)
+feel = cached(f"void({_TABLE}, {_ANY_MATRIX}, {_NUMBERS}, float64)", _feel, fastmath=REORDERED)
 damp = cached(f"void({_TABLE}, {_NUMBERS})", _damp)
 limit = cached(f"void({_TABLE}, {_NUMBERS})", _limit)
 stretch = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS}, {_NUMBERS})", _stretch)

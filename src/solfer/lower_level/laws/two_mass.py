@@ -29,7 +29,7 @@ class TwoMassImpedance(ImplicitImpedance):
     With gamma = 1/2 and beta = 1/12 that is Newmark's method of fourth order, which keeps the energy of an undamped
     oscillation. Its frequency w is right up to (w dt)^4 / 480, its damping up to (w dt)^2 / 12. gamma grows towards 1
     where D alone would stop the joint within a step. delta'' is found for all motors and links together, from one
-    linear system of the size of M, with what contacts and pushes did in the last step. Link and motor feel opposite
+    linear system of the size of M, with what else acted on the links in the last step. Link and motor feel opposite
     torques.
 
     A spring that swings faster than a step resolves only yields, theta = q + tau / K: its rotor has no inertia, and
@@ -40,7 +40,7 @@ class TwoMassImpedance(ImplicitImpedance):
     85(3), 1959. Limits: T. Hughes, "The Finite Element Method", 1987, section 9.1.
 
     Args:
-        dynamics: Inertia and bias forces of the robot's links.
+        dynamics: Inertia of the robot's links.
         limits: Largest torque u of each drive, zero where there is none, and its largest speed, shape (size,) each.
         springs: Springs and motors.
         posture: Positions for which gamma is chosen, shape (size,).
@@ -98,12 +98,13 @@ class TwoMassImpedance(ImplicitImpedance):
         """
         table = self._table
         elastic = self._elastic
-        inertia, bias = self._feel(q, v, dt)
+        inertia = self._dynamics.inertia(q)
+        self._kernel.feel(table, inertia, v, dt)
         self._kernel.stretch(table, elastic, q, v)
         self._kernel.pull(table, self.motor_position, self.motor_velocity, dt)
         self._kernel.soften(table, elastic, dt)
-        if self._solve(inertia, bias):  # then some drives do not follow their law, and all is different
-            self._solve(inertia, bias)
+        if self._solve(inertia):  # then some drives do not follow their law, and all is different
+            self._solve(inertia)
         self._kernel.release(table, elastic, dt)
         return self.torque
 
@@ -118,12 +119,12 @@ class TwoMassImpedance(ImplicitImpedance):
         gamma = np.maximum(0.5, 1.0 - np.divide(1.0, damped, out=np.full(len(damped), np.inf), where=damped > 0.0))
         return ACCURATE * dt**2 * spring + gamma * dt * damper
 
-    def _solve(self, inertia: np.ndarray, bias: np.ndarray) -> bool:
+    def _solve(self, inertia: np.ndarray) -> bool:
         """Write accelerations and torques of the drives, for the law p - l alpha of force p and loss l.
 
         With the spring's gain c and m = B + dt d + l a motor has alpha = (p - d theta' - tension + c a) / (m + c). What
-        remains is (M + W) a = tension + c / (m + c) (p - d theta' - tension) - nle + f with W = c m / (m + c). Without
-        two masses W is m, and p - d q' acts on the link.
+        remains is (M + W) a = tension + c / (m + c) (p - d theta' - tension) + f with W = c m / (m + c). Without two
+        masses W is m, and p - d q' acts on the link.
 
         Returns:
             Whether drives behind a spring reach their limits; they are constant from now on.
@@ -131,6 +132,6 @@ class TwoMassImpedance(ImplicitImpedance):
         table = self._table
         elastic = self._elastic
         self._kernel.balance(table, elastic)
-        self._kernel.move(table, elastic, self._accelerations(inertia, bias))
+        self._kernel.move(table, elastic, self._accelerations(inertia))
         self._kernel.limit(table, self.motor_velocity)
         return self._kernel.clip(table, self._sprung)
