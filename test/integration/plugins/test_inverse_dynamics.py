@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pinocchio
 import pytest
-from support.integration.torque_robot import ARMS, FRICTION, LEGGED, opened
+from support.integration.torque_robot import ARMS, FRICTION, LEGGED, Legged, opened
 from support.integration.world import CONFIG, World
 from support.integration.xbot_world import XbotWorld
 
@@ -244,6 +244,7 @@ class Circle:
         followers, acceleration = robot.kinematics.followers, problem.acceleration.copy()
         acceleration[followers.dofs] = followers.ratios * acceleration[followers.leaders]
         torque = followers.fold(pinocchio.rnea(self._model, self._data, state.position, state.velocity, acceleration))
+        torque -= component.ground.jacobian.T @ problem.force
         driven = np.setdiff1d(robot.actuated, followers.dofs)
         self.differences.append(np.abs(torque - problem.torque)[driven].max())
 
@@ -284,6 +285,61 @@ PART = """mwoibn:
   feedbacks: {simulated: [link_side_online]}
   controller: {position_controller: {interface: {velocity: true, stiffness: true, damping: true}}}
 """
+
+
+def cart():
+    """Write a cart of 30 kg on four wheels with an arm of four joints, and its groups; return URDF and SRDF."""
+    joint = (
+        '<joint name="{0}" type="{1}"><origin xyz="{2}"/><parent link="{3}"/><child link="{0}"/><axis xyz="{4}"/>'
+        '<limit lower="-3" upper="3" effort="{5}" velocity="5"/></joint><link name="{0}"><inertial>'
+        '<origin xyz="{6}"/><mass value="{7}"/><inertia ixx="{8}" iyy="{8}" izz="{8}" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial>{9}</link>"
+    )
+    body = (
+        '<link name="base_link"><inertial><mass value="30"/><inertia ixx="1" iyy="1" izz="1.5" ixy="0" ixz="0" '
+        'iyz="0"/></inertial></link>'
+    )
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    sides = {"front_left": "0.3 0.25", "front_right": "0.3 -0.25", "rear_left": "-0.3 0.25", "rear_right": "-0.3 -0.25"}
+    parts = [
+        joint.format(f"{name}_wheel", "continuous", f"{place} -0.1", "base_link", "0 1 0", 20, "0 0 0", 1, 0.005, ball)
+        for name, place in sides.items()
+    ]
+    parents, axes = ("base_link", "turn", "shoulder", "elbow"), ("0 0 1", "0 1 0", "0 1 0", "0 1 0")
+    parts += [
+        joint.format(name, "revolute", "0 0 0.3", parent, axis, 80, "0 0 0.15", 2, 0.02, "")
+        for name, parent, axis in zip(("turn", "shoulder", "elbow", "wrist"), parents, axes, strict=True)
+    ]
+    links = "".join(f'<link name="{name}_wheel"/>' for name in sides)
+    wheels = "".join(f'<joint name="{name}_wheel"/>' for name in sides)
+    bend = {"shoulder": 0.4, "elbow": 1.8, "wrist": -0.6}
+    state = "".join(f'<joint name="{name}" value="{value}"/>' for name, value in bend.items())
+    arm = "".join(f'<joint name="{name}"/>' for name in ("turn", *bend))
+    groups = f'<group name="wheels">{links}{wheels}</group><group name="arm">{arm}</group>'
+    return (
+        f'<robot name="cart">{body}{"".join(parts)}</robot>',
+        f'<robot name="cart">{groups}<group_state name="bent" group="arm">{state}</group_state></robot>',
+    )
+
+
+@pytest.mark.slow
+def test_an_arm_on_a_cart_draws_a_circle(tmp_path, monkeypatch):
+    """The cart stands on its wheels, whose drives hold them against the reaction of the arm."""
+    files = tmp_path / "cart.urdf", tmp_path / "cart.srdf"
+    for file, text in zip(files, cart(), strict=True):
+        file.write_text(text)
+    feet = tuple(f"{each}_wheel" for each in ("front_left", "front_right", "rear_left", "rear_right"))
+    axis = dict(zip("xyz", (0, 1, 0), strict=True))
+    wheel = {"type": "wheel", "minor_axis": 0.1, "major_axis": 0.0, "reference_axis": axis}
+    tags = {"speed_driven": "wheels", "gains": [{"chain": "arm", "stiffness": 0}]}
+    robot = Legged(*map(str, files), "bent", feet, 3, contact=wheel, tags=tags, tip="wrist")
+    monkeypatch.setitem(LEGGED, "cart", robot)
+    with opened("cart", tmp_path, 0.0) as scene:
+        scene.run(0.5)
+        circle = Circle(scene.bus, scene.plugin)
+        scene.run(5.0)
+        assert scene.plugin.life is PluginState.RUNNING and not scene.plugin.component.is_holding
+        circle.check()
 
 
 def test_hands_in_the_air_hold_nothing(tmp_path):

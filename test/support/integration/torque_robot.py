@@ -43,7 +43,7 @@ class Legged:
         contact: Further keys of a contact.
         tags: Further tags of the component.
         base: Link whose orientation stays.
-        tip: Link that draws a circle of 5 cm, where the base is fixed.
+        tip: Link that draws a circle of 5 cm in the world, in place of the squat.
     """
 
     urdf: str
@@ -166,7 +166,8 @@ def write(name: str, folder: Path, amplitude: float, hand: str | None = None) ->
         } | ({} if hand is None else {"hand": hand_task(hand, legged.base)})
         if legged.tip:
             tip = {"point": "position", "link": legged.tip, "gain": 8, "reference": {"circle": CIRCLE}}
-            tasks = {"tip": tip, "posture": tasks["posture"]}
+            base = {"base": tasks["base"] | {"point": "pose"}} if legged.feet else {}
+            tasks = {"tip": tip} | base | {"posture": tasks["posture"]}
         main_tree["modules"]["squat"] = {
             "class": "solfer.components.inverse_dynamics:InverseDynamics",
             "layer": "NRT",

@@ -57,11 +57,12 @@ def _largest(row):
 
 
 @part
-def _eliminate(rows, sides, first, fixed, scales):
+def _eliminate(rows, sides, first, fixed, scales, origins):
     """Bring rows to the form where each has a 1 in a column of its own, and zeros in those of the others.
 
-    A row that depends on those before it has no use; its force is zero instead. Its entry of the others is that of a
-    contact that holds what others hold as well.
+    A contact may hold what others hold as well, such as the fourth wheel of a cart. Its row depends on theirs, so that
+    forces N on these rows do nothing. In its place comes N^T f = 0: of all forces with one effect the smallest, as
+    contacts of equal stiffness have them.
 
     Args:
         rows: A, shape (e, n + k); overwritten.
@@ -69,6 +70,7 @@ def _eliminate(rows, sides, first, fixed, scales):
         first: First of the k rows of contacts.
         fixed: Columns of the rows' own unknowns, shape (e,); written.
         scales: Work space, shape (e,).
+        origins: Work space: what the rows of contacts are made of, shape (k, k).
 
     Returns:
         Whether all rows have one.
@@ -77,6 +79,9 @@ def _eliminate(rows, sides, first, fixed, scales):
     size = rows.shape[1] - (count - first)
     for i in range(count):
         scales[i] = _largest(rows[i])[1]
+    for i in range(count - first):
+        origins[i] = 0.0
+        origins[i, i] = 1.0
     # contacts come first: torques that no drive has are then forces
     for step in range(count):
         i = (first + step) % count
@@ -85,9 +90,9 @@ def _eliminate(rows, sides, first, fixed, scales):
             if i < first:
                 return False
             rows[i] = 0.0
-            column = size + i - first
             sides[i] = 0.0
-            rows[i, column] = 1.0
+            for j in range(count - first):
+                rows[i, size + j] = origins[i - first, j]
             for before in range(step):
                 other = (first + before) % count
                 if rows[i, fixed[other]] != 0.0:
@@ -99,10 +104,14 @@ def _eliminate(rows, sides, first, fixed, scales):
         for j in range(rows.shape[1]):
             rows[i, j] *= share
         sides[i] *= share
+        if i >= first:
+            origins[i - first] *= share
         rows[i, column] = 1.0
         fixed[i] = column
         for other in range(count):
             if other != i and rows[other, column] != 0.0:
+                if i >= first and other >= first:
+                    origins[other - first] -= rows[other, column] * origins[i - first]
                 _subtract(rows, sides, other, i, rows[other, column])
                 rows[other, column] = 0.0
     return True
@@ -191,6 +200,7 @@ def _build(
     free,
     table,
     work,
+    origins,
     hessian,
     gradient,
     matrix,
@@ -206,7 +216,7 @@ def _build(
     size = len(bias)
     count_forces = len(demanded)
     _write_equalities(inertia, bias, jacobian, demanded, unit, passive, holds, rows, sides)
-    if not _eliminate(rows, sides, len(passive), fixed, work[0]):
+    if not _eliminate(rows, sides, len(passive), fixed, work[0], origins):
         return False
     _sort(rows, fixed, free, table)
     _write_cost(tasks, desired, smallest, fixed, sides, free, table, work[1, : len(free)], hessian, gradient)
@@ -290,8 +300,8 @@ _INDICES = "int64[::1]"
 build = cached(
     f"boolean({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, float64, {_INDICES}, boolean[::1], {_MATRIX}, {_VECTOR}, "
     f"{_VECTOR}, {_INDICES}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, "
-    f"{_INDICES}, {_INDICES}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, "
-    f"{_VECTOR})",
+    f"{_INDICES}, {_INDICES}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, "
+    f"{_VECTOR}, {_VECTOR})",
     _build,
     REORDERED,
 )

@@ -40,6 +40,7 @@ class Elimination(NamedTuple):
         free: The free ones, shape (m,).
         table: T, shape (e, m).
         work: Work space, shape (3, n + k).
+        origins: Work space, shape (k, k).
     """
 
     rows: np.ndarray
@@ -48,10 +49,11 @@ class Elimination(NamedTuple):
     free: np.ndarray
     table: np.ndarray
     work: np.ndarray
+    origins: np.ndarray
 
     @classmethod
-    def empty(cls, fixed: int, free: int) -> "Elimination":
-        """Make one of a number of fixed and of free unknowns."""
+    def empty(cls, fixed: int, free: int, forces: int) -> "Elimination":
+        """Make one of a number of fixed and of free unknowns, and of forces."""
         unknowns = fixed + free
         return cls(
             np.zeros((fixed, unknowns)),
@@ -60,6 +62,7 @@ class Elimination(NamedTuple):
             free=np.zeros(free, dtype=np.int64),
             table=np.zeros((fixed, free)),
             work=np.zeros((3, unknowns)),
+            origins=np.zeros((forces, forces)),
         )
 
 
@@ -98,7 +101,7 @@ class WholeBodyProblem:
         fixed = len(self._passive) + forces
         free = size - len(self._passive)
         self._smallest = np.concatenate((np.full(size, QP_ACCELERATION), np.full(forces, QP_FORCE)))
-        self._elimination = Elimination.empty(fixed, free)
+        self._elimination = Elimination.empty(fixed, free, forces)
         self._constraints = ProblemConstraints(robot, ground, bounds, driven, torque_limits)
         count = self._constraints.count + fixed
         self._problem = Problem.empty(free, 0, count)
