@@ -8,17 +8,20 @@ from pathlib import Path
 import numpy as np
 
 from solfer.errors import SimulationError
+from solfer.lower_level.gains.defaults import free_inertia
 from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
+from solfer.model.neutral_posture import neutral_posture
 from solfer.model.urdf.description import Description
 from solfer.simulation.robot_body.base import FloatingBase
 from solfer.simulation.robot_body.body_urdf import body_urdf
 from solfer.simulation.robot_body.differences import warn_of_differences
 from solfer.simulation.robot_body.motors import LARGEST_EFFORT, BodyMotors
-from solfer.simulation.world.engine import STDERR_DESCRIPTOR, STDOUT, Engine, decimal_points, redirected
+from solfer.simulation.world.engine import STDERR_DESCRIPTOR, STDOUT, STEP, Engine, decimal_points, redirected
 from solfer.simulation.world.records import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
+MOST_BRAKING = 0.25  # share of its speed that the damping of the description takes from a joint in a step
 MOST_JOINTS = 127  # of which PyBullet measures the state
 SEARCH_DISTANCE = 100.0  # [m], how far away other bodies are searched for
 
@@ -72,7 +75,7 @@ class Body:
         self._name_links(urdf.base)
         warn_of_differences(engine, self.id, urdf.text, where=description.where)
         self._set_dynamics(friction, urdf.owner)
-        losses = self._set_losses(description, lossless)
+        losses = self._set_losses(description, lossless, kinematics)
         self._motors = BodyMotors(engine, self.id, self._indices, kinematics=kinematics, motors=motors, losses=losses)
         self._followers = Followers(self.joints, description.mimics)
         self._set_gears()
@@ -263,10 +266,15 @@ class Body:
                 physicsClientId=client,
             )
 
-    def _set_losses(self, description: Description, lossless: Collection[str]) -> list[float]:
-        """Set the damping of the joints; return their friction, which motors make that hold them back [Nm]."""
+    def _set_losses(self, description: Description, lossless: Collection[str], kinematics: Kinematics) -> list[float]:
+        """Set the damping of the joints; return their friction, which motors make that hold them back [Nm].
+
+        PyBullet takes the speed at the begin of a step for damping, which diverges where it would turn a joint back.
+        """
         joints = [description.joints[name] for name in self.joints]
-        for index, joint in zip(self._indices, joints, strict=True):
+        most = MOST_BRAKING * free_inertia(kinematics, neutral_posture(kinematics))[self._first :] / STEP
+        for index, joint, bound in zip(self._indices, joints, most.tolist(), strict=True):
             if joint.damping and joint.name not in lossless:
-                self._bullet.changeDynamics(self.id, index, jointDamping=joint.damping, physicsClientId=self._client)
+                damping = min(joint.damping, bound)
+                self._bullet.changeDynamics(self.id, index, jointDamping=damping, physicsClientId=self._client)
         return [0.0 if joint.name in lossless else joint.friction for joint in joints]
