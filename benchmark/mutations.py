@@ -2,7 +2,7 @@
 """Which small changes of `src/` the tests notice: mutations by room, drawn by a seed.
 
 Run with `./run exec python benchmark/mutations.py [--room ROOM...] [--count N] [--seed S] [--results FILE]
-[--tree PATH] [--limit SECONDS] [--report]`; `./run check` installs the operators, which are those of cosmic-ray. Files
+[--tree PATH] [--limit SECONDS] [--report]`; `./run test` installs the operators, which are those of cosmic-ray. Files
 are drawn by their sizes, then a place, then one of its changes. Docstrings, annotations, texts of errors, messages of
 the log and `__repr__` do not count.
 
@@ -44,7 +44,7 @@ try:
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator, operator_names
 except ImportError:
-    sys.exit("cosmic-ray is missing: `./run check` installs it")
+    sys.exit("cosmic-ray is missing: `./run test` installs it")
 
 ROOT = Path(__file__).resolve().parents[1]
 UNUSED = ("RemoveDecorator", "VariableReplacer", "VariableInserter")

@@ -5,8 +5,6 @@ import json
 import pytest
 from support.estimation import part
 
-pytest.importorskip("cosmic_ray", reason="`./run check` installs it")
-
 AREA = '''"""Areas."""
 
 import logging

@@ -1,0 +1,39 @@
+"""Files that version 0.2.0 made go on: a recording is replayed, a component's package passes its own test."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support.processes import SOURCES
+
+from solfer.cli.main import main
+
+FILES = Path(__file__).parents[2] / "data/0.2.0"
+
+
+def test_a_recording_is_replayed_to_the_same_commands(capsys):
+    assert main(["replay", str(FILES / "run.mcap"), "-n", "first"]) == 0
+    assert "the same commands" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_package_of_a_component_passes(repository, tmp_path):
+    shutil.unpack_archive(FILES / "swing_joint.zip", tmp_path)
+    package = tmp_path / "swing_joint"
+    paths = {"PYTHONPATH": f"{package / 'src'}{os.pathsep}{SOURCES}", "ROS_PACKAGE_PATH": str(repository)}
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    for name, path in paths.items():
+        environment[name] = os.pathsep.join(filter(None, [path, os.environ.get(name)]))
+    for command in (["-m", "pytest", "-q", "."], [repository / "nodes/solfer", "check", "config/swing_joint.yaml"]):
+        done = subprocess.run(
+            [sys.executable, *map(str, command)],
+            cwd=package,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=200,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
