@@ -118,6 +118,10 @@ class PipeError(SolferError):
     """A pipe that cannot be made, or a message that does not fit it."""
 
 
+class Unrelated(PipeError):
+    """A message that has nothing of what a pipe receives: it is for other pipes on its topic."""
+
+
 class Contradiction(PipeError):
     """A measurement that those before it contradict: its sensor is wrong, or the robot was put into another state.
 

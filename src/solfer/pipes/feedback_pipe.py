@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.errors import Contradiction, NotFinite, PipeError, SolferError, UnknownName
+from solfer.errors import Contradiction, NotFinite, PipeError, SolferError, UnknownName, Unrelated
 from solfer.model import History, State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.precedence import Precedence
@@ -52,8 +52,9 @@ class FeedbackPipe(abc.ABC):
     """A pipe that a plugin receives.
 
     A message that does not fit is refused whole: nothing of it is used, and the refusal is counted and logged once a
-    second. What contradicts earlier measurements is logged `NAMING_DELAY` later, unless the pipe restarts meanwhile, or
-    it was an impact.
+    second. One that has nothing of what the pipe receives is no fault as soon as another one fits.
+    What contradicts earlier measurements is logged `NAMING_DELAY` later, unless the pipe restarts meanwhile, or it was
+    an impact.
     Where a topic has several publishers, the newest message counts, and their names are logged; for measured States
     the first publisher counts, see `StateFeedbackPipe`.
 
@@ -216,12 +217,17 @@ class FeedbackPipe(abc.ABC):
         return True
 
     def _refuse(self, error: SolferError) -> None:
-        self._refused += 1
-        self.refused_at = self.reader.arrival
+        unrelated = isinstance(error, Unrelated)
+        if unrelated and self.arrival < math.inf:
+            return  # another publisher has what the pipe receives
         sender = self.reader.message.sender or self.reader.topic
         if self.accepted != self._accepted_before:
             self.refusal = f"{sender}: {error.line}"
             self._accepted_before = self.accepted
+        if unrelated and self.measures:
+            return  # a plugin that waits for the pipe logs it
+        self._refused += 1
+        self.refused_at = self.reader.arrival
         if not isinstance(error, Contradiction) or self._contradicted == self.accepted:
             self._log_refusal(sender, error)
         elif self._doubt is None:
@@ -486,9 +492,8 @@ class StateFeedbackPipe(FeedbackPipe):
         """Let `part` be all that the messages of this cycle had; return whether there were any."""
         if not parts:
             return NONE if self.reader.message is None else OLD
-        stalest = self._precedence.stalest
-        if stalest is not None:
-            self.arrival = stalest.arrival
+        if self._precedence.watched:
+            self.arrival = self._precedence.stalest.arrival
         self.part = None if any(part is None for part in parts) else np.unique(np.concatenate(parts))
         return NEW
 

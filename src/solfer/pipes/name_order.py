@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solfer.errors import PipeError, UnknownName, nearest
+from solfer.errors import PipeError, UnknownName, Unrelated, nearest
 
 logger = logging.getLogger(__name__)
 
@@ -73,7 +73,8 @@ class NameOrder:
         """Find the names of the pipe in `names`.
 
         Raises:
-            PipeError: A name occurs twice, or none is of the pipe.
+            PipeError: A name occurs twice.
+            Unrelated: None is of the pipe.
             UnknownName: A name is unknown.
         """
         if names is self._names or names == self._names:
@@ -84,6 +85,11 @@ class NameOrder:
             if len(self._remembered) == ORDER_MEMORY:
                 self._remembered.clear()
             self._remembered[names] = order
+        if not len(order.source):
+            raise Unrelated(
+                f"it has none of the pipe's {len(self._pipe_names)} {self._what}s",
+                expected=f"some of {', '.join(self._pipe_names)}",
+            )
         self._names = names
         self._order = order
         return order
@@ -136,10 +142,5 @@ class NameOrder:
         self._warn(unknown)
         place = {name: index for index, name in enumerate(names)}
         target = [index for index, name in enumerate(self._pipe_names) if name in place]
-        if not target:
-            raise PipeError(
-                f"it has none of the pipe's {len(self._pipe_names)} {self._what}s",
-                expected=f"some of {', '.join(self._pipe_names)}",
-            )
         source = np.array([place[self._pipe_names[index]] for index in target], dtype=np.intp)
         return Order(source, None if len(target) == len(self._pipe_names) else np.array(target, dtype=np.intp))

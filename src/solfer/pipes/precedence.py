@@ -1,7 +1,6 @@
 """Decides which publisher of a topic counts for which DoFs of a measured State, where several publish the same."""
 
 import math
-from operator import attrgetter
 
 import numpy as np
 
@@ -33,13 +32,15 @@ class Owner:
         self.part: object = NEVER
         self.dofs = np.zeros(size, dtype=bool)
 
-    def note(self, part: np.ndarray | None, arrival: float) -> None:
-        """Record an accepted message with the DoFs `part` that arrived at `arrival` [s]."""
+    def note(self, part: np.ndarray | None, arrival: float) -> bool:
+        """Record an accepted message with the DoFs `part` that arrived at `arrival` [s]; return whether they differ."""
         self.arrival = arrival
         self.strikes = 0
-        if part is not self.part:
+        differs = part is not self.part
+        if differs:
             self.part = part
             self.dofs[slice(None) if part is None else part] = True
+        return differs
 
 
 class Precedence:
@@ -57,6 +58,7 @@ class Precedence:
         ignored: Messages that were ignored.
         handovers: How often the DoFs of a publisher that had timed out went to another one.
         sole: The only publisher that counts; None: there are several, or none.
+        watched: Those of DoFs that are watched, if there are several publishers.
     """
 
     def __init__(self, size: int):
@@ -66,19 +68,24 @@ class Precedence:
         self.handovers = 0
         self.sole: Owner | None = None
         self._size = size
-        self._watched = np.zeros(size, dtype=bool)
+        self.watched: tuple[Owner, ...] = ()
+        self._watches = np.zeros(size, dtype=bool)
         self._owners: dict[str, Owner] = {}
         self._rivalries: dict[str, tuple[float, tuple[Owner, ...]]] = {}
 
     def watch(self, dofs: np.ndarray) -> None:
         """Watch DoFs, flags of shape (size,): each of their publishers has to go on, see `stalest`."""
-        self._watched |= dofs
+        self._watches |= dofs
+        self._arrange()
 
     @property
     def stalest(self) -> Owner | None:
-        """The publisher of DoFs that are watched that was silent for longest; None: there are not two publishers."""
-        watched = [owner for owner in self._owners.values() if (owner.dofs & self._watched).any()]
-        return min(watched, key=attrgetter("arrival")) if len(self._owners) > 1 and watched else None
+        """The publisher of DoFs that are watched that was silent for longest; None: `watched` is empty."""
+        stalest = None
+        for owner in self.watched:
+            if stalest is None or owner.arrival < stalest.arrival:
+                stalest = owner
+        return stalest
 
     def admits(self, name: str, part: np.ndarray | None, arrival: float) -> bool:
         """Decide whether a message of a publisher with the DoFs `part` that arrived at `arrival` [s] counts.
@@ -104,8 +111,8 @@ class Precedence:
         owner = self._owners.get(name)
         if owner is None:
             owner = self._owners[name] = Owner(name, self._size)
-        owner.note(part, arrival)
-        self.sole = owner if len(self._owners) == 1 else None
+        if owner.note(part, arrival):
+            self._arrange()
 
     def rivals(self, since: float) -> list[str]:
         """List the publishers of the same DoFs since a time [s], sorted; empty: there are none."""
@@ -116,6 +123,13 @@ class Precedence:
             if present:
                 names |= {name, *present}
         return sorted(names)
+
+    def _arrange(self) -> None:
+        """Find out which publisher is the only one, or which of several are watched."""
+        owners = tuple(self._owners.values())
+        self.sole = owners[0] if len(owners) == 1 else None
+        several = len(owners) > 1
+        self.watched = tuple(owner for owner in owners if several and (owner.dofs & self._watches).any())
 
     def _owners_of(self, name: str, part: np.ndarray | None) -> tuple[Owner, ...]:
         """Return other publishers of some of these DoFs."""

@@ -148,6 +148,13 @@ class FeedbackTimeout:
         self.timed_out = False
         self._young = False
 
+    @property
+    def lacks(self) -> str:
+        """Description of what a plugin waits for: values, and the publisher that is silent, if it is known."""
+        feedback = self.feedback
+        is_known = self.timed_out and feedback.silent
+        return f"{feedback.lacks}, where {feedback.silent} is silent" if is_known else feedback.lacks
+
     def refusal(self, now: float) -> str:
         """Return why messages were refused lately, before the time `now` [s]; empty: none was, or the reader knows."""
         feedback = self.feedback
@@ -262,7 +269,7 @@ class FeedbackTimeouts:
     def lacks(self, running: bool) -> str:
         """Return the feedbacks that a plugin, which is `running` or not, waits for; empty: there is none."""
         return ", ".join(
-            watch.doubt or watch.feedback.lacks
+            watch.doubt or watch.lacks
             for watch in self._feedback_timeouts
             if watch.doubt or watch.missed(running) or (watch.feedback.required and not watch.feedback.received)
         )

@@ -12,21 +12,25 @@ def received_joints(
 ) -> tuple[str, ...]:
     """Translate the hardware's `order` into names of the model, without joints that the calibration does not know.
 
+    Joints of the pipe that are not in the order follow: another driver may publish them later.
+
     Raises:
-        UnknownName: The hardware does not publish a joint that the pipe needs.
+        UnknownName: The hardware does not publish a joint that the pipe needs, but others without a calibration: its
+            name is wrong.
     """
     members = set(robot.selectors[record.dofs.chain].names)
-    for joint, entry in calibration.joints.items():
-        name = calibration.hardware(joint)
-        if joint in members and name not in order:
-            raise UnknownName(
-                HARDWARE,
-                name,
-                order,
-                where=entry.where("name"),
-                expected=f"the name that '{record.source}' has for '{joint}'",
-            )
-    return calibration.robot(order)
+    joints = calibration.robot(order)
+    missing = [joint for joint in calibration.joints if joint in members and joint not in joints]
+    if missing and len(joints) < len(order):
+        name = calibration.hardware(missing[0])
+        raise UnknownName(
+            HARDWARE,
+            name,
+            order,
+            where=calibration.joints[missing[0]].where("name"),
+            expected=f"the name that '{record.source}' has for '{missing[0]}'",
+        )
+    return (*joints, *missing)
 
 
 def commanded_joints(

@@ -71,7 +71,9 @@ def pipes(repository, names):
         )
         middleware.serve(controller, (service,), _at_once)
 
-    def make(file, module="joint_states"):
+    def make(file, module="joint_states", keep=lambda joint: True):
+        published.names = tuple(name for joint, name in names.items() if keep(joint))
+        published.position = published.velocity = published.effort = np.zeros(len(published.names))
         configuration = load(file, module)
         robot = build(configuration, middleware)
         context = PipeContext(robot, middleware, configuration.calibrations, configuration.rate)
@@ -104,6 +106,14 @@ def test_the_shipped_calibration_fits_every_joint(files, pipes, names):
     assert feedbacks[0].run()
     assert feedbacks[0].accepted == 1
     assert sorted(joint for pipe in controllers for joint in pipe.message.names) == sorted(names)
+
+
+@pytest.mark.parametrize("late", ["arm1", "j_wheel"])
+def test_joints_of_another_driver_may_come_later(files, pipes, late):
+    """The pipe waits for those that the calibration names, by the names of the hardware."""
+    feedbacks, _ = pipes(files(), keep=lambda joint: late not in joint)
+    assert feedbacks[0].run() and not feedbacks[0].received
+    assert len(feedbacks[0].lacks.split(", ")) == (7 if late == "arm1" else 4)
 
 
 def test_calibrations_of_the_whole_serve_its_parts(files, pipes):

@@ -15,7 +15,7 @@ from solfer.pipes.joint.calibration import Calibration, Correction, same
 from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.joint.turns import JointTurns
-from solfer.pipes.name_order import NameOrder, Order
+from solfer.pipes.name_order import ORDER_MEMORY, NameOrder, Order
 from solfer.pipes.state_field import interface_of
 from solfer.transport.endpoints import Reader, Writer
 from solfer.transport.messages import JOINT_FIELDS, JointMessage, arrays
@@ -91,6 +91,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         self._names = NameOrder(
             calibration.names if calibration else external_names(mapping), sender.known, ignores=True
         )
+        self._logged: set[tuple[int, ...]] = set()  # the DoFs of messages that lack some
         self._carried: tuple[str, ...] = ()
         self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
         self._corrections: list[tuple[Correction, np.ndarray]] = []
@@ -193,7 +194,9 @@ class JointFeedbackPipe(StateFeedbackPipe):
         self._ever = np.flatnonzero(~not_received) if not_received.any() else None
         for state_field in self.state_fields:
             state_field.reset()
-        if order.target is not None:
+        part = None if order.target is None else tuple(order.target)
+        if part is not None and part not in self._logged and len(self._logged) < ORDER_MEMORY:
+            self._logged.add(part)
             logger.info(
                 "feedback '%s': %s has %d of %d joints; the others keep their values",
                 self.name,

@@ -103,7 +103,9 @@ def test_a_plugin_holds_without_one_of_its_drivers(tmp_path, drivers, caplog):
     halves.run(0.5, *drivers)
     assert halves.running
     halves.run(0.5, drivers[0])
-    assert not halves.running and f"nothing new of driver_of_{drivers[1][0]} for 0.1" in caplog.text
+    silent = f"driver_of_{drivers[1][0]}"
+    assert not halves.running and f"nothing new of {silent} for 0.1" in caplog.text
+    assert f"waits for feedback 'joints' (halves), where {silent} is silent" in halves.plugin.health()[1]
     halves.run(0.5, *drivers)
     assert halves.running
     halves.plugin.stop()
@@ -125,10 +127,27 @@ def test_joints_without_a_feedback_need_open_loop(tmp_path, chain, pipe, missing
     assert halves.running
 
 
-def test_a_driver_of_other_joints_may_end(tmp_path):
-    """The plugin commands the arm: it neither waits for the wheel nor needs it."""
-    halves = Halves(tmp_path, ("shoulder", "elbow"), **{MAIN + "controllers/few": BOTH[:1]})
-    assert halves.run(0.5, ("shoulder", "elbow")) and halves.running
-    halves.run(0.5, ("shoulder", "elbow"), ("roll",))
-    halves.run(0.5, ("shoulder", "elbow"))
+@pytest.mark.parametrize("chain", ["all", "arm", "wheels"])
+def test_a_driver_of_other_joints_is_no_fault(tmp_path, chain, caplog):
+    """The plugin commands the arm, or the wheel: it neither waits for the other joints nor needs them."""
+    own, others = DRIVERS[0] if chain != "wheels" else reversed(DRIVERS[0])
+    pipe = BOTH[chain == "wheels"]
+    halves = Halves(tmp_path, own, **{MAIN + "controllers/few": [pipe], IN + "dofs/chain": chain})
+    (feedback,) = halves.plugin.feedbacks
+    halves.run(0.5, own)
     assert halves.running
+    for drivers in ((own, others), (own,), (others, own)):
+        halves.run(0.5, *drivers)
+        assert halves.running and not feedback.refused
+    assert not any("refuse" in text for text in caplog.messages)
+    halves.run(0.5, others)
+    assert not halves.running and "refuse" not in halves.plugin.health()[1]
+
+
+@pytest.mark.parametrize(("chain", "driver"), [("arm", ("roll",)), ("wheels", ("shoulder", "elbow"))])
+def test_other_joints_alone_are_named_as_the_reason(tmp_path, chain, driver, caplog):
+    halves = Halves(tmp_path, driver, **{MAIN + "controllers/few": [BOTH[chain == "wheels"]], IN + "dofs/chain": chain})
+    halves.run(0.5, driver)
+    reason = f"(halves), which refuses messages of driver_of_{driver[0]}: it has none of the pipe's {3 - len(driver)} "
+    assert not halves.running and reason in halves.plugin.health()[1]
+    assert not any(record.levelno >= logging.WARNING for record in caplog.records)
