@@ -83,6 +83,8 @@ class TopicIn:
         handler: Gets every message, in the order of arrival. A `SolferError` that it raises is logged: no sender waits.
         stream: Topics of a component with the same stream have one sender at a time: the first, until it has been
             silent for 0.5 s. Messages of others are ignored, and both are named. Empty: every sender counts.
+        ordered: Whether the stamps of each sender, in the header of `message`, may not go back. Those that stay back
+            for 0.2 s are of another clock; 0 is no stamp.
     """
 
     name: str
@@ -90,6 +92,7 @@ class TopicIn:
     message: type
     handler: Callable[[Any], None]
     stream: str = ""
+    ordered: bool = False
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,11 @@ class Pose:
     orientation: Turn = field(default_factory=Turn)
 
 
+def bare_frame(frame: str) -> str:
+    """Return the name of a frame without the leading slash that some publishers still send, as for the first tf."""
+    return frame.lstrip("/")
+
+
 @dataclass(frozen=True)
 class Header:
     """Time [s] and frame of a message."""

@@ -10,8 +10,8 @@ from solfer.components.odometry.imu_samples import IMU_SAMPLES_LAG
 from solfer.components.odometry.samples import SortedSamples
 from solfer.components.odometry.stamps import StampCheck
 from solfer.components.odometry.streams import IMU_LEAD, Streams
-from solfer.components.stamp_faults import STAMP_PERSISTENT
 from solfer.model.history import History
+from solfer.transport.stamp_faults import STAMP_PERSISTENT
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002
 """Periods of the cycle, and of the messages of joints and IMU [s]."""

@@ -82,6 +82,32 @@ def test_a_stream_has_one_sender(caplog):
     assert caplog.messages[-1] == "topic base/left: messages of stick are ignored while other sends"
 
 
+@pytest.mark.parametrize(("one", "two"), [(1.8e9, 5.0), (3.0, 1e5)])
+def test_each_sender_has_a_clock_of_its_own(one, two, caplog):
+    """Both send at the same time, and both count; a stamp that goes back does not, unless they stay back for 0.2 s."""
+    wire, inbox, got, waiting = MemoryWire(), Inbox(), [], []
+    interface = "geometry_msgs/TwistStamped"
+    bind("base", (TopicIn("wanted", interface, TwistStamped, got.append, ordered=True),), wire.middleware, inbox)
+    out = TopicOut("/base/wanted", interface, TwistStamped, waiting.pop)
+    publish = {name: bind(name, (out,), wire.node(name), Inbox())[0] for name in ("stick", "other")}
+
+    def counts(sender, stamp):
+        before = len(got)
+        waiting.append(TwistStamped(Header(stamp, "world")))
+        publish[sender]()
+        inbox.apply()
+        wire.pass_time(0.03)
+        return len(got) > before
+
+    for tick in range(20):
+        assert counts("stick", one + 0.05 * tick) and counts("other", two + 0.05 * tick)
+    assert not caplog.messages
+    assert not counts("stick", one) and f"of stick is refused: a stamp of {one:.3f} s after" in caplog.text
+    assert counts("stick", one + 1.0) and counts("other", 0.0)
+    back = [counts("other", two + 0.03 * tick) for tick in range(12)]
+    assert back == [False] * 7 + [True] * 5
+
+
 def test_nothing_is_handed_over_while_refused(wire):
     got, inbox = [], Inbox("it waits")
     bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, got.append),), wire.middleware, inbox)

@@ -98,6 +98,7 @@ class ReferenceFollower(Component, abc.ABC):
                 *REFERENCE_MESSAGES[target.quantity],
                 self._listener(target),
                 stream=target.name,
+                ordered=True,
             )
             for target in self._list
         )
@@ -370,7 +371,7 @@ class ReferenceFollower(Component, abc.ABC):
     def _listener(self, target: Target) -> Callable[[Any], None]:
         def listen(message: Any) -> None:
             target.check(message.numbers)
-            target.check_header(message.header.frame_id, message.header.stamp, self.clock())
+            target.check_frame(message.header.frame_id)
             target.want(message.numbers, stream=True)
 
         return listen

@@ -9,8 +9,8 @@ from solfer.components.following.generated import GeneratedReference
 from solfer.components.following.progress import Residual, TaskProgress
 from solfer.components.following.quantity import PoseNumbers
 from solfer.components.following.tags import MotionRecord
-from solfer.components.stamp_faults import StreamClock
-from solfer.errors import ComponentError, UnknownName
+from solfer.errors import UnknownName
+from solfer.interfaces.geometry import bare_frame
 from solfer.interfaces.port import Port
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFilter
@@ -53,7 +53,6 @@ class Target:
         self._feed_forward = FeedForward(task)
         self._held = HeldPlace(task, reference)
         self._generated = None if generator is None else GeneratedReference(generator, self._numbers)
-        self._clock = StreamClock()
         self._filtered: FilteredReference
         self._residual: Residual
         self._progress: TaskProgress
@@ -142,7 +141,6 @@ class Target:
         self._filtered.start(value)
         if not np.array_equal(desired, value):
             self._filtered.aim(desired)
-        self._clock.start()
         self._forget()
         if self._generated is not None:
             self._generated.start(value)
@@ -200,22 +198,15 @@ class Target:
         """Check a reference; see `want`."""
         self._numbers.check(values, self.where)
 
-    def check_header(self, frame: str, stamp: float, arrival: float) -> None:
-        """Check frame and time [s] of a message by its arrival [s]; stamps that stay back are of a new clock.
+    def check_frame(self, frame: str) -> None:
+        """Check the frame of a message.
 
         Raises:
-            UnknownName: It is in another frame than the task's reference.
-            ComponentError: It is older than the one before it, or its time is no number.
+            UnknownName: It is another one than that of the task's reference.
         """
-        frame = frame.lstrip("/")
+        frame = bare_frame(frame)
         if frame not in ("", self.frame):
             raise UnknownName("frame of a reference", frame, (self.frame,), where=self.where)
-        if not self._clock.accepts(stamp, arrival):
-            raise ComponentError(
-                f"a reference of {stamp:g} s after one of {self._clock.newest:g} s",
-                where=self.where,
-                expected="times that do not go back",
-            )
 
     def part_of(self, pose: tuple[float, ...]) -> tuple[float, ...]:
         """Return what the task has of the seven numbers of a pose."""

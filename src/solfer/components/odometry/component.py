@@ -26,6 +26,7 @@ from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
 from solfer.interfaces.declaration import Accepted, LiveParameter, Parameter, Service, TopicIn, TopicOut
+from solfer.interfaces.geometry import bare_frame
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
@@ -233,7 +234,7 @@ class Odometry(Component):
             NotFinite: A number is NaN or infinite, or the quaternion is no orientation.
             ComponentError: The pose is in another frame than `odom`, or a variance is negative.
         """
-        frame = message.header.frame_id.lstrip("/")
+        frame = bare_frame(message.header.frame_id)
         stamped = message.pose
         if frame not in ("", FRAME):
             raise ComponentError(f"a pose in the frame '{frame}'", expected=f"the frame '{FRAME}'")

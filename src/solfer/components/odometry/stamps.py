@@ -2,7 +2,7 @@
 
 import math
 
-from solfer.components.stamp_faults import StampFault
+from solfer.transport.stamp_faults import StampFault
 
 FUTURE = 0.05
 """A stamp is of the future that is this much earlier at its arrival than others [s]."""
@@ -91,13 +91,13 @@ class StampCheck:
         if reference is None:
             return True
         if math.isnan(reference.newest):  # nothing to compare with yet
-            self._apart.clear()
+            self._apart.since = math.nan
             return False
         # in the first cycle comes all that was sent while the plugin was made
         first = reference.first if math.isnan(reference.before) else reference.before
         passed = max(arrival - reference.arrival, 0.0)
         if first - FOREIGN <= stamp <= reference.newest + passed + FOREIGN:
-            self._apart.clear()
+            self._apart.since = math.nan
             return True
         return False
 
@@ -108,13 +108,13 @@ class StampCheck:
             known = delay if math.isnan(self._delay) else self._delay
             self._delay = min(delay, known + (delay - known) * -math.expm1(-passed / STAMP_FORGETTING_TIME))
             self._before = arrival
-            self._jumped.clear()
+            self._jumped.since = math.nan
             return True
         if not self._jumped.persists(arrival):
             return False
         self._delay = delay
         self._before = arrival
-        self._jumped.clear()
+        self._jumped.since = math.nan
         return True
 
     def _refuse(self, kind: str, sender: str) -> bool:

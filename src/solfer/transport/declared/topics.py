@@ -8,12 +8,15 @@ from solfer.interfaces.declaration import TopicIn, TopicOut, full_name
 from solfer.throttle import Throttle
 from solfer.transport.declared.fields import message_of, require_carried, value_of
 from solfer.transport.middleware import Middleware
+from solfer.transport.stamp_faults import StreamClock
 
 logger = logging.getLogger(__name__)
 
 STREAM_REPEAT_PERIOD = 0.05
 """Time between two messages of rest [s]: one may be lost."""
 
+MOST_CLOCKS = 32
+"""Most senders whose clocks are kept; those whose name changes each time do not fill the memory."""
 
 STREAM_SILENCE = 0.5
 """Time without a message after which another sender of a stream counts [s]."""
@@ -58,12 +61,16 @@ class DeclaredIn:
         self._sole = sole
         self._throttle = Throttle(logger)
         self._now = middleware.now
+        self._clocks: dict[str, StreamClock] = {}
         self.queue = middleware.declared_queue(full_name(owner, topic.name), topic.interface)
 
     def receive(self, refusal: str) -> None:
         """Hand over what has come; while the component does not work it is dropped."""
         messages = self.queue.drain()
-        if not messages or refusal:
+        if refusal:
+            self._clocks.clear()
+            return
+        if not messages:
             return
         now = self._now()
         sole = self._sole
@@ -78,11 +85,25 @@ class DeclaredIn:
                 )
                 continue
             try:
-                self._topic.handler(value_of(self._topic.message, message))
+                value = value_of(self._topic.message, message)
+                if self._topic.ordered:
+                    self._check_stamp(value.header.stamp, message.sender, now)
+                self._topic.handler(value)
             except SolferError as error:
                 self._throttle.warning(
                     message.sender, "topic %s: a message of %s is refused: %s", self.queue.topic, message.sender, error
                 )
+
+    def _check_stamp(self, stamp: float, sender: str, arrival: float) -> None:
+        clock = self._clocks.get(sender)
+        if clock is None:
+            if len(self._clocks) == MOST_CLOCKS:
+                self._clocks.clear()
+            clock = self._clocks[sender] = StreamClock()
+        if not clock.accepts(stamp, arrival):
+            raise ComponentError(
+                f"a stamp of {stamp:.3f} s after one of {clock.newest:.3f} s", expected="times that do not go back"
+            )
 
 
 class DeclaredOut:

@@ -7,20 +7,20 @@ STAMP_PERSISTENT = 0.2
 
 
 class StampFault:
-    """A fault of stamps: after a while it is their clock that has changed."""
+    """A fault of stamps: after a while it is their clock that has changed.
+
+    Attributes:
+        since: When it began [s]; NaN: the newest stamp is right.
+    """
 
     def __init__(self) -> None:
-        self._since = math.nan
-
-    def clear(self) -> None:
-        """Note that a stamp is right."""
-        self._since = math.nan
+        self.since = math.nan
 
     def persists(self, arrival: float) -> bool:
         """Note that a stamp which arrives at a time [s] has the fault; return whether it has lasted for long."""
-        if math.isnan(self._since):
-            self._since = arrival
-        return arrival - self._since >= STAMP_PERSISTENT
+        if math.isnan(self.since):
+            self.since = arrival
+        return arrival - self.since >= STAMP_PERSISTENT
 
 
 class StreamClock:
@@ -31,13 +31,8 @@ class StreamClock:
     """
 
     def __init__(self) -> None:
-        self._fault = StampFault()
-        self.start()
-
-    def start(self) -> None:
-        """Forget the clock."""
         self.newest = -math.inf
-        self._fault.clear()
+        self._fault = StampFault()
 
     def accepts(self, stamp: float, arrival: float) -> bool:
         """Return whether a message with a stamp counts, which arrives at a time [s]; without a stamp (0) it does."""
@@ -46,5 +41,5 @@ class StreamClock:
         if not math.isfinite(stamp) or (stamp < self.newest and not self._fault.persists(arrival)):
             return False
         self.newest = stamp
-        self._fault.clear()
+        self._fault.since = math.nan
         return True
