@@ -20,6 +20,9 @@ error-state Kalman filter", arXiv:1711.02508, section 3.
 UNIT_TOLERANCE = 1e-2
 """Largest deviation of the square of an external quaternion's length from one, as in tf2; it is made one."""
 
+INEXACT = 1e-3
+"""The same from which on it is reported: more than the rounding of numbers of 32 bits, or of three digits."""
+
 ORTHONORMAL = 1e-6
 """Largest deviation of R^T R of a rotation matrix R from the identity."""
 
@@ -67,20 +70,20 @@ def is_unit(quaternion: Sequence[float]) -> bool:
     return abs(sum(number * number for number in quaternion) - 1.0) <= UNIT_TOLERANCE
 
 
-def normalize(quaternions: np.ndarray) -> None:
-    """Give external quaternions, shape (4,) or (n, 4), the length 1, in place.
+def normalize(quaternions: np.ndarray) -> bool:
+    """Give external quaternions, shape (4,) or (n, 4), the length 1, in place; return whether one was inexact.
 
     Raises:
         PipeError: One has not about this length, or is not finite.
     """
     if quaternions.ndim > 1:
-        for quaternion in quaternions:
-            normalize(quaternion)
-        return
+        return any([normalize(quaternion) for quaternion in quaternions])
     norm = math.hypot(*quaternions.tolist())
-    if not abs(norm * norm - 1.0) <= UNIT_TOLERANCE:
+    deviation = abs(norm * norm - 1.0)
+    if not deviation <= UNIT_TOLERANCE:
         raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
     quaternions /= norm
+    return deviation > INEXACT
 
 
 class QuaternionConvention:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from solfer.interfaces.geometry import Pose
+from solfer.interfaces.geometry import Pose, bare_frame
 from solfer.interfaces.support import SupportMargins
 from solfer.interfaces.task_references import TaskReferences, numbers_of
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -98,12 +98,13 @@ class LiveScene:
             return True
         kinematics = self._robot.kinematics
         for reader in self._bases:
-            if _is_fresh(reader) and reader.message.child == kinematics.base_link:
+            if _is_fresh(reader) and bare_frame(reader.message.child) == kinematics.base_link:
                 message = reader.message
+                frame = bare_frame(message.frame)
                 kinematics.base.from_pose(message.position, message.orientation, self._robot.state.position[:6])
-                if message.frame != self._frame:
+                if frame != self._frame:
                     self._path = _Path()
-                self._frame = message.frame
+                self._frame = frame
                 return True
         return False
 
@@ -133,7 +134,7 @@ class LiveScene:
             reader = self._wrenches.get(name)
             if reader is not None and _is_fresh(reader):
                 wrench = reader.message
-                axes = measured.get(wrench.frame)
+                axes = measured.get(bare_frame(wrench.frame))
                 force = wrench.force.copy() if axes is None else axes.rotation @ wrench.force
             elif estimates is not None and name in estimates.names:
                 force = estimates.values[estimates.names.index(name), :3].copy()
@@ -200,7 +201,7 @@ class LiveScene:
     def _estimated(self) -> np.ndarray:
         """Return the path that is estimated, where another topic has the pose of the base."""
         reader = self._bases[-1] if self._bases else None
-        if reader is not None and _is_fresh(reader) and reader.message.frame != self._frame:
+        if reader is not None and _is_fresh(reader) and bare_frame(reader.message.frame) != self._frame:
             self._estimated_path.add(reader.message.position)
         return self._estimated_path.points
 

@@ -256,7 +256,10 @@ def test_an_orientation_of_zeros_is_not_measured(covariance):
 
 
 @pytest.mark.parametrize("length", [0.9955, 1.0045])
-def test_an_orientation_gets_the_length_one(body, length):
-    message = nav_messages.Odometry()
-    message.pose.pose.orientation.w = length
-    assert body.decode(packed(message), "driver").orientation.tolist() == [0.0, 0.0, 0.0, 1.0]
+def test_an_orientation_gets_the_length_one(length, caplog):
+    """Once for each sender the log has it, unless it is only rounded."""
+    body, message = codec("nav_msgs/Odometry"), nav_messages.Odometry()
+    for sender in ("rounded", "driver", "driver", "b"):
+        message.pose.pose.orientation.w = 1.0 + (length - 1.0) * (0.01 if sender == "rounded" else 1.0)
+        assert body.decode(packed(message), sender).orientation.tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert [text.split(" have")[0] for text in caplog.messages] == ["quaternions of driver", "quaternions of b"]

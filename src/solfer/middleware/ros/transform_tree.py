@@ -5,6 +5,7 @@ import math
 import rospy
 import tf2_ros
 
+from solfer.interfaces.geometry import bare_frame
 from solfer.middleware.ros.middleware import RosMiddleware
 from solfer.middleware.ros.tf import prefixed, tf_prefix
 
@@ -21,7 +22,7 @@ class TransformTree:
     """
 
     def __init__(self, fixed: str, middleware: RosMiddleware):
-        self._fixed, self._prefix = fixed.lstrip("/"), tf_prefix(middleware)
+        self._fixed, self._prefix = bare_frame(fixed), tf_prefix(middleware)
         self._middleware = middleware
         self._rewinds = middleware.rewinds
         self._buffer = tf2_ros.Buffer(rospy.Duration(TRANSFORM_STALE_AGE), debug=False)
@@ -32,7 +33,7 @@ class TransformTree:
         if self._middleware.rewinds != self._rewinds:  # all that comes would pass for old
             self._rewinds = self._middleware.rewinds
             self._buffer.clear()
-        frame = prefixed(self._prefix, frame.lstrip("/"))
+        frame = prefixed(self._prefix, bare_frame(frame))
         missing = f"a transform from '{self._fixed}' to '{frame}' on /tf"
         try:
             found = self._buffer.lookup_transform(self._fixed, frame, rospy.Time(0))

@@ -8,6 +8,7 @@ import numpy as np
 
 from solfer.config.records.conventions import AnglesRecord, ConventionRecord
 from solfer.errors import NotFinite, PipeError, nearest
+from solfer.interfaces.geometry import bare_frame
 from solfer.numerics.rotations import (
     QuaternionConvention,
     normalize,
@@ -15,6 +16,7 @@ from solfer.numerics.rotations import (
     rotation_from_angles,
     rotation_from_quaternion,
 )
+from solfer.transport.inexact import InexactTurns
 from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
 
 BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
@@ -22,6 +24,8 @@ BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
 
 NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
 """In place of an orientation that is not measured."""
+
+ZEROS = [0.0] * 4
 
 LACKING = {
     (True, True): frozenset[str](),
@@ -59,6 +63,7 @@ class BodyReading(abc.ABC):
         self._axes = axes
         self._twist_frame = convention.twist.frame
         orientation = convention.orientation
+        self._inexact = InexactTurns()
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
         self.values = np.zeros(13)
@@ -102,16 +107,17 @@ class BodyReading(abc.ABC):
         """Read the values; those that are not in the orientation need no check."""
 
     def _check_name(self, name: str) -> None:
-        if name.lstrip("/") != self._body:
+        if name != self._body and bare_frame(name) != self._body:
             raise PipeError(
                 f"it describes '{name}'",
                 expected=f"'{self._body}', or the key 'reference' in the pipe",
                 names=nearest(name, (self._body,)),
             )
 
-    def _orient(self, quaternion: np.ndarray) -> None:
+    def _orient(self, quaternion: np.ndarray, sender: str) -> None:
         self._convention.read(quaternion, self._quaternion)
-        normalize(self._quaternion)
+        if normalize(self._quaternion):
+            self._inexact.report(sender)
 
 
 class OdometryReading(BodyReading):
@@ -125,7 +131,7 @@ class OdometryReading(BodyReading):
 
     def _read_values(self, message: BodyMessage) -> None:
         self._check_name(message.child)
-        self._orient(message.orientation)
+        self._orient(message.orientation, message.sender)
         self._position[:] = message.position
         self._twist[:3], self._twist[3:] = message.linear, message.angular
         if not self._as_prescribed or self._twist_frame == "world":
@@ -142,11 +148,11 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        zeros = not message.orientation.any()  # no orientation: some drivers publish them instead of -1
+        zeros = message.orientation.tolist() == ZEROS  # no orientation: some drivers publish them instead of -1
         oriented = not (zeros or np.isnan(message.orientation).all())
         turning = not np.isnan(message.angular).all()
         if oriented:
-            self._orient(message.orientation)
+            self._orient(message.orientation, message.sender)
         else:
             self._quaternion[:] = NO_TURN
         self._angular[...] = message.angular if turning else 0.0
@@ -163,7 +169,7 @@ class PoseReading(BodyReading):
     carries = frozenset(("position", "orientation"))
 
     def _read_values(self, message: VectorMessage) -> None:
-        self._orient(message.values[3:])
+        self._orient(message.values[3:], message.sender)
         self._position[:] = message.values[:3]
 
 
@@ -173,7 +179,7 @@ class QuaternionReading(BodyReading):
     carries = frozenset(("orientation",))
 
     def _read_values(self, message: VectorMessage) -> None:
-        self._orient(message.values)
+        self._orient(message.values, message.sender)
 
 
 class AnglesReading(BodyReading):
@@ -193,7 +199,7 @@ class TwistReading(BodyReading):
     carries = frozenset(("linear", "angular"))
 
     def _read_values(self, message: VectorMessage) -> None:
-        frame = self._twist_frame or ("body" if message.frame == self._body else "world")
+        frame = self._twist_frame or ("body" if bare_frame(message.frame) == self._body else "world")
         self.own_axes = frame == "body"
         self._twist[:] = message.values
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.errors import NotFinite, PipeError
+from solfer.interfaces.geometry import bare_frame
 from solfer.interfaces.port import Port
 from solfer.numerics.kernels import finite
 from solfer.numerics.rotations import normalize
@@ -16,6 +17,7 @@ from solfer.pipes.name_order import NameOrder
 from solfer.pipes.point.notation import PointNotation
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
+from solfer.transport.inexact import InexactTurns
 from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
 
 
@@ -66,6 +68,7 @@ class PointFeedbackPipe(FeedbackPipe):
         self._frame = received.frame
         self._notation = received.notation
         self._names = None if received.names is None else NameOrder(received.names, known, self.what)
+        self._inexact = InexactTurns()
         self._oriented = port.quantity in ("orientation", "pose")
         self._values = np.zeros_like(port.value)
         self._numbers = self._values.reshape(-1)
@@ -120,11 +123,11 @@ class PointFeedbackPipe(FeedbackPipe):
             self._values[..., :3] = self._port.value[..., :3]
         if not finite(self._numbers):
             raise NotFinite(f"a {self._port.quantity} that is not finite")
-        if self._oriented:
-            normalize(self._values[..., -4:])
+        if self._oriented and normalize(self._values[..., -4:]):
+            self._inexact.report(message.sender)
 
     def _check_frame(self, message: Message) -> None:
-        if message.frame.lstrip("/") != self._frame:
+        if message.frame != self._frame and bare_frame(message.frame) != self._frame:
             raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
 
     def _copy_named(self, message: Message) -> None:

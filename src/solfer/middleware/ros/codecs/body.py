@@ -12,6 +12,7 @@ from sensor_msgs.msg import Imu
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH, PackedMessage
 from solfer.numerics.rotations import normalize, rotation_from_quaternion
+from solfer.transport.inexact import InexactTurns
 from solfer.transport.messages import (
     BODY_MESSAGES,
     IMU_MESSAGES,
@@ -59,6 +60,7 @@ class BodyCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Odometry)
+        self._inexact = InexactTurns()
         self._out = NumbersBuffer(85)  # pose and its covariance, twist and its covariance
 
     def encode(self, message: BodyMessage) -> PackedMessage:
@@ -76,7 +78,7 @@ class BodyCodec(Codec):
         odometry = unpack(Odometry, packed)
         pose = odometry.pose.pose
         twist = odometry.twist.twist
-        orientation = _orientation(pose.orientation)
+        orientation = _orientation(pose.orientation, self._inexact, sender)
         rotation = rotation_from_quaternion(orientation)
         return BodyMessage(
             odometry.header.frame_id,
@@ -103,6 +105,7 @@ class ImuCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Imu)
+        self._inexact = InexactTurns()
         self._out = NumbersBuffer(37)  # each quantity with its covariance, row by row
 
     def encode(self, message: ImuMessage) -> PackedMessage:
@@ -126,7 +129,7 @@ class ImuCodec(Codec):
         deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
         return ImuMessage(
             imu.header.frame_id,
-            np.full(4, np.nan) if lacks_orientation else _orientation(imu.orientation),
+            np.full(4, np.nan) if lacks_orientation else _orientation(imu.orientation, self._inexact, sender),
             np.full(3, np.nan) if lacks_angular else _get(imu.angular_velocity),
             acceleration=np.full(3, np.nan) if lacks_force else _get(imu.linear_acceleration),
             deviations=deviations,
@@ -160,10 +163,11 @@ class WrenchCodec(Codec):
         )
 
 
-def _orientation(element: genpy.Message) -> np.ndarray:
-    """Read a unit quaternion (x, y, z, w), shape (4,)."""
+def _orientation(element: genpy.Message, inexact: InexactTurns, sender: str) -> np.ndarray:
+    """Read a unit quaternion (x, y, z, w) of a sender, shape (4,); report an inexact one."""
     orientation = _get(element)
-    normalize(orientation)
+    if normalize(orientation):
+        inexact.report(sender)
     return orientation
 
 

@@ -7,6 +7,7 @@ from interactive_markers.interactive_marker_server import InteractiveMarkerServe
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback
 
 from solfer.errors import NotFinite
+from solfer.interfaces.geometry import bare_frame
 from solfer.middleware.ros.scene.markers import pose_of
 from solfer.middleware.ros.tf import prefixed
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -75,7 +76,7 @@ class ReferenceMarkers:
 
     def _take(self, feedback: InteractiveMarkerFeedback) -> None:
         shown = self._shown.get(feedback.marker_name)
-        if shown is None or feedback.header.frame_id.lstrip("/") != self._frames.get(feedback.marker_name):
+        if shown is None or bare_frame(feedback.header.frame_id) != self._frames.get(feedback.marker_name):
             return
         if feedback.event_type == feedback.MOUSE_UP:
             self._dragged.release(shown, feedback.client_id)
