@@ -11,7 +11,7 @@ import numpy as np
 from solfer.errors import Contradiction, NotFinite, PipeError, SolferError, UnknownName, Unrelated
 from solfer.model import History, State
 from solfer.numerics.filters import LowPass
-from solfer.pipes.precedence import Precedence
+from solfer.pipes.precedence import Precedence, Watch
 from solfer.pipes.state_field import StateField
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, MessageStatus, Publisher, Reader
@@ -75,6 +75,7 @@ class FeedbackPipe(abc.ABC):
         refused_at: When the newest message was refused, in the pipe's own clock [s].
     """
 
+    _watch: Watch | None = None
     handovers = 0
     changed = math.inf
     refusal = ""
@@ -91,8 +92,7 @@ class FeedbackPipe(abc.ABC):
         self._refused = 0
         self._throttle = Throttle(logger)
         self._accepted_before = -1  # number of accepted messages before `refusal`
-        self._doubt: tuple[str, Contradiction] | None = None  # sender and error that is not logged yet
-        self._doubted = math.inf  # its arrival
+        self._doubt: tuple[str, Contradiction, float] | None = None  # sender, error and arrival; not logged yet
         self._contradicted = -1  # number of accepted messages before the last one that is logged
 
     @property
@@ -130,11 +130,17 @@ class FeedbackPipe(abc.ABC):
     @property
     def silent(self) -> str:
         """Name of the publisher that has been silent for the longest time; empty: there are not several that count."""
-        return ""
+        stalest = None if self._watch is None else self._watch.stalest
+        return "" if stalest is None else stalest.name
 
     def require(self, dofs: np.ndarray) -> None:
         """Require the pipe at a start; from then on each publisher of some of the Robot's `dofs` has to go on."""
         self.required = True
+        self._watch = self.watched(dofs, self._watch)
+
+    def watched(self, dofs: np.ndarray, watch: Watch | None) -> Watch | None:
+        """Add DoFs of the Robot to a watch of the pipe's publishers, or make one; None: any of them may end."""
+        return watch
 
     def run(self) -> MessageStatus:
         """Read and accept the newest message: NEW if there was one that fits, OLD or NONE if not."""
@@ -197,8 +203,8 @@ class FeedbackPipe(abc.ABC):
     def _accept(self) -> bool:
         """Decode the message that was read last; return whether it fits."""
         reader = self.reader
-        if self._doubt is not None and reader.arrival >= self._doubted + NAMING_DELAY:
-            self._log_refusal(*self._doubt)
+        if self._doubt is not None and reader.arrival >= self._doubt[2] + NAMING_DELAY:
+            self._log_refusal(*self._doubt[:2])
             self._contradicted = self.accepted
             self._doubt = None
         try:
@@ -231,8 +237,7 @@ class FeedbackPipe(abc.ABC):
         if not isinstance(error, Contradiction) or self._contradicted == self.accepted:
             self._log_refusal(sender, error)
         elif self._doubt is None:
-            self._doubt = sender, error
-            self._doubted = self.refused_at
+            self._doubt = sender, error, self.refused_at
 
     def _log_refusal(self, sender: str, error: SolferError) -> None:
         self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
@@ -363,17 +368,13 @@ class StateFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.dropped`."""
         return 0 if self.history is None else self.history.dropped
 
-    @property
-    def silent(self) -> str:
-        """See `FeedbackPipe.silent`."""
-        stalest = None if self._precedence is None else self._precedence.stalest
-        return "" if stalest is None else stalest.name
-
-    def require(self, dofs: np.ndarray) -> None:
-        """See `FeedbackPipe.require`."""
-        super().require(dofs)
+    def watched(self, dofs: np.ndarray, watch: Watch | None) -> Watch | None:
+        """See `FeedbackPipe.watched`."""
         if self._precedence is not None:
-            self._precedence.watch(np.isin(self.state_fields[0].dofs, dofs))
+            flags = np.isin(self.state_fields[0].dofs, dofs)
+            watch = Watch(flags if watch is None else flags | watch.dofs)
+            self._precedence.watch(watch)
+        return watch
 
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
@@ -492,8 +493,8 @@ class StateFeedbackPipe(FeedbackPipe):
         """Let `part` be all that the messages of this cycle had; return whether there were any."""
         if not parts:
             return NONE if self.reader.message is None else OLD
-        if self._precedence.watched:
-            self.arrival = self._precedence.stalest.arrival
+        if self._watch is not None and self._watch.owners:
+            self.arrival = self._watch.stalest.arrival
         self.part = None if any(part is None for part in parts) else np.unique(np.concatenate(parts))
         return NEW
 

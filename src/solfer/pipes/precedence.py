@@ -43,6 +43,31 @@ class Owner:
         return differs
 
 
+class Watch:
+    """Publishers of DoFs of which each has to go on.
+
+    Args:
+        dofs: Flags of the DoFs, shape (size,).
+
+    Attributes:
+        dofs: See above.
+        owners: The publishers; empty: there is only one on the topic.
+    """
+
+    def __init__(self, dofs: np.ndarray):
+        self.dofs = dofs
+        self.owners: tuple[Owner, ...] = ()
+
+    @property
+    def stalest(self) -> Owner | None:
+        """The one of the `owners` that was silent for longest; None: there are none."""
+        stalest = None
+        for owner in self.owners:
+            if stalest is None or owner.arrival < stalest.arrival:
+                stalest = owner
+        return stalest
+
+
 class Precedence:
     """The first publisher of a DoF counts until it times out; messages of others with the same DoFs are ignored.
 
@@ -58,7 +83,6 @@ class Precedence:
         ignored: Messages that were ignored.
         handovers: How often the DoFs of a publisher that had timed out went to another one.
         sole: The only publisher that counts; None: there are several, or none.
-        watched: Those of DoFs that are watched, if there are several publishers.
     """
 
     def __init__(self, size: int):
@@ -68,24 +92,14 @@ class Precedence:
         self.handovers = 0
         self.sole: Owner | None = None
         self._size = size
-        self.watched: tuple[Owner, ...] = ()
-        self._watches = np.zeros(size, dtype=bool)
+        self._watches: list[Watch] = []
         self._owners: dict[str, Owner] = {}
         self._rivalries: dict[str, tuple[float, tuple[Owner, ...]]] = {}
 
-    def watch(self, dofs: np.ndarray) -> None:
-        """Watch DoFs, flags of shape (size,): each of their publishers has to go on, see `stalest`."""
-        self._watches |= dofs
+    def watch(self, watch: Watch) -> None:
+        """Keep the publishers of a watch up to date."""
+        self._watches.append(watch)
         self._arrange()
-
-    @property
-    def stalest(self) -> Owner | None:
-        """The publisher of DoFs that are watched that was silent for longest; None: `watched` is empty."""
-        stalest = None
-        for owner in self.watched:
-            if stalest is None or owner.arrival < stalest.arrival:
-                stalest = owner
-        return stalest
 
     def admits(self, name: str, part: np.ndarray | None, arrival: float) -> bool:
         """Decide whether a message of a publisher with the DoFs `part` that arrived at `arrival` [s] counts.
@@ -125,11 +139,12 @@ class Precedence:
         return sorted(names)
 
     def _arrange(self) -> None:
-        """Find out which publisher is the only one, or which of several are watched."""
+        """Find out which publisher is the only one, or which of several each watch has."""
         owners = tuple(self._owners.values())
         self.sole = owners[0] if len(owners) == 1 else None
         several = len(owners) > 1
-        self.watched = tuple(owner for owner in owners if several and (owner.dofs & self._watches).any())
+        for watch in self._watches:
+            watch.owners = tuple(owner for owner in owners if several and (owner.dofs & watch.dofs).any())
 
     def _owners_of(self, name: str, part: np.ndarray | None) -> tuple[Owner, ...]:
         """Return other publishers of some of these DoFs."""

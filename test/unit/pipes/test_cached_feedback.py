@@ -1,6 +1,7 @@
 """A feedback for several Robots."""
 
 import numpy as np
+import pytest
 from support.unit.endpoints import Told
 from support.unit.joint_pipes import dofs, make_robot, received
 
@@ -29,6 +30,30 @@ def test_patience_is_that_of_the_source(monkeypatch):
     for patience in ((0.7, 9), (0.5, 10)):  # the most patient plugin counts
         source.share(record()).be_patient(*patience)
     assert told == [(0.7, 9), (0.7, 10)]
+
+
+@pytest.mark.parametrize("ended", ["roll", "shoulder"])
+def test_each_plugin_needs_the_drivers_of_its_own_joints(ended):
+    """Each joint has a driver; the one that ends is a timeout of the plugin alone that commands this joint."""
+    robot, turns, bus, names = make_robot(), CycleCount(), Bus(), ("roll", "shoulder")
+    pipe = factory.feedback(record(), PipeContext(robot, MemoryMiddleware(bus, "cart"), {}, 200.0))
+    source = CachedFeedback(pipe, turns)
+    shares = {name: source.share(record()) for name in names}
+    writers = {name: MemoryMiddleware(bus, f"driver_of_{name}").writer("told", pipe.reader.carries) for name in names}
+    for name, share in shares.items():
+        share.require(np.array([robot.dofs.index(name)]))
+    for tick in range(5):
+        bus.run_until(0.1 * tick)
+        for name, writer in writers.items():
+            if tick < 2 or name != ended:
+                writer.write(JointMessage((name,), np.array([0.01 * tick])))
+        turns.next()
+        for share in shares.values():
+            share.run()
+    assert {name: share.arrival for name, share in shares.items()} == {
+        name: pytest.approx(0.1 if name == ended else 0.4) for name in names
+    }
+    assert shares[ended].silent == f"driver_of_{ended}"
 
 
 def test_a_restart_needs_every_part_again():

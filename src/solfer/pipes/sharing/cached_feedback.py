@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.config.records.pipes import FeedbackRecord
 from solfer.pipes.feedback_pipe import FeedbackPipe, StateFeedbackPipe
+from solfer.pipes.precedence import Watch
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
 from solfer.transport.messages import Message
 
@@ -97,7 +98,6 @@ class CachedFeedbackPipe(FeedbackPipe):
     changed = property(attrgetter("_pipe.changed"))
     ignored = property(attrgetter("_pipe.ignored"))
     dropped = property(attrgetter("_pipe.dropped"))
-    silent = property(attrgetter("_pipe.silent"))
     lacks = property(attrgetter("_pipe.lacks"))
 
     def rivalry(self, now: float) -> str:
@@ -112,10 +112,9 @@ class CachedFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
         self.source.be_patient(timeout, strikes)
 
-    def require(self, dofs: np.ndarray) -> None:
-        """See `FeedbackPipe.require`."""
-        super().require(dofs)
-        self._pipe.require(dofs)
+    def watched(self, dofs: np.ndarray, watch: Watch | None) -> Watch | None:
+        """See `FeedbackPipe.watched`."""
+        return self._pipe.watched(dofs, watch)
 
     def check_start(self) -> None:
         """See `FeedbackPipe.check_start`."""
@@ -134,7 +133,8 @@ class CachedFeedbackPipe(FeedbackPipe):
             return OLD if self._seen else NONE
         self._seen = pipe.accepted
         self.accepted += 1
-        self.arrival = pipe.arrival
+        watch = self._watch
+        self.arrival = watch.stalest.arrival if watch is not None and watch.owners else pipe.arrival
         self.stamp = pipe.stamp
         if not self.received:
             self.received = self._complete()
