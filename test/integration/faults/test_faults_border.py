@@ -47,7 +47,8 @@ class Peer:
         self._wanted.velocity[[dofs.index(wheel) for wheel in WHEELS]] = WHEEL_SPEED
         self._yaw = dofs.index("torso_yaw")
         self.bend, self.published = lambda message: [message], 0
-        world.bus.every(PERIOD, self._publish)
+        # between two turns of the bridge: at the same time rounding would decide which of them comes first
+        world.bus.every(PERIOD, self._publish, start=world.bus.time + PERIOD / 2.0)
 
     def _publish(self):
         self._wanted.position[self._yaw] += SPEED * PERIOD
