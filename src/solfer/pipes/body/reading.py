@@ -25,7 +25,7 @@ BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
 NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
 """In place of an orientation that is not measured."""
 
-ZEROS = [0.0] * 4
+NO_QUATERNION = [0.0] * 4
 
 LACKING = {
     (True, True): frozenset[str](),
@@ -148,7 +148,7 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        zeros = message.orientation.tolist() == ZEROS  # no orientation: some drivers publish them instead of -1
+        zeros = message.orientation.tolist() == NO_QUATERNION  # no orientation: some drivers publish them instead of -1
         oriented = not (zeros or np.isnan(message.orientation).all())
         turning = not np.isnan(message.angular).all()
         if oriented:
