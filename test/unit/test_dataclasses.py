@@ -8,6 +8,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
 CHANGED = {
     "cli/allocations/meter.py": {"LineCost"},
+    "components/trajectories/follower.py": {"_Course"},
     "components/wheeled_motion/targets.py": {"Stream"},
     "config/loading/check.py": {"CheckReport"},
     "demo/record.py": {"Trace"},

@@ -37,7 +37,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Header:
+class TableHeader:
     """What the columns of a table are.
 
     Attributes:
@@ -49,7 +49,7 @@ class Header:
     factors: tuple[float, ...]
 
     @classmethod
-    def plain(cls, columns: Sequence[str]) -> "Header":
+    def plain(cls, columns: Sequence[str]) -> "TableHeader":
         """Return that of a table without names: the time, then the columns."""
         return cls((TIME_COLUMN, *columns), (1.0,) * (1 + len(columns)))
 
@@ -63,7 +63,7 @@ def fields_of(text: str) -> list[Field]:
     return [Field(text[begin:end].strip().strip('"'), begin + 1) for begin, end in places]
 
 
-def read_header(place: str, fields: Sequence[Field], columns: Sequence[str], is_partial: bool) -> Header:
+def read_header(place: str, fields: Sequence[Field], columns: Sequence[str], is_partial: bool) -> TableHeader:
     """Read names and units of columns, in any order.
 
     Names are those of `columns`, such as `x` and `qw`, or those of TUM (`tx`), EuRoC (`p_RS_R_x`, `q_RS_w`) and ROS
@@ -102,7 +102,7 @@ def read_header(place: str, fields: Sequence[Field], columns: Sequence[str], is_
         )
     if len(names) == 1:
         raise ConfigError("there is one column", where=f"{place}:1", expected=f"the {TIME_COLUMN}, then the {kind}s")
-    return Header(tuple(names), tuple(factors))
+    return TableHeader(tuple(names), tuple(factors))
 
 
 def is_header(fields: Sequence[Field], columns: Sequence[str]) -> bool:

@@ -10,7 +10,7 @@ from solfer.config.records.bounds import COORDINATE
 from solfer.config.yaml.files import read_text
 from solfer.errors import ConfigError, SizeMismatch
 from solfer.numerics.rotations import is_unit
-from solfer.references.header import TIME_COLUMN, Field, Header, fields_of, is_header, names_of, read_header
+from solfer.references.header import TIME_COLUMN, Field, TableHeader, fields_of, is_header, names_of, read_header
 
 TABLE_ROWS = 20_000
 """Rows of a table."""
@@ -44,7 +44,7 @@ def read_table(
             few or too many numbers. UnknownName: There is no such column.
     """
     names, lines = _parts(path, columns, where)
-    header = Header.plain(columns)
+    header = TableHeader.plain(columns)
     if names is not None:
         header = read_header(f"{path}:{names[0]}", names[1], columns, is_partial=is_partial)
     rows: list[list[float]] = []
