@@ -62,6 +62,8 @@ class WheeledKillsTest(unittest.TestCase):
             os.kill(pid, signal.SIGKILL)
             wait_for(lambda: max(map(abs, self.robot.speeds())) < WHEEL_REST, START, "wheels at rest")
             self.assertLess(self.now() - begin, LEASE + 0.3)
+        wait_for(lambda: self.speed() < REST, START, "a base at rest")
+        self.assertLess(self.now() - begin, LEASE + UNSENT)  # it rocks on its springs for a second
         self.robot.passes(1.0)
         self.assertLess(self.speed(), REST)
         self.assertLess(self.robot.moved(before), 0.1)
