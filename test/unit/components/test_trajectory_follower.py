@@ -335,6 +335,15 @@ def test_a_stamp_of_another_clock_is_refused_with_both_times(scene, lead):
     assert f"stamped {1.0 + lead:.3f} s, and now it is 1.005 s" in refused.text and "60 s ahead" in refused.text
 
 
+def test_not_too_many_wait(scene):
+    for _ in range(1000):
+        ahead(scene, NOD, 50.0, False)
+        scene.run(0.01)
+    refused = ahead(scene, NOD, 50.0, True)
+    scene.run(0.1)
+    assert refused.status is GoalStatus.REJECTED and "1000 trajectories wait" in refused.text
+
+
 def test_a_point_at_the_stamp_is_reached_by_then(scene):
     ahead(scene, through((0.0, (0.2, 0.1), (0.0, 0.0))), 1.0, False)
     scene.run(1.0)

@@ -1,5 +1,6 @@
 """Moves joints along trajectories, one after the other, and supervises the goal of an action that requested one."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,10 @@ from solfer.interfaces.trajectories import (
 from solfer.numerics.rotations import whole_turns
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot
+
+
+MOST_WAITING = 1000
+"""Trajectories that may wait for their stamps."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +96,8 @@ class _Course:
 
     Attributes:
         motion: Its motion, by the time since its stamp.
-        time: That time [s].
-        start: That time at which it takes over [s].
+        time: That time; while it waits, what it will be when it takes over [s].
+        begins: When it takes over, by the clock of the follower [s].
         names: Its joints.
         places: The same, indices of those that may be moved, shape (m,).
         limits: Tolerances of its goal; None: it has no goal.
@@ -101,7 +106,7 @@ class _Course:
 
     motion: ViaPoints
     time: float
-    start: float
+    begins: float
     names: tuple[str, ...]
     places: np.ndarray
     limits: _Limits | None
@@ -147,7 +152,8 @@ class TrajectoryFollower:
             turns=robot.turns[joints],
         )
         self.moving = False
-        self.waiting: list[_Course] = []
+        self.waiting: deque[_Course] = deque()
+        self._clock = 0.0
         self._course: _Course | None = None
         self._goal: _Course | None = None
         self._outcome: Outcome | None = None
@@ -163,7 +169,7 @@ class TrajectoryFollower:
             goal: The goal that it belongs to, in place of the one before; None: a topic's.
 
         Raises:
-            SolferError: See `TrajectoryCheck`.
+            SolferError: See `TrajectoryCheck`; or too many wait.
         """
         if not trajectory.points:
             raise ComponentError("a trajectory without points", expected="one point or more")
@@ -173,7 +179,12 @@ class TrajectoryFollower:
         elapsed = self._check.elapsed(trajectory, now)
         # joints have to be at a point at the stamp by then
         start = elapsed if trajectory.points[-1].time_from_start == 0.0 else max(elapsed, 0.0)
-        kept = [each for each in self.waiting if each.names == names and each.start - each.time < start - elapsed]
+        begins = self._clock + start - elapsed
+        kept = [each for each in self.waiting if each.names == names and each.begins < begins]
+        if len(kept) == MOST_WAITING:
+            raise ComponentError(
+                f"{MOST_WAITING} trajectories wait for their stamps", expected="fewer, or stamps that are less far ahead"
+            )
         position, velocity = self._after(start - elapsed, kept)
         motion = self._check.motion(
             trajectory,
@@ -184,13 +195,13 @@ class TrajectoryFollower:
             elapsed=start,
         )
         deviation = _Deviation(self._robot, self._joints[places])
-        course = _Course(motion, elapsed, start, names=names, places=places, limits=limits, deviation=deviation)
+        course = _Course(motion, start, begins, names=names, places=places, limits=limits, deviation=deviation)
         if goal is not None:
             self._goal = course
             self._outcome = None
         elif any(each is self._goal for each in self.waiting) and not any(each is self._goal for each in kept):
             self._abort("another trajectory has taken over")
-        self.waiting = [*kept, course]
+        self.waiting = deque((*kept, course))
 
     def take_turn(self, period: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Let a trajectory take over that begins within some time [s].
@@ -198,20 +209,21 @@ class TrajectoryFollower:
         Returns:
             Its joints, and where they end, shape (m,) each [rad, m]; None: none begins.
         """
-        due = [each for each in self.waiting if each.time + period >= each.start]
-        if not due:
+        course = None
+        while self.waiting and self.waiting[0].begins <= self._clock + period:
+            course = self.waiting.popleft()
+            if self._goal is self._course:
+                self._abort("another trajectory has taken over")
+            self._course = course
+        if course is None:
             return None
-        self.waiting = self.waiting[len(due) :]
-        if self._goal is self._course or any(each is self._goal for each in due[:-1]):
-            self._abort("another trajectory has taken over")
-        self._course = course = due[-1]
+        course.time += self._clock - course.begins
         self.moving = True
         return course.places, course.motion.last
 
     def advance(self, period: float) -> None:
         """Move the joints on by the time of a cycle [s], and supervise the goal."""
-        for waiting in self.waiting:
-            waiting.time += period
+        self._clock += period
         course = self._course
         if course is None:
             return
@@ -273,14 +285,15 @@ class TrajectoryFollower:
             last = kept[-1] if kept else self._course
             if last is not None and (kept or self.moving):
                 desired, speed = np.zeros((2, len(last.places)))
-                last.motion.at(last.time + lead, desired, speed)
+                waited = self._clock - last.begins if kept else 0.0
+                last.motion.at(last.time + waited + lead, desired, speed)
                 position[last.places] = desired
                 velocity[last.places] = speed
         return position, velocity
 
     def _drop(self) -> None:
         self.moving = False
-        self.waiting = []
+        self.waiting.clear()
         self._course = None
 
     def _abort(self, why: str) -> None:
