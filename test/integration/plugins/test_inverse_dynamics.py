@@ -342,15 +342,20 @@ def test_an_arm_on_a_cart_draws_a_circle(tmp_path, monkeypatch):
         circle.check()
 
 
+def more(folder, plugins):
+    """Write the shipped configuration with more plugins into a folder; return its file."""
+    for name in ("robots", "references"):
+        (folder / name).symlink_to(CONFIG / name)
+    shutil.copytree(CONFIG / "support", folder / "support")
+    (folder / "support/upper_torques.yaml").write_text(PART)
+    file, text = folder / "centauro.yaml", (CONFIG / "centauro.yaml").read_text()
+    file.write_text(text.replace("\n    squat_estimated:", f"{plugins}\n    squat_estimated:", 1))
+    return file
+
+
 def test_hands_in_the_air_hold_nothing(tmp_path):
     """The contacts of both hands are in the robot's file; by the measured torques they bear nothing."""
-    for name in ("robots", "references"):
-        (tmp_path / name).symlink_to(CONFIG / name)
-    shutil.copytree(CONFIG / "support", tmp_path / "support")
-    (tmp_path / "support/upper_torques.yaml").write_text(PART)
-    file = tmp_path / "centauro.yaml"
-    text = (CONFIG / "centauro.yaml").read_text()
-    file.write_text(text.replace("\n    squat: &squat", f"{UPPER_BODY}\n    squat: &squat", 1))
+    file = more(tmp_path, UPPER_BODY)
     with contextlib.closing(World()) as world:
         world.run(1.0)
         plugin = world.plugin("upper_squat", file, target="solfer.components.inverse_dynamics:InverseDynamics")
@@ -360,4 +365,20 @@ def test_hands_in_the_air_hold_nothing(tmp_path):
         circle = Circle(world.bus, plugin)
         world.run(5.0)
         circle.check()
+        assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding
+
+
+def test_all_contacts_of_the_whole_robot_may_be_tracked(tmp_path):
+    with contextlib.closing(World()) as world:
+        world.run(1.0)
+        file = more(tmp_path, "\n    whole: {<<: *squat, track: all}")
+        plugin = world.plugin("whole", file, target="solfer.components.inverse_dynamics:InverseDynamics")
+        world.run(0.01)
+        watch = Watch(world.bus, plugin, world.simulation)
+        world.run(5.0)
+        watch.check(GRIP, 0.1)
+        ground = plugin.component.ground
+        legs = {f"{side}_leg" for side in ("front_left", "front_right", "rear_left", "rear_right")}
+        assert {name for name, ratio in zip(ground.names, ground.shares, strict=True) if ratio.any()} == legs
+        assert set(ground.names) == legs | {"left_arm", "right_arm"}
         assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding
