@@ -87,7 +87,7 @@ class SensedWorld(World):
 
 
 def test_it_squats_where_odometry_says_that_it_is():
-    """The true centre of mass stays within twice the bound of a base that is measured."""
+    """The true centre of mass stays within twice the bound of a base that is measured, and pushes shake no joint."""
     with contextlib.closing(SensedWorld()) as world:
         world.run(1.0)
         world.plugin("odometry", target="solfer.components.odometry:Odometry")
@@ -104,6 +104,13 @@ def test_it_squats_where_odometry_says_that_it_is():
         world.bus.every(0.005, look)
         world.run(4.5)
         assert np.sqrt(np.mean(np.sum(np.square(errors), axis=1))) < 0.01
+        joints = [index for index, name in enumerate(world.simulation.kinematics.dofs) if "wheel" not in name][6:]
+        world.simulation.pushes.add("pelvis", (85.0, 50.0, 0.0), (0.0, 0.0, 0.0), 0.3)
+        world.run(3.0)
+        speeds = []
+        world.bus.every(0.005, lambda: speeds.append(world.simulation.v[joints].copy()))
+        world.run(1.0)
+        assert np.std(np.diff(speeds, axis=0), axis=0).max() < 0.02
         assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding
 
 
