@@ -128,7 +128,7 @@ def test_the_robot_goes_the_same_way(undisturbed, file, tmp_path, repository, na
     assert (np.abs(driven.base[-1] - undisturbed.base[-1]) < near).all()
     if name in ("quiet", "busy", "skip"):
         assert_ends_as_the_file(driven)
-    # wheels that roll on against each other in a stall slip: 19 mm with 13 seeds, 54 mm at most
+    # wheels that roll on against each other in a stall slip: 20 mm with 16 seeds, 54 mm at most
     slipped = 0.005 + 0.25 * LATE.get(name, 0.0)
     assert np.linalg.norm(driven.estimate[:2]) < slipped and abs(driven.estimate[2]) < math.radians(0.5)
     assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)
