@@ -116,7 +116,7 @@ def end_by_signal(command, out, draw):
     process.wait(200.0)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("seed", range(20))
 def test_a_study_that_is_ended_has_the_same_table(undisturbed, tmp_path, seed):
     """Signals end it, on any engine of this machine; no run is done twice but those that were ended."""
