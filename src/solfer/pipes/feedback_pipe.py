@@ -394,7 +394,10 @@ class StateFeedbackPipe(FeedbackPipe):
                 if status is NEW and not self._accept():
                     status = OLD
                 if status is NEW:
-                    sole.note(self.part, reader.arrival)
+                    if self.part is sole.part:
+                        sole.note(reader.arrival)
+                    else:
+                        precedence.note(sole.name, self.part, reader.arrival)
                     self._write_fields()
             else:
                 status = self._arbitrate(publishers)

@@ -121,7 +121,11 @@ class NameOrder:
 
     def absent(self) -> list[str]:
         """List the names that no message has contained so far."""
-        return [name for name, not_received in zip(self._pipe_names, self.not_received, strict=True) if not_received]
+        return self.names(self.not_received)
+
+    def names(self, flags: np.ndarray) -> list[str]:
+        """List the pipe's names at which `flags` are true, shape (len(pipe_names),)."""
+        return [name for name, is_one in zip(self._pipe_names, flags, strict=True) if is_one]
 
     def _warn(self, unknown: Sequence[str]) -> None:
         """Name those that are ignored for the first time."""

@@ -6,41 +6,35 @@ import numpy as np
 
 from solfer.transport.endpoints import RIVALRY
 
-NEVER = object()
-"""The `part` of a publisher without an accepted message."""
-
 
 class Owner:
-    """A publisher that counts for its DoFs.
+    """A publisher that counts for the DoFs of its messages; one whose messages have other DoFs at times is several.
 
     Args:
         name: Its name.
+        part: Indices of the DoFs in its messages; None: all.
         size: DoFs of the pipe.
 
     Attributes:
-        name: Its name.
+        name, part: See above.
         arrival: Arrival of its newest accepted message, in the pipe's own clock [s].
-        part: Indices of the DoFs in its newest message; None: all.
-        dofs: Flags of the DoFs that it publishes, shape (size,).
+        dofs: Flags of the DoFs that it publishes and that no newer message of it without the others has, shape (size,).
+        lost: Whether some of its DoFs are not among these.
         strikes: Messages of others in a row that arrived after its timeout.
     """
 
-    def __init__(self, name: str, size: int):
+    def __init__(self, name: str, part: np.ndarray | None, size: int):
         self.name = name
+        self.part = part
         self.arrival = -math.inf
         self.strikes = 0
-        self.part: object = NEVER
         self.dofs = np.zeros(size, dtype=bool)
+        self.lost = True
 
-    def note(self, part: np.ndarray | None, arrival: float) -> bool:
-        """Record an accepted message with the DoFs `part` that arrived at `arrival` [s]; return whether they differ."""
+    def note(self, arrival: float) -> None:
+        """Record an accepted message that arrived at `arrival` [s]."""
         self.arrival = arrival
         self.strikes = 0
-        differs = part is not self.part
-        if differs:
-            self.part = part
-            self.dofs[slice(None) if part is None else part] = True
-        return differs
 
 
 class Watch:
@@ -93,7 +87,7 @@ class Precedence:
         self.sole: Owner | None = None
         self._size = size
         self._watches: list[Watch] = []
-        self._owners: dict[str, Owner] = {}
+        self._owners: dict[tuple[str, int], Owner] = {}  # by name and identity of the part
         self._rivalries: dict[str, tuple[float, tuple[Owner, ...]]] = {}
 
     def watch(self, watch: Watch) -> None:
@@ -111,7 +105,7 @@ class Precedence:
             return True
         if all([self._outlasts(owner, arrival) for owner in rivals]):
             for owner in rivals:
-                del self._owners[owner.name]
+                del self._owners[owner.name, id(owner.part)]
             self.handovers += 1
             return True
         self.ignored += 1
@@ -122,10 +116,13 @@ class Precedence:
 
     def note(self, name: str, part: np.ndarray | None, arrival: float) -> None:
         """Record an accepted message; see `admits`."""
-        owner = self._owners.get(name)
+        key = name, id(part)
+        owner = self._owners.get(key)
         if owner is None:
-            owner = self._owners[name] = Owner(name, self._size)
-        if owner.note(part, arrival):
+            owner = self._owners[key] = Owner(name, part, self._size)
+        owner.note(arrival)
+        if owner.lost:
+            self._take(owner)
             self._arrange()
 
     def rivals(self, since: float) -> list[str]:
@@ -137,6 +134,18 @@ class Precedence:
             if present:
                 names |= {name, *present}
         return sorted(names)
+
+    def _take(self, owner: Owner) -> None:
+        """Let an owner have all of its DoFs, and no other owner of its publisher any of them."""
+        selected = slice(None) if owner.part is None else owner.part
+        for key, other in list(self._owners.items()):
+            if other.name == owner.name and other.dofs[selected].any():
+                other.dofs[selected] = False
+                other.lost = True
+                if other is not owner and not other.dofs.any():
+                    del self._owners[key]
+        owner.dofs[selected] = True
+        owner.lost = False
 
     def _arrange(self) -> None:
         """Find out which publisher is the only one, or which of several each watch has."""

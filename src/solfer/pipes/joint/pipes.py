@@ -107,6 +107,14 @@ class JointFeedbackPipe(StateFeedbackPipe):
         whole = super().lacks
         return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._names.not_received) else whole
 
+    @property
+    def silent(self) -> str:
+        """See `FeedbackPipe.silent`; with the joints that its newer messages lack."""
+        stalest = None if self._watch is None else self._watch.stalest
+        if stalest is None or not stalest.lost:
+            return super().silent
+        return f"{stalest.name} ({', '.join(self._names.names(stalest.dofs))})"
+
     def check_start(self) -> None:
         """See `FeedbackPipe.check_start`."""
         if self._limits is not None and self.received:

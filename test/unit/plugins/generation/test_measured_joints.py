@@ -59,7 +59,7 @@ class Halves:
     def publish(self, names):
         """Publish joints where they are at home, by a driver of their own."""
         bus, topic = self.others.bus, ("halves", "sensor_msgs/JointState")
-        driver = self._drivers.setdefault(names, MemoryMiddleware(bus, f"driver_of_{names[0]}").writer(*topic))
+        driver = self._drivers.setdefault(names[0], MemoryMiddleware(bus, f"driver_of_{names[0]}").writer(*topic))
         noise = 1e-6 * np.sin(1e3 * bus.time)  # a sensor whose numbers stay is frozen
         position = np.array([HOME[name] + noise for name in names])
         driver.write(JointMessage(names, position, np.zeros(len(names)), np.zeros(len(names)), stamp=bus.time))
@@ -113,6 +113,23 @@ def test_a_plugin_holds_without_one_of_its_drivers(tmp_path, drivers, caplog):
     halves.run(0.5, drivers[1])
     assert not halves.running
     halves.run(0.5, *drivers)
+    assert halves.running
+
+
+@pytest.mark.parametrize("lost", [("roll",), ("elbow", "roll")])
+def test_a_driver_that_leaves_joints_out_is_a_timeout(tmp_path, lost, caplog):
+    """Its other messages go on, under the same name; so does the plugin when the joints are back, in any order."""
+    halves = Halves(tmp_path, benches.JOINTS)
+    halves.run(0.5, benches.JOINTS)
+    assert halves.running
+    rest = tuple(name for name in benches.JOINTS if name not in lost)
+    halves.run(0.5, rest)
+    assert not halves.running and f"nothing new of driver_of_shoulder ({', '.join(lost)}) for 0.1" in caplog.text
+    halves.run(0.5, ("shoulder", "roll", "elbow"))
+    assert halves.running
+    for _ in range(20):  # messages with other joints in turn
+        halves.run(0.02, ("shoulder", "elbow"))
+        halves.run(0.02, ("shoulder", "roll"))
     assert halves.running
 
 
