@@ -72,12 +72,12 @@ class Page:
         self._control: PageControl | None = None
         self.foxglove: FoxgloveServer | None = None
         if playback is not None:
-            self._time_line = TimeLine(self._viser, self._requests, playback)
-            self._plots = Plots(gui, self._requests, playback)
+            self._time_line = TimeLine(server, self._requests, playback)
+            self._plots = Plots(gui, self._requests, playback, incoming=server.incoming)
             return
         EmergencyStopButton(self._viser, self._requests, stop)
         self._columns = LiveColumns(middleware)
-        self._plots = Plots(gui, self._requests, self._columns)
+        self._plots = Plots(gui, self._requests, self._columns, incoming=server.incoming)
         self._control = PageControl(server, self._requests, middleware) if control else None
         self._parameters = KnownParameters(middleware)
         self._tabs = PluginTabs(gui, self._requests, self._parameters, control=self._control)

@@ -1,9 +1,12 @@
 """The server of the page: on this machine alone, and for those alone that know its address."""
 
+import asyncio
 import http
+import logging
 import secrets
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 from unittest.mock import patch
 
@@ -16,7 +19,9 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from solfer.errors import MiddlewareError
+from solfer.errors import MiddlewareError, described
+from solfer.throttle import Throttle
+from solfer.view.incoming import LARGEST_MESSAGE, IncomingMessages
 
 HOST = "127.0.0.1"
 
@@ -35,6 +40,29 @@ HEADERS = {
 }
 """Of the page: neither stored nor shown inside of another one, and its address is not passed on."""
 
+logger = logging.getLogger(__name__)
+
+throttle = Throttle(logger)
+
+
+class _OneLine(logging.Handler):
+    """Logs in one line, once a second, what the server says with a traceback for each connection."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """See `logging.Handler.emit`."""
+        error = record.exc_info[1] if record.exc_info else None
+        _log(record.getMessage(), error)
+
+
+def _log(text: str, error: BaseException | None) -> None:
+    throttle.warning(text, "%s%s", text, "" if error is None else f": {described(error)}")
+
+
+quiet = logging.getLogger(f"{__name__}.websockets")
+quiet.propagate = False
+quiet.setLevel(logging.WARNING)
+quiet.addHandler(_OneLine())
+
 Handler = Callable[[ServerConnection], Awaitable[None]]
 Process = Callable[[ServerConnection, Request], Response | None | Awaitable[Response | None]]
 
@@ -50,6 +78,7 @@ class PageServer:
     Attributes:
         viser: What is on the page.
         address: Address of the page.
+        incoming: Judges what pages send.
         lives: What notes a sign of life, in the server's thread, by the random key of a page.
 
     Raises:
@@ -67,8 +96,7 @@ class PageServer:
         if not self._is_guarded:
             self.viser.stop()
             raise MiddlewareError("this version of viser cannot be guarded", expected="that of requirements-view.txt")
-        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):  # a way from other machines
-            self.connection.unregister_handler(message)
+        self.incoming = IncomingMessages(self.viser)
         self.address = f"http://localhost:{self.viser.get_port()}/{self._token}/"
 
     @property
@@ -95,7 +123,10 @@ class PageServer:
                 if refusal is not None:
                     return refusal
                 request.path = request.path.removeprefix(f"/{self._token}") or "/"
-                response = process_request(connection, request)
+                try:
+                    response = process_request(connection, request)
+                except OSError:  # a path that no file can have
+                    response = Response(http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"")
                 if isinstance(response, Response):
                     response.headers.update(HEADERS)
                 return response
@@ -104,6 +135,8 @@ class PageServer:
                 assert connection.request is not None
                 kind, _, key = connection.request.path.strip("/").partition("/")
                 if kind != LIFE:
+                    receive = partial(self.incoming.receive, connection, connection.recv)
+                    connection.recv = receive  # type: ignore[method-assign]
                     return await handler(connection)
                 with suppress(ConnectionClosed):
                     async for _ in connection:
@@ -111,6 +144,10 @@ class PageServer:
                             return
                         self.lives[key]()
 
+            asyncio.get_running_loop().set_exception_handler(
+                lambda _, context: _log(context["message"].partition("\n")[0], context.get("exception"))
+            )
+            options |= {"max_size": LARGEST_MESSAGE, "logger": quiet}
             return serve(handle, *arguments, process_request=process, **options)
 
         return guarded

@@ -49,7 +49,7 @@ def test_a_mesh_without_a_unit_that_can_be_read_is_left_out(tmp_path, caplog, un
     text = robot('rgba="1 1 1 1"', '<mesh filename="a.dae"/>')
     with caplog.at_level(logging.WARNING):
         assert not visuals_of(Description.from_text(text, str(tmp_path / "r.urdf")))["a"]
-    assert "meshes that cannot be read are left out: a.dae" in caplog.text
+    assert "shapes that cannot be read are left out: a.dae" in caplog.text
 
 
 def test_units_of_a_mesh_and_its_scale_count(tmp_path):
