@@ -1,11 +1,17 @@
 """A server for Foxglove: joints, frames, odometry, forces, columns and parameters, by its websocket protocol."""
 
+import asyncio
 import json
+import secrets
 import time
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
 import numpy as np
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
 
 from solfer.errors import MiddlewareError, MissingDependency
 from solfer.interfaces.declaration import Accepted
@@ -17,7 +23,7 @@ from solfer.view.control import PageControl
 from solfer.view.drawing import FORCE_SCALE, FORCES
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
-from solfer.view.server import HOST
+from solfer.view.server import PageServer
 
 try:
     import foxglove
@@ -45,15 +51,18 @@ except ModuleNotFoundError as error:
         expected="pip install -r requirements-view.txt",
     ) from error
 
-FOXGLOVE_PORT = 8765
-"""Where Foxglove looks first."""
+FOXGLOVE = "foxglove"
+"""Path of the server below the token of the page."""
 
 
 class FoxgloveServer(ServerListener):
-    """Serves what a page shows, on this machine alone.
+    """Serves what a page shows, at the address of the page.
+
+    The server of foxglove-sdk checks neither origin nor token. So the page's server does, and relays; the one behind it
+    has a random address of this machine, which no web page finds, and only relayed clients have parameters.
 
     Args:
-        port: Its port; 0: any.
+        server: The page.
         requests: Calls the services of parameters.
         columns: Numbers over time, one message of all.
         parameters: Those of the parts.
@@ -68,7 +77,7 @@ class FoxgloveServer(ServerListener):
 
     def __init__(
         self,
-        port: int,
+        server: PageServer,
         requests: PageRequests,
         columns: PlottedColumns,
         parameters: KnownParameters,
@@ -82,6 +91,8 @@ class FoxgloveServer(ServerListener):
         self._joints = middleware.reader("joint_states", "sensor_msgs/JointState")
         self._odometry = middleware.reader("odometry/odom", "nav_msgs/Odometry")
         self._published: dict[str, Any] = {}
+        self._secret = secrets.token_urlsafe()
+        self._relayed: set[int] = set()
         context = Context()
         self._context = context  # channels end with it
         self._joint_states = JointStatesChannel("/joint_states", context=context)
@@ -89,18 +100,21 @@ class FoxgloveServer(ServerListener):
         self._odom = OdometryChannel("/odometry", context=context)
         self._forces = SceneUpdateChannel("/forces", context=context)
         self._numbers = Channel("/columns", message_encoding="json", context=context)
+        host = ".".join(map(str, (127, *(1 + secrets.randbelow(254) for _ in range(3)))))
         try:
             self._server = foxglove.start_server(
                 name="solfer",
-                host=HOST,
-                port=port,
+                host=host,
+                port=0,
                 capabilities=[Capability.Parameters],
                 server_listener=self,
                 context=context,
             )
-        except Exception as error:  # whatever the library raises for a port that is taken
-            raise MiddlewareError(f"no server for Foxglove at port {port}: {error}", expected="a free port") from None
-        self.address = f"ws://localhost:{self._server.port}"
+        except Exception as error:  # whatever the library raises
+            raise MiddlewareError(f"no server for Foxglove: {error}") from None
+        self._behind = f"ws://{host}:{self._server.port}"
+        server.routes[FOXGLOVE] = self._relay
+        self.address = f"{server.address.replace('http', 'ws', 1)}{FOXGLOVE}"
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is new; of a channel without subscribers nothing is made."""
@@ -144,6 +158,10 @@ class FoxgloveServer(ServerListener):
         self, client: Client, param_names: list[str], request_id: str | None = None
     ) -> list[Parameter]:
         """Return parameters; without names all."""
+        if request_id == self._secret:
+            self._relayed.add(client.id)
+        if client.id not in self._relayed:
+            return []
         values = self._values()
         return [_parameter(name, value) for name, value in values.items() if not param_names or name in param_names]
 
@@ -151,13 +169,30 @@ class FoxgloveServer(ServerListener):
         self, client: Client, parameters: list[Parameter], request_id: str | None = None
     ) -> list[Parameter]:
         """Let parameters change; their present values are returned, and the new ones published once they count."""
+        known = self._values()
         for each in parameters:
-            self._requests.submit(partial(self._set, each.name, each.get_value()))
+            if client.id in self._relayed and each.name in known:
+                self._requests.submit((FOXGLOVE, each.name), partial(self._set, each))
         return self.on_get_parameters(client, [each.name for each in parameters])
 
-    def _set(self, name: str, value: Any) -> None:
-        part, _, parameter = name.partition(".")
-        self._published.pop(name, None)  # what is refused is published as it is
+    async def _relay(self, connection: ServerConnection) -> None:
+        """Pass on what a client and the server send, after the server knows that it is relayed."""
+        protocols = [connection.subprotocol] if connection.subprotocol else None
+        async with connect(self._behind, subprotocols=protocols, max_size=None, proxy=None) as server:
+            await server.send(json.dumps({"op": "getParameters", "parameterNames": [], "id": self._secret}))
+            async for message in server:
+                if isinstance(message, str) and self._secret in message:
+                    break
+                await connection.send(message)
+            ways = [asyncio.create_task(_pass_on(*each)) for each in ((connection, server), (server, connection))]
+            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            for way in ways:
+                way.cancel()
+
+    def _set(self, changed: Parameter) -> None:
+        part, _, parameter = changed.name.partition(".")
+        value = changed.get_value()
+        self._published.pop(changed.name, None)  # what is refused is published as it is
         if self._control is None or not self._control.is_free:
             return
         text = value if isinstance(value, str) else json.dumps(value)
@@ -193,6 +228,12 @@ class FoxgloveServer(ServerListener):
         message = self._odometry.message
         pose = Pose(position=_vector(message.position), orientation=_turn(message.orientation))
         self._odom.log(Odometry(timestamp=stamp, frame_id=message.frame, body_frame_id=message.child, pose=pose))
+
+
+async def _pass_on(source: ServerConnection | ClientConnection, sink: ServerConnection | ClientConnection) -> None:
+    with suppress(ConnectionClosed):
+        async for message in source:
+            await sink.send(message)
 
 
 def _vector(numbers: np.ndarray) -> Vector3:

@@ -4,7 +4,7 @@ import asyncio
 import http
 import logging
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -18,6 +18,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
+from websockets.typing import Subprotocol
 
 from solfer.errors import MiddlewareError, described
 from solfer.throttle import Throttle
@@ -32,6 +33,9 @@ FIRST_PORT = 8080
 
 LIFE = "life"
 """Path of the websockets by which pages show that they live."""
+
+PROGRAM_ORIGINS = ("https://app.foxglove.dev", "file://")
+"""Origins that `routes` accept besides that of the page and none: Foxglove in the browser, and on the desktop."""
 
 HEADERS = {
     "Cache-Control": "no-store",
@@ -79,6 +83,7 @@ class PageServer:
         viser: What is on the page.
         address: Address of the page.
         incoming: Judges what pages send.
+        routes: What serves websockets of other programs, by the path below the token.
         lives: What notes a sign of life, in the server's thread, by the random key of a page.
 
     Raises:
@@ -90,6 +95,7 @@ class PageServer:
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
         self.lives: dict[str, Callable[[], None]] = {}
+        self.routes: dict[str, Handler] = {}
         # viser has no hook for requests
         with patch.object(websockets.asyncio.server, "serve", self._guarded(websockets.asyncio.server.serve)):
             self.viser = viser.ViserServer(HOST, port, label="solfer", verbose=False)
@@ -134,6 +140,8 @@ class PageServer:
             async def handle(connection: ServerConnection) -> None:
                 assert connection.request is not None
                 kind, _, key = connection.request.path.strip("/").partition("/")
+                if kind in self.routes:
+                    return await self.routes[kind](connection)
                 if kind != LIFE:
                     receive = partial(self.incoming.receive, connection, connection.recv)
                     connection.recv = receive  # type: ignore[method-assign]
@@ -147,7 +155,7 @@ class PageServer:
             asyncio.get_running_loop().set_exception_handler(
                 lambda _, context: _log(context["message"].partition("\n")[0], context.get("exception"))
             )
-            options |= {"max_size": LARGEST_MESSAGE, "logger": quiet}
+            options |= {"max_size": LARGEST_MESSAGE, "logger": quiet, "select_subprotocol": _subprotocol}
             return serve(handle, *arguments, process_request=process, **options)
 
         return guarded
@@ -156,12 +164,18 @@ class PageServer:
         """Return the answer to a request that is none of this page's; None: it is one."""
         hosts = [f"{name}:{connection.local_address[1]}" for name in HOST_NAMES]
         origins = [f"http://{host}" for host in hosts]
-        token = request.path.partition("?")[0].split("/")[1:2]
+        _, token, kind, *_ = [*request.path.partition("?")[0].split("/"), "", ""]
         headers = request.headers
+        is_routed = kind in self.routes
+        origins += PROGRAM_ORIGINS if is_routed else ()
         own = (
-            secrets.compare_digest("".join(token).encode(), self._token.encode())
+            secrets.compare_digest(token.encode(), self._token.encode())
             and headers.get_all("Host") in [[host] for host in hosts]
             and all(origin in origins for origin in headers.get_all("Origin"))
-            and ("Upgrade" not in headers or "Origin" in headers)
+            and ("Upgrade" not in headers or "Origin" in headers or is_routed)
         )
         return None if own else Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), b"")
+
+
+def _subprotocol(_: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
+    return next((each for each in offered if each.startswith(("viser-v", "foxglove."))), None)

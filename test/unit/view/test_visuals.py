@@ -57,3 +57,24 @@ def test_units_of_a_mesh_and_its_scale_count(tmp_path):
     text = robot('rgba="1 1 1 1"', '<mesh filename="a.dae" scale="1 1 2"/>')
     (visual,) = visuals_of(Description.from_text(text, str(tmp_path / "r.urdf")))["a"]
     np.testing.assert_allclose(np.ptp(visual.mesh.bounds, axis=0), (0.1, 0.2, 0.6), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        '<box size="a b c"/>',
+        '<box size="1 2"/>',
+        '<box size="nan 1 1"/>',
+        "<box/>",
+        '<sphere radius="1 2"/>',
+        '<cylinder radius="1m" length="1"/>',
+        '<capsule radius="" length="1"/>',
+    ],
+)
+def test_a_shape_that_cannot_be_read_is_left_out(caplog, geometry):
+    text = robot('rgba="1 1 1 1"', geometry + '<sphere radius="2"/>')
+    with caplog.at_level(logging.WARNING):
+        (visual,) = visuals_of(Description.from_text(text, "r.urdf"))["a"]
+    np.testing.assert_allclose(np.ptp(visual.mesh.bounds, axis=0), 4.0, atol=0.1)
+    (line,) = caplog.messages
+    assert line == f"shapes that cannot be read are left out: {geometry[1:].split()[0].rstrip('/>')}"
