@@ -86,8 +86,8 @@ def _place(origin: Element | None) -> np.ndarray:
     """Return the transform of an origin, shape (4, 4)."""
     place = np.eye(4)
     if origin is not None:
-        place[:3, :3] = rotation_from_rpy(_numbers(origin, "rpy", 3, "0 0 0"))
-        place[:3, 3] = _numbers(origin, "xyz", 3, "0 0 0")
+        place[:3, :3] = rotation_from_rpy(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
+        place[:3, 3] = _numbers(origin, "xyz", (0.0, 0.0, 0.0))
     return place
 
 
@@ -98,19 +98,19 @@ def _mesh(geometry: Element, where: str) -> trimesh.Trimesh:
         Exception: It cannot be made, whatever its reader raises then.
     """
     if geometry.tag == "box":
-        return creation.box(_numbers(geometry, "size", 3))
+        return creation.box(_numbers(geometry, "size"))
     if geometry.tag == "sphere":
-        return creation.icosphere(2, *_numbers(geometry, "radius", 1))
+        return creation.icosphere(2, *_numbers(geometry, "radius"))
     if geometry.tag in ("cylinder", "capsule"):
-        (radius,) = _numbers(geometry, "radius", 1)
-        (length,) = _numbers(geometry, "length", 1)
+        (radius,) = _numbers(geometry, "radius")
+        (length,) = _numbers(geometry, "length")
         return creation.cylinder(radius, length) if geometry.tag == "cylinder" else creation.capsule(length, radius)
     path = find_mesh(where, geometry.get("filename", ""))
     if path is None:
         raise ValueError
     mesh = trimesh.load_mesh(path)
     scale = np.eye(4)
-    scale[(0, 1, 2), (0, 1, 2)] = unit_of(path) * np.array(_numbers(geometry, "scale", 3, "1 1 1"))
+    scale[(0, 1, 2), (0, 1, 2)] = unit_of(path) * np.array(_numbers(geometry, "scale", (1.0, 1.0, 1.0)))
     mesh.apply_transform(scale)
     return mesh
 
@@ -140,13 +140,6 @@ def _color(shape: Element, materials: dict[str, Element]) -> tuple[Color, str]:
     return (red, green, blue, opacity), "" if is_right else fault
 
 
-def _numbers(element: Element, attribute: str, count: int, default: str = "") -> list[float]:
-    """Return the numbers of an attribute.
-
-    Raises:
-        ValueError: There are more or fewer, or one is not finite.
-    """
-    numbers = [float(each) for each in element.get(attribute, default).split()]
-    if len(numbers) != count or not np.isfinite(numbers).all():
-        raise ValueError
-    return numbers
+def _numbers(element: Element, attribute: str, default: tuple[float, ...] = ()) -> list[float]:
+    text = element.get(attribute)
+    return list(default) if text is None else [float(each) for each in text.split()]

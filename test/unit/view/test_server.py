@@ -2,6 +2,7 @@
 
 import http.client
 import socket
+from contextlib import closing
 
 import msgspec
 import pytest
@@ -78,11 +79,11 @@ def test_no_page_opens_a_way_from_other_machines(server):
     assert server.viser._share_tunnel is None
 
 
-@pytest.mark.parametrize("length", [300, 3000, 9000])
+@pytest.mark.parametrize("length", [300, 3000])
 def test_a_path_that_no_file_can_have_is_not_found(server, length):
     path = "/" + server.address.split("/", 3)[3]
-    assert status(server, path + length * "a")[0] in (404, 414, 400)[: 3 if length > 8000 else 2]
-    assert status(server, path + "a/" * (length // 4))[0] in (404, 414)
+    assert status(server, path + length * "a")[0] == 404
+    assert status(server, path + "a/" * (length // 2))[0] == 404
 
 
 JUNK = {
@@ -102,8 +103,8 @@ JUNK = {
 }
 
 
-def test_junk_is_one_line_and_the_page_goes_on(server, caplog, capfd):
-    with opened_page(server.address) as page:
+def test_junk_is_one_line_and_the_page_goes_on(caplog, capfd):
+    with closing(PageServer(0)) as server, opened_page(server.address) as page:
         page.receive(0.3)
         for _ in range(20):
             for junk in JUNK.values():
