@@ -30,8 +30,8 @@ class EmergencyStopButton:
     async def _confirm(self, event: GuiEvent[GuiButtonHandle]) -> None:
         if event.client is None:
             return
-        for asked in tuple(event.client.gui._modal_handle_from_uuid.values()):
-            asked.close()
+        for question in tuple(event.client.gui._modal_handle_from_uuid.values()):
+            question.close()
         with event.client.gui.add_modal("emergency stop") as modal:
             confirm = event.client.gui.add_button(CONFIRM, color="red")
             cancel = event.client.gui.add_button("cancel")

@@ -1,17 +1,12 @@
 """A server for Foxglove: joints, frames, odometry, forces, columns and parameters, by its websocket protocol."""
 
-import asyncio
 import json
 import secrets
 import time
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
 import numpy as np
-from websockets.asyncio.client import ClientConnection, connect
-from websockets.asyncio.server import ServerConnection
-from websockets.exceptions import ConnectionClosed
 
 from solfer.errors import MiddlewareError, MissingDependency
 from solfer.interfaces.declaration import Accepted
@@ -21,6 +16,7 @@ from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters
 from solfer.view.columns import PlottedColumns
 from solfer.view.control import PageControl
 from solfer.view.drawing import FORCE_SCALE, FORCES
+from solfer.view.foxglove_relay import FOXGLOVE, FoxgloveRelay
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
@@ -51,9 +47,6 @@ except ModuleNotFoundError as error:
         expected="pip install -r requirements-view.txt",
     ) from error
 
-FOXGLOVE = "foxglove"
-"""Path of the server below the token of the page."""
-
 
 class FoxgloveServer(ServerListener):
     """Serves what a page shows, at the address of the page.
@@ -67,9 +60,6 @@ class FoxgloveServer(ServerListener):
         columns: Numbers over time, one message of all.
         parameters: Those of the parts.
         control: Lets parameters change while no page commands; None: they do not change.
-
-    Attributes:
-        address: Address of the server.
 
     Raises:
         MiddlewareError: It cannot be served.
@@ -91,8 +81,6 @@ class FoxgloveServer(ServerListener):
         self._joints = middleware.reader("joint_states", "sensor_msgs/JointState")
         self._odometry = middleware.reader("odometry/odom", "nav_msgs/Odometry")
         self._published: dict[str, Any] = {}
-        self._secret = secrets.token_urlsafe()
-        self._relayed: set[int] = set()
         context = Context()
         self._context = context  # channels end with it
         self._joint_states = JointStatesChannel("/joint_states", context=context)
@@ -111,10 +99,13 @@ class FoxgloveServer(ServerListener):
                 context=context,
             )
         except Exception as error:  # whatever the library raises
-            raise MiddlewareError(f"no server for Foxglove: {error}") from None
-        self._behind = f"ws://{host}:{self._server.port}"
-        server.routes[FOXGLOVE] = self._relay
-        self.address = f"{server.address.replace('http', 'ws', 1)}{FOXGLOVE}"
+            raise MiddlewareError(f"no server for Foxglove: {error}", expected="a free port") from None
+        self._relay = FoxgloveRelay(server, f"ws://{host}:{self._server.port}")
+
+    @property
+    def address(self) -> str:
+        """Address of the server, with the token of the page."""
+        return self._relay.address
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is new; of a channel without subscribers nothing is made."""
@@ -158,9 +149,7 @@ class FoxgloveServer(ServerListener):
         self, client: Client, param_names: list[str], request_id: str | None = None
     ) -> list[Parameter]:
         """Return parameters; without names all."""
-        if request_id == self._secret:
-            self._relayed.add(client.id)
-        if client.id not in self._relayed:
+        if not self._relay.knows(client.id, request_id):
             return []
         values = self._values()
         return [_parameter(name, value) for name, value in values.items() if not param_names or name in param_names]
@@ -171,23 +160,9 @@ class FoxgloveServer(ServerListener):
         """Let parameters change; their present values are returned, and the new ones published once they count."""
         known = self._values()
         for each in parameters:
-            if client.id in self._relayed and each.name in known:
+            if self._relay.knows(client.id) and each.name in known:
                 self._requests.submit((FOXGLOVE, each.name), partial(self._set, each))
         return self.on_get_parameters(client, [each.name for each in parameters])
-
-    async def _relay(self, connection: ServerConnection) -> None:
-        """Pass on what a client and the server send, after the server knows that it is relayed."""
-        protocols = [connection.subprotocol] if connection.subprotocol else None
-        async with connect(self._behind, subprotocols=protocols, max_size=None, proxy=None) as server:
-            await server.send(json.dumps({"op": "getParameters", "parameterNames": [], "id": self._secret}))
-            async for message in server:
-                if isinstance(message, str) and self._secret in message:
-                    break
-                await connection.send(message)
-            ways = [asyncio.create_task(_pass_on(*each)) for each in ((connection, server), (server, connection))]
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            for way in ways:
-                way.cancel()
 
     def _set(self, changed: Parameter) -> None:
         part, _, parameter = changed.name.partition(".")
@@ -228,12 +203,6 @@ class FoxgloveServer(ServerListener):
         message = self._odometry.message
         pose = Pose(position=_vector(message.position), orientation=_turn(message.orientation))
         self._odom.log(Odometry(timestamp=stamp, frame_id=message.frame, body_frame_id=message.child, pose=pose))
-
-
-async def _pass_on(source: ServerConnection | ClientConnection, sink: ServerConnection | ClientConnection) -> None:
-    with suppress(ConnectionClosed):
-        async for message in source:
-            await sink.send(message)
 
 
 def _vector(numbers: np.ndarray) -> Vector3:

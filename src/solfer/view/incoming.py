@@ -113,6 +113,8 @@ def _decoded(raw: str | bytes) -> _messages.Message:
     Raises:
         ValueError, TypeError, KeyError, RecursionError: It is none.
     """
+    if isinstance(raw, str):
+        raise TypeError
     fields = msgspec.msgpack.decode(raw, type=dict[str, Any])
     message = msgspec.convert(fields, MESSAGE_TYPES[fields.pop("type")], strict=False)
     if not _is_finite(tuple(vars(message).values())):

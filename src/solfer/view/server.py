@@ -144,7 +144,7 @@ class PageServer:
                     return await self.routes[kind](connection)
                 if kind != LIFE:
                     receive = partial(self.incoming.receive, connection, connection.recv)
-                    connection.recv = receive  # type: ignore[method-assign]
+                    connection.recv = receive  # type: ignore[method-assign, assignment]
                     return await handler(connection)
                 with suppress(ConnectionClosed):
                     async for _ in connection:

@@ -134,7 +134,7 @@ def test_only_programs_with_the_token_are_served(repository):
             with pytest.raises(InvalidStatus):
                 connect(wrong, subprotocols=[PROTOCOL], origin=origin)
         connect(address, subprotocols=[PROTOCOL], origin="https://app.foxglove.dev").close()
-        with connect(bench.page.foxglove._behind, subprotocols=[PROTOCOL]) as connection:
+        with connect(bench.page.foxglove._relay.behind, subprotocols=[PROTOCOL]) as connection:
             client = Client(connection)
             bench.clients.append(client_of(client))
             client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 9.0}], id="set")
