@@ -30,7 +30,7 @@ MESSAGE_TYPES = {
         *DRAG_MESSAGES,
     )
 }
-"""All that pages send; viser would also take files, and open a way from other machines."""
+"""All that pages send; viser would also take files, and be reached from other machines."""
 
 logger = logging.getLogger(__name__)
 
@@ -108,7 +108,7 @@ class IncomingMessages:
 
 
 def _decoded(raw: str | bytes) -> _messages.Message:
-    """Make a message of its bytes, strictly: viser's own way accepts any shape, and warns without a bound.
+    """Make a message of its bytes, strictly: viser itself accepts any shape, and warns without a bound.
 
     Raises:
         ValueError, TypeError, KeyError, RecursionError: It is none.
