@@ -50,7 +50,7 @@ throttle = Throttle(logger)
 
 
 class _OneLine(logging.Handler):
-    """Logs in one line, once a second, what the server says with a traceback for each connection."""
+    """Logs in one line, once a second, what the server logs with a traceback for each connection."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """See `logging.Handler.emit`."""
