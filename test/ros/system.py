@@ -241,6 +241,10 @@ def started(*command: str, **environment: str) -> Iterator[subprocess.Popen]:
     ) as process:
         try:
             yield process
+        except BaseException:
+            with contextlib.suppress(subprocess.TimeoutExpired):  # what it has started ends with it, and disturbs no later test
+                end(process, signal.SIGINT)
+            raise
         finally:
             process.kill()
 
