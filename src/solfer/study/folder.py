@@ -34,7 +34,7 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from solfer.errors import StudyError
-from solfer.study.plan import ENDING, ROW, Plan, PlannedRun, ShortHash, Study, study_of
+from solfer.study.plan import OUTCOME, ROW, Plan, PlannedRun, ShortHash, Study, study_of
 from solfer.study.result import Result
 
 STUDY = "study.json"
@@ -301,7 +301,7 @@ class StudyFolder:
                 continue
             row: dict[str, Any] = dict(zip(ROW, (run.index, run.id, run.seed), strict=True))
             row |= {name: _cell(run.variations.get(name)) for name in names}
-            row |= zip(ENDING, (int(not result.done), result.failure.replace("\n", " ")), strict=True)
+            row |= zip(OUTCOME, (int(not result.done), result.failure.replace("\n", " ")), strict=True)
             yield row | {name: result.measures.get(name) for name in self.study.record.measure}
 
     def write_table(self) -> list[Path]:
@@ -311,7 +311,7 @@ class StudyFolder:
             StudyError: It cannot be written.
         """
         rows = list(self.rows())
-        head = [*ROW, *self.study.names, *ENDING, *self.study.record.measure]
+        head = [*ROW, *self.study.names, *OUTCOME, *self.study.record.measure]
         text = io.StringIO()
         writer = csv.DictWriter(text, head, lineterminator="\n")
         writer.writeheader()
@@ -365,7 +365,7 @@ def _write(folder: Path, data: StudyFile) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """Say in one line why a file cannot be read."""
+    """Return in one line why a file cannot be read."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_input=False)[0]

@@ -42,7 +42,7 @@ VARYING = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
 ROW = ("run", "id", "seed")
 """First columns of the table, before those of variations."""
 
-ENDING = ("failed", "failure")
+OUTCOME = ("failed", "failure")
 """Columns of the table between those of variations and of measures."""
 
 MOST_RUNS = 1_000_000
@@ -239,7 +239,7 @@ class Study:
             elif path[0] == CONFIGURATION_KEY and len(path) < 3:
                 problems.add(mark, f"'{'/'.join(path)}' leads to no tag", "configuration/modules/NAME/TAG")
         for name in (*self._variations, *record.measure):
-            if name in (*ROW, *ENDING) or (name in self._variations and name in record.measure):
+            if name in (*ROW, *OUTCOME) or (name in self._variations and name in record.measure):
                 mark = (self._variations.get(name) or record.measure[name]).place() or self._node.mark
                 problems.add(mark, f"two columns of the table are named '{name}'", "another name")
         search = record.search
