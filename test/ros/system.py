@@ -242,9 +242,8 @@ def started(*command: str, **environment: str) -> Iterator[subprocess.Popen]:
         try:
             yield process
         except BaseException:
-            with contextlib.suppress(
-                subprocess.TimeoutExpired
-            ):  # what it has started ends with it, and disturbs no later test
+            # what it has started ends with it, and disturbs no later test
+            with contextlib.suppress(subprocess.TimeoutExpired):
                 end(process, signal.SIGINT)
             raise
         finally:
