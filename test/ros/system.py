@@ -241,6 +241,11 @@ def started(*command: str, **environment: str) -> Iterator[subprocess.Popen]:
     ) as process:
         try:
             yield process
+        except BaseException:
+            # what it has started ends with it, and disturbs no later test
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                end(process, signal.SIGINT)
+            raise
         finally:
             process.kill()
 

@@ -96,9 +96,18 @@ class DaskEngine(WorkerEngine):
         with needs("distributed", "dask"):
             from distributed import Client, LocalCluster
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is reported by `check`
-        self._cluster = (
-            None if scheduler else LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None)
-        )
+        self._cluster = None
+        if not scheduler:
+            with needs("cryptography", "cryptography"):
+                import cryptography  # noqa: F401
+            import dask
+
+            # tasks are code: of the users of this machine only this one may submit any, and see them
+            routes: dict[str, list[str]] = {f"distributed.{each}.http.routes": [] for each in ("scheduler", "worker")}
+            with dask.config.set(routes):
+                self._cluster = LocalCluster(
+                    n_workers=count, threads_per_worker=1, dashboard_address=None, security=True
+                )
         try:
             self._client = Client(scheduler or self._cluster, timeout="10s")
         except (OSError, ValueError) as error:

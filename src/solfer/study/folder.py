@@ -17,17 +17,24 @@ import csv
 import io
 import json
 import os
+import re
 import socket
 import tempfile
 import time
 import uuid
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
 from solfer.errors import StudyError
-from solfer.study.plan import Plan, PlannedRun, Study, study_of
+from solfer.study.plan import OUTCOME, ROW, Plan, PlannedRun, ShortHash, Study, study_of
 from solfer.study.result import Result
 
 STUDY = "study.json"
@@ -38,9 +45,38 @@ STDERR_FILE = "stderr"
 RECORDING = "recording.mcap"
 COLUMNS_FILE = "columns.npz"
 CLAIM_PREFIX = "claim."
+CLAIM = re.compile(r"claim\.([1-9][0-9]{0,8})")
+
+MOST_COLUMNS = 2**26
+"""Largest size of the columns of a run [bytes]."""
+
+DAMAGED = zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryError
+"""Errors of NumPy and `zipfile` about a file that is not one of theirs."""
 
 HEARTBEAT, DEAD = 2.0, 30.0
 """Period in which a worker renews its claim, and the age at which another one takes it over [s]."""
+
+
+class StudyFile(BaseModel):
+    """What `study.json` holds, which others may have written."""
+
+    study: str
+    file: str
+    record: bool
+    code: ShortHash
+    runs: list[PlannedRun]
+
+
+class Identity(BaseModel):
+    """The worker of a claim."""
+
+    machine: str
+    process: int
+    started: str
+    time: float
+
+
+RESULTS = TypeAdapter(Result)
 
 
 class Claim:
@@ -97,20 +133,15 @@ class StudyFolder:
         Raises:
             StudyError: The folder cannot be written, or has runs of another study or of other code.
         """
-        data = {
-            "study": study.text(),
-            "file": os.path.abspath(study.file),
-            "record": record,
-            "code": plan.code,
-            "runs": [each.as_json() for each in plan.runs],
-        }
+        runs = list(plan.runs)
         try:
             (path / RUNS).mkdir(parents=True, exist_ok=True)
             if (path / STUDY).exists():
                 before = cls(path)
-                data["runs"] = _continued(before, plan, force)
+                runs = _continued(before, plan, force)
                 before.repeat_interrupted()
-            write_whole(path / STUDY, json.dumps(data, indent=1))
+            file = os.path.abspath(study.file)
+            _write(path, StudyFile(study=study.text(), file=file, record=record, code=plan.code, runs=runs))
         except OSError as error:
             raise _unwritten(path, error) from None
         return cls(path)
@@ -123,19 +154,26 @@ class StudyFolder:
         """
         file = self.path / STUDY
         try:
-            self._data = data = json.loads(file.read_text())
-            self.code = data["code"]
-            self.is_recorded = data["record"]
-            self.runs = tuple(PlannedRun(**each) for each in data["runs"])
-            self.study = study_of(data["study"], data["file"])
+            self._data = data = StudyFile.model_validate_json(file.read_bytes())
+            self.code = data.code
+            self.is_recorded = data.record
+            self.runs = tuple(data.runs)
+            self.study = study_of(data.study, data.file)
         except FileNotFoundError:
             raise StudyError(
                 "there is no study", where=str(self.path), expected="a folder that `solfer study` made"
             ) from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise StudyError(
-                f"its study cannot be read: {error}", where=str(file), expected="what `solfer study` wrote"
+                f"its study cannot be read: {_reason(error)}", where=str(file), expected="what `solfer study` wrote"
             ) from None
+        for run in self.runs:
+            if strange := run.variations.keys() - set(self.study.names):
+                raise StudyError(
+                    f"run {run.id} varies what the study does not: {', '.join(sorted(strange))}",
+                    where=str(file),
+                    expected="what `solfer study` wrote",
+                )
 
     @property
     def distinct_runs(self) -> tuple[PlannedRun, ...]:
@@ -148,10 +186,10 @@ class StudyFolder:
         Raises:
             StudyError: It cannot be written.
         """
-        self._data["runs"].append(run.as_json())
+        self._data.runs.append(run)
         self.runs = (*self.runs, run)
         try:
-            write_whole(self.path / STUDY, json.dumps(self._data, indent=1))
+            _write(self.path, self._data)
         except OSError as error:
             raise _unwritten(self.path, error) from None
 
@@ -162,13 +200,13 @@ class StudyFolder:
     def result(self, run: PlannedRun) -> Result | None:
         """Return the result of a run; None: there is none yet."""
         try:
-            return Result.from_json(json.loads((self.of(run) / RESULT).read_text()))
+            return RESULTS.validate_json((self.of(run) / RESULT).read_bytes())
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError) as error:
             where = str(self.of(run) / RESULT)
             raise StudyError(
-                f"this result cannot be read: {error}",
+                f"this result cannot be read: {_reason(error)}",
                 where=where,
                 expected="what a worker wrote; remove it to repeat it",
             ) from None
@@ -181,22 +219,24 @@ class StudyFolder:
         """Take up a run that nothing works on; None: it has a result, or another worker works on it.
 
         Raises:
-            StudyError: The folder cannot be written.
+            StudyError: The folder cannot be written, or leads elsewhere.
         """
         folder = self.of(run)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            attempts = sorted(int(file.name.removeprefix(CLAIM_PREFIX)) for file in folder.glob(f"{CLAIM_PREFIX}*"))
-            if self.is_done(run) or (attempts and not self._is_dead(folder / f"{CLAIM_PREFIX}{attempts[-1]}")):
+            if folder.resolve() != self.path.resolve() / RUNS / run.id:
+                raise StudyError("it is a link", where=str(folder), expected="a folder in that of the study")
+            last = max(self._attempts(run), default=0)
+            if self.is_done(run) or (last and not self._is_dead(folder / f"{CLAIM_PREFIX}{last}")):
                 return None
-            file = folder / f"{CLAIM_PREFIX}{attempts[-1] + 1 if attempts else 1}"
+            file = folder / f"{CLAIM_PREFIX}{last + 1}"
             place = os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o644)
         except FileExistsError:
             return None  # another worker was faster
         except OSError as error:
             raise _unwritten(folder, error) from None
         with os.fdopen(place, "w") as opened:
-            json.dump(_identity(), opened)
+            opened.write(_identity().model_dump_json())
         return Claim(file)
 
     def finish(self, run: PlannedRun, result: Result) -> None:
@@ -229,7 +269,28 @@ class StudyFolder:
 
     def attempts(self, run: PlannedRun) -> int:
         """Return how often a run was taken up."""
-        return sum(1 for _ in self.of(run).glob(f"{CLAIM_PREFIX}*"))
+        return len(self._attempts(run))
+
+    def columns(self, run_id: str) -> tuple[np.ndarray, list[str], np.ndarray] | None:
+        """Return times, names and values of the columns that a run kept, shape (T,), (n,) and (n, T); None: none."""
+        file = self.path / RUNS / run_id / COLUMNS_FILE
+        try:
+            with zipfile.ZipFile(file) as archive:
+                if sum(each.file_size for each in archive.infolist()) > MOST_COLUMNS:
+                    return None
+            with np.load(file) as kept:
+                times = kept["times"].astype(float)
+                names = [str(name) for name in kept["names"]]
+                values = kept["values"].astype(float)
+        except DAMAGED:
+            return None
+        return (times, names, values) if values.shape == (len(names), *times.shape) and times.ndim == 1 else None
+
+    def _attempts(self, run: PlannedRun) -> list[int]:
+        """List the numbers of the claims of a run; other files beside them do not count, such as an editor's."""
+        with suppress(FileNotFoundError):
+            return [int(found[1]) for name in os.listdir(self.of(run)) if (found := CLAIM.fullmatch(name))]
+        return []
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of the table, in the order of the plan."""
@@ -238,9 +299,9 @@ class StudyFolder:
             result = self.result(run)
             if result is None:
                 continue
-            row = {"run": run.index, "id": run.id, "seed": run.seed}
+            row: dict[str, Any] = dict(zip(ROW, (run.index, run.id, run.seed), strict=True))
             row |= {name: _cell(run.variations.get(name)) for name in names}
-            row |= {"failed": int(not result.done), "failure": result.failure.replace("\n", " ")}
+            row |= zip(OUTCOME, (int(not result.done), result.failure.replace("\n", " ")), strict=True)
             yield row | {name: result.measures.get(name) for name in self.study.record.measure}
 
     def write_table(self) -> list[Path]:
@@ -250,7 +311,7 @@ class StudyFolder:
             StudyError: It cannot be written.
         """
         rows = list(self.rows())
-        head = ["run", "id", "seed", *self.study.names, "failed", "failure", *self.study.record.measure]
+        head = [*ROW, *self.study.names, *OUTCOME, *self.study.record.measure]
         text = io.StringIO()
         writer = csv.DictWriter(text, head, lineterminator="\n")
         writer.writeheader()
@@ -267,10 +328,10 @@ class StudyFolder:
     def _is_dead(self, claim: Path) -> bool:
         """Whether the worker of a claim has ended: on this machine as soon as its process has."""
         try:
-            identity = json.loads(claim.read_text())
-            if identity["machine"] == _machine() and _started(identity["process"]) != identity["started"]:
+            identity = Identity.model_validate_json(claim.read_bytes())
+            if identity.machine == _machine() and _started(identity.process) != identity.started:
                 return True
-        except (ValueError, KeyError):
+        except ValidationError:
             pass  # it is being written, or its worker died meanwhile
         except FileNotFoundError:
             return False
@@ -294,7 +355,25 @@ def write_whole(file: Path, text: str) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def _continued(folder: StudyFolder, plan: Plan, force: bool) -> list[dict[str, Any]]:
+def _write(folder: Path, data: StudyFile) -> None:
+    """Write the study into its folder; numbers that are not finite as Python does.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    write_whole(folder / STUDY, json.dumps(data.model_dump(), indent=1))
+
+
+def _reason(error: Exception) -> str:
+    """Return in one line why a file cannot be read."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors(include_url=False, include_input=False)[0]
+    place = ".".join(map(str, first["loc"]))
+    return f"{place}: {first['msg']}" if place else first["msg"]
+
+
+def _continued(folder: StudyFolder, plan: Plan, force: bool) -> list[PlannedRun]:
     """Return the runs of a plan with which a folder goes on; with `force` those that other code has done stay.
 
     Raises:
@@ -316,16 +395,23 @@ def _continued(folder: StudyFolder, plan: Plan, force: bool) -> list[dict[str, A
                 expected="another folder, or --force to leave them out",
             )
     if folder.study.record.search is not None:
-        return [run.as_json() for run in folder.runs]
+        return list(folder.runs)
     kept = before if force else {}
-    return [{**each.as_json(), "id": kept[each.key].id if each.key in kept else each.id} for each in plan.runs]
+    return [replace(each, id=kept[each.key].id) if each.key in kept else each for each in plan.runs]
 
 
 def _write_parquet(file: Path, head: list[str], rows: list[dict[str, Any]]) -> Path:
     import pyarrow
     from pyarrow import parquet
 
-    table = pyarrow.table({name: [row.get(name) for row in rows] for name in head})
+    columns = {}
+    for name in head:
+        values = [row.get(name) for row in rows]
+        try:
+            columns[name] = pyarrow.array(values)
+        except (pyarrow.ArrowException, OverflowError):  # values of different types
+            columns[name] = pyarrow.array([None if value is None else str(value) for value in values])
+    table = pyarrow.table(columns)
     temporary = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
     try:
         parquet.write_table(table, temporary)
@@ -340,9 +426,9 @@ def _cell(value: Any) -> Any:
     return json.dumps(value) if isinstance(value, (Mapping, list, tuple)) else value
 
 
-def _identity() -> dict[str, Any]:
+def _identity() -> Identity:
     process = os.getpid()
-    return {"machine": _machine(), "process": process, "started": _started(process), "time": time.time()}
+    return Identity(machine=_machine(), process=process, started=_started(process), time=time.time())
 
 
 def _machine() -> str:

@@ -1,6 +1,7 @@
 """What is measured of a run: columns that are sampled, reduced, and combined."""
 
 import math
+import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -118,9 +119,12 @@ def evaluated(expression: str, values: Mapping[str, Any], where: str) -> Any:
         return evaluator.eval(expression)
     except (ZeroDivisionError, OverflowError, ValueError):
         return math.nan
-    except (InvalidExpression, SyntaxError, TypeError, KeyError, AttributeError) as error:
+    except (InvalidExpression, SyntaxError, TypeError, KeyError, AttributeError, RecursionError, MemoryError) as error:
         raise ConfigError(
-            f"'{expression}' cannot be computed: {error}", where=where, expected="an expression of", names=tuple(values)
+            f"'{textwrap.shorten(expression, 200)}' cannot be computed: {error}",
+            where=where,
+            expected="an expression of",
+            names=tuple(values),
         ) from None
 
 

@@ -3,14 +3,17 @@
 import hashlib
 import itertools
 import json
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, JsonValue
+from pydantic.dataclasses import dataclass as checked
 
 from solfer.config.records.record import parse
 from solfer.config.yaml.files import check_file, read_node
@@ -22,7 +25,7 @@ from solfer.recording.versions import versions
 from solfer.study.measures import check_expressions
 from solfer.study.records import DRAWN_KEYS, StudyRecord, VariationRecord
 from solfer.study.robot import files_of
-from solfer.study.simulated_run import check_tags, configurations_of, listed, rehearse
+from solfer.study.simulated_run import check_tags, configurations_of, function_of, listed, rehearse
 
 CODE_FOLDER = Path(__file__).resolve().parents[1]
 """Folder of the code; that of `solfer.__init__` may be one of catkin's."""
@@ -36,8 +39,18 @@ DECIDING = {"plugins", "simulation", "motion", "settle", "duration", "measure", 
 VARYING = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
 """First keys of paths of what may vary."""
 
+ROW = ("run", "id", "seed")
+"""First columns of the table, before those of variations."""
 
-@dataclass(frozen=True)
+OUTCOME = ("failed", "failure")
+"""Columns of the table between those of variations and of measures."""
+
+MOST_RUNS = 1_000_000
+
+ShortHash = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
+
+
+@checked(frozen=True)
 class PlannedRun:
     """A run of a study.
 
@@ -51,19 +64,9 @@ class PlannedRun:
 
     index: int
     seed: int
-    variations: Mapping[str, Any]
-    key: str
-    id: str
-
-    def as_json(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {
-            "index": self.index,
-            "seed": self.seed,
-            "variations": dict(self.variations),
-            "key": self.key,
-            "id": self.id,
-        }
+    variations: dict[str, JsonValue]
+    key: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    id: ShortHash
 
 
 @dataclass(frozen=True)
@@ -147,8 +150,13 @@ class Study:
         """Plan all runs of the grid.
 
         Raises:
-            SolferError: A value does not fit. SolferErrors: Several mistakes.
+            SolferError: A value does not fit, or there are too many runs. SolferErrors: Several mistakes.
         """
+        vary = self.record.vary.values()
+        lengths = [len(each.grid) for each in vary if each.grid is not None]
+        lengths += [len(each.list) for each in vary if each.list is not None][:1]
+        if (count := math.prod(lengths) * (runs or self.record.runs)) > MOST_RUNS:
+            raise ConfigError(f"{count} runs", where=str(self._node.mark), expected=f"{MOST_RUNS} at most")
         self.check_values()
         return Plan(code_hash(), tuple(self.planned(index, *point) for index, point in enumerate(self.points(runs))))
 
@@ -179,6 +187,9 @@ class Study:
                 errors.append(UnknownName("configuration of a plugin of the study", path[2], used, where=each.where()))
         raise_all(errors)
         _files(self.record)
+        motion = self.record.motion
+        if motion.function is not None:
+            function_of(motion.function, motion.where("function"))
         rehearse(self.record)
         alone = [{name: value} for name, each in self._variations.items() for value in _ends(each)]
         for variations in alone:
@@ -227,6 +238,10 @@ class Study:
                 problems.unknown(mark, "begin of a path", path[0], VARYING)
             elif path[0] == CONFIGURATION_KEY and len(path) < 3:
                 problems.add(mark, f"'{'/'.join(path)}' leads to no tag", "configuration/modules/NAME/TAG")
+        for name in (*self._variations, *record.measure):
+            if name in (*ROW, *OUTCOME) or (name in self._variations and name in record.measure):
+                mark = (self._variations.get(name) or record.measure[name]).place() or self._node.mark
+                problems.add(mark, f"two columns of the table are named '{name}'", "another name")
         search = record.search
         if search is not None and (goal := search.minimize or search.maximize) not in record.measure:
             problems.unknown(search.place() or self._node.mark, "measure", str(goal), record.measure)

@@ -15,7 +15,7 @@ import numpy as np
 
 from solfer.errors import StudyError, UnknownName
 from solfer.recording.review import CANVAS_FONT, FIRST_COLOR, WRONG, check_suffix, new_figure, save
-from solfer.study.folder import COLUMNS_FILE, RECORDING, RUNS, StudyFolder, write_whole
+from solfer.study.folder import RECORDING, RUNS, StudyFolder, write_whole
 
 if TYPE_CHECKING:
     from solfer.recording.review import Figure
@@ -222,22 +222,20 @@ def _worst(folder: StudyFolder, rows: Sequence[Row]) -> str:
         reason = f"<br>failed: {html.escape(row['failure'])}" if row["failed"] else ""
         items.append(
             f"<h3>run {row['run']}</h3><p>{html.escape(figures)}{reason}<br><code>{html.escape(command)}</code></p>"
-            + _plot(folder.path / RUNS / row["id"])
+            + _plot(folder, row["id"])
         )
     return f"<h2>Worst runs</h2>{''.join(items)}"
 
 
-def _plot(run: Path) -> str:
+def _plot(folder: StudyFolder, run_id: str) -> str:
     """Draw the columns of a run over time; empty where it has none."""
-    try:
-        with np.load(run / COLUMNS_FILE) as kept:
-            times = kept["times"]
-            names = kept["names"].tolist()
-            values = kept["values"]
-    except (OSError, ValueError, KeyError):
+    columns = folder.columns(run_id)
+    if columns is None:
         return ""
+    times, names, values = columns
     if not names or not len(times):
         return ""
+    run = folder.path / RUNS / run_id
     across = min(3, len(names))
     down = -(-len(names) // across)
     figure = new_figure(3.6 * across, 1.6 * down)

@@ -2,9 +2,10 @@
 
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
+
+from pydantic.dataclasses import dataclass
 
 FAULTS = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS")
 """Signals of a fault of a run; others come from outside, and leave no result."""
@@ -26,7 +27,7 @@ class Result:
     """
 
     failure: str
-    measures: Mapping[str, float] = field(default_factory=dict)
+    measures: dict[str, float] = field(default_factory=dict)
     time: float = 0.0
 
     @property
@@ -43,8 +44,3 @@ class Result:
         """Return it for JSON, which has no NaN."""
         numbers = {name: value if math.isfinite(value) else str(value) for name, value in self.measures.items()}
         return {"failure": self.failure, "measures": numbers, "time": self.time}
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> "Result":
-        """Read what `as_json` returned."""
-        return cls(data["failure"], {name: float(value) for name, value in data["measures"].items()}, data["time"])

@@ -181,6 +181,8 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
     code = UNFINISHED
     try:
         folder = study.of(run)
+        for name in (STDERR_FILE, RECORDING, COLUMNS_FILE):  # a link would lead elsewhere
+            (folder / name).unlink(missing_ok=True)
         stderr = os.open(folder / STDERR_FILE, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o644)
         for stream in (1, 2):
             os.dup2(stderr, stream)

@@ -23,7 +23,6 @@ from solfer.numerics.rotations import whole_turns
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot
 
-
 MOST_WAITING = 1000
 """Trajectories that may wait for their stamps."""
 
@@ -183,7 +182,7 @@ class TrajectoryFollower:
         kept = [each for each in self.waiting if each.names == names and each.begins < begins]
         if len(kept) == MOST_WAITING:
             raise ComponentError(
-                f"{MOST_WAITING} trajectories wait for their stamps", expected="fewer, or stamps that are less far ahead"
+                f"{MOST_WAITING} trajectories wait for their stamps", expected="fewer, or stamps less far ahead"
             )
         position, velocity = self._after(start - elapsed, kept)
         motion = self._check.motion(

@@ -1,4 +1,4 @@
-"""Publishes the statistics of a real-time layer on /xbotcore/statistics, and its health on /diagnostics."""
+"""Publishes the statistics of a real-time layer on xbotcore/statistics, and its health on /diagnostics."""
 
 import logging
 import threading
@@ -36,7 +36,7 @@ class StatisticsPublisher:
         self._middleware = middleware
         self._period = period
         self._before: LayerSummary | None = None
-        self._publisher = rospy.Publisher(f"/{EXECUTOR}/statistics", LayerStatistics, queue_size=1)
+        self._publisher = rospy.Publisher(f"{EXECUTOR}/statistics", LayerStatistics, queue_size=1)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()

@@ -72,7 +72,7 @@ def _description(configuration: Configuration, middleware: Middleware) -> str:
         try:
             middleware.parameter(source.parameter, source.where())
         except UnknownName as error:
-            if nearest(source.parameter, error.names, likeness=MISSPELT):
+            if _is_misspelt(source.parameter, error.names):
                 raise
             return f"no parameter '{source.parameter}' of a living robot ({source.where()})"
     return ""
@@ -85,6 +85,12 @@ def _joints(configuration: Configuration, middleware: Middleware) -> str:
         return ""
     topic = middleware.resolve(measured.source)
     present = [each.lstrip("/") for each in middleware.topics().result().published]
-    if topic.lstrip("/") in present or nearest(topic.lstrip("/"), present, likeness=MISSPELT):
+    if topic.lstrip("/") in present or _is_misspelt(topic.lstrip("/"), present):
         return ""
     return f"no publisher on {topic} ({measured.where('source')})"
+
+
+def _is_misspelt(name: str, present: Iterable[str]) -> bool:
+    """Whether another name is meant that is present; the same one in a namespace is that of another robot."""
+    last = name.rpartition("/")[2]
+    return bool(nearest(name, [each for each in present if each.rpartition("/")[2] != last], likeness=MISSPELT))

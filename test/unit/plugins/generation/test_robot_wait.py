@@ -84,6 +84,16 @@ def test_a_misspelt_name_is_not_waited_for(bus, node):
     assert missing([configuration(source="torso/measured")], node)
 
 
+def test_the_names_of_another_robot_are_not_meant(bus, node):
+    """Robots in namespaces are there already."""
+    for robot in ("a", "left"):
+        bus.parameters[f"/{robot}/robot_description"] = "<robot/>"
+        publish(bus, f"{robot}/joint_states")
+    assert "no parameter '/robot_description'" in missing([configuration()], node)
+    describe(bus)
+    assert "no publisher on joint_states" in missing([configuration()], node)
+
+
 def test_a_misspelt_description_ends_the_wait(bus, node):
     """At once, also while joints are missing."""
     describe(bus)
