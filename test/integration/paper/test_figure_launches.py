@@ -65,7 +65,7 @@ def test_all_names_of_a_figure_are_in_its_namespace(middleware, monkeypatch):
     assert {node.namespace for node in config.nodes} == {"/left/"}
     for node in config.nodes:
         places = {name: resolve_name(target, f"/left/{node.name}") for name, target in node.remap_args}
-        assert places == {"/diagnostics": "/left/diagnostics", "/tf": "/left/tf"}, node.name
+        assert places == {f"/{name}": f"/left/{name}" for name in ("diagnostics", "tf", "tf_static")}, node.name
     assert all(name.startswith("/left/") for name in config.params if not name.startswith("/rosdistro")), config.params
     if middleware == "XBOT":
         named = [node for node in config.nodes if node.package == "solfer"]
