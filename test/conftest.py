@@ -18,11 +18,6 @@ from solfer.supervision import supervise
 
 TESTS = Path(__file__).resolve().parent
 
-UNHURRIED = frozenset(
-    ("figure_4", "figure_5", "inverse_kinematics", "lockstep", "nodes", "robot", "tools", "wheeled_motion")
-)
-"""Rostests that may run beside others: their simulation waits for its plugins, all go by its time, or there is none."""
-
 REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory", "integration/view")
 """Folders of tests in real time, which a stall of the machine may fail."""
 
@@ -84,18 +79,7 @@ def pytest_ignore_collect(collection_path):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """Keep tests of one file together where processes share them, for its fixtures.
-
-    They are handed out in the order of collection, the slow ones first. All rostests are one file: one process runs
-    them one after the other, since two simulations in real time beside each other stall the plugins that they test;
-    but UNHURRIED ones.
-    """
-    from xdist.scheduler import LoadFileScheduling
-
-    class Scheduling(LoadFileScheduling):
-        def _split_scope(self, nodeid):
-            name = nodeid.partition("::test_rostest[")[2].rstrip("]")
-            return nodeid if name in UNHURRIED else super()._split_scope(nodeid)
+    from support.suite.scheduling import Scheduling
 
     config.option.loadscopereorder = False  # it would begin with the files that have the most tests
     return Scheduling(config, log)

@@ -17,6 +17,9 @@ from websockets.sync.client import connect
 ADDRESS = re.compile(r"http://localhost:\d+/[\w-]{20,}/\n")
 REPOSITORY = Path(__file__).parents[2]
 
+PATIENCE = 20.0
+"""Longest time in which the command ends by Ctrl-C [s]."""
+
 
 class FakePage:
     """One page; it sends signs of life as long as `is_alive`, and something is received."""
@@ -170,6 +173,10 @@ def started_view(*words):
             yield process, first.strip()
         finally:
             process.send_signal(signal.SIGINT)
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
 @contextmanager
@@ -177,7 +184,7 @@ def view(*words):
     """Start `solfer view` on any port; yields its address. It has to end well by Ctrl-C."""
     with started_view(*words) as (process, address):
         yield address
-    assert process.wait(20.0) == 0
+    assert process.wait() == 0
 
 
 def drive(address):

@@ -224,8 +224,7 @@ class StudyFolder:
         folder = self.of(run)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if folder.resolve() != self.path.resolve() / RUNS / run.id:
-                raise StudyError("it is a link", where=str(folder), expected="a folder in that of the study")
+            self._check_inside(run)
             last = max(self._attempts(run), default=0)
             if self.is_done(run) or (last and not self._is_dead(folder / f"{CLAIM_PREFIX}{last}")):
                 return None
@@ -271,6 +270,18 @@ class StudyFolder:
         """Return how often a run was taken up."""
         return len(self._attempts(run))
 
+    def output(self, run: PlannedRun, name: str) -> Path:
+        """Return the path for a new file of a run; the old one, which may be a link, is removed.
+
+        Raises:
+            StudyError: The folder of the run leads elsewhere.
+            OSError: It cannot be removed.
+        """
+        self._check_inside(run)
+        file = self.of(run) / name
+        file.unlink(missing_ok=True)
+        return file
+
     def columns(self, run_id: str) -> tuple[np.ndarray, list[str], np.ndarray] | None:
         """Return times, names and values of the columns that a run kept, shape (T,), (n,) and (n, T); None: none."""
         file = self.path / RUNS / run_id / COLUMNS_FILE
@@ -285,6 +296,11 @@ class StudyFolder:
         except DAMAGED:
             return None
         return (times, names, values) if values.shape == (len(names), *times.shape) and times.ndim == 1 else None
+
+    def _check_inside(self, run: PlannedRun) -> None:
+        folder = self.of(run)
+        if folder.resolve() != self.path.resolve() / RUNS / run.id:
+            raise StudyError("it is a link", where=str(folder), expected="a folder in that of the study")
 
     def _attempts(self, run: PlannedRun) -> list[int]:
         """List the numbers of the claims of a run; other files beside them do not count, such as an editor's."""

@@ -78,6 +78,7 @@ class SimulatedRun:
 
     Raises:
         SolferError: The configuration, the robot, or the motion is wrong. SolferErrors: Several mistakes.
+        KeyboardInterrupt: Ctrl-C, also in a cycle of a plugin.
     """
 
     def __init__(
@@ -227,6 +228,8 @@ class SimulatedRun:
         together.cycle()
         if together.failures and not self.failure:
             name, error = next(iter(together.failures.items()))
+            if isinstance(error, KeyboardInterrupt):  # in this process Ctrl-C is the user's, no component's
+                raise error
             self.failure = f"{name}: {error}"
 
     def nanoseconds(self) -> int:

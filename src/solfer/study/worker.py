@@ -180,15 +180,12 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
     """Carry out a run in this process, which ends with it."""
     code = UNFINISHED
     try:
-        folder = study.of(run)
-        for name in (STDERR_FILE, RECORDING, COLUMNS_FILE):  # a link would lead elsewhere
-            (folder / name).unlink(missing_ok=True)
-        stderr = os.open(folder / STDERR_FILE, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o644)
+        stderr = os.open(study.output(run, STDERR_FILE), os.O_CREAT | os.O_WRONLY | os.O_EXCL, 0o644)
         for stream in (1, 2):
             os.dup2(stderr, stream)
         gc.freeze()
         record, changes = study.study.settings(run.variations)
-        write_whole(folder / CONFIGURATION_FILE, _texts(run, record, changes))
+        write_whole(study.of(run) / CONFIGURATION_FILE, _texts(run, record, changes))
         study.finish(run, _result(study, run, record, changes=changes))
         code = 0
     except (SolferError, SolferErrors) as error:
@@ -211,12 +208,10 @@ def _result(study: StudyFolder, run: PlannedRun, record: StudyRecord, changes: Y
     """Carry out a run; a mistake in what varies is its failure."""
     from solfer.study.run import carry_out
 
-    folder = study.of(run)
-    recording = folder / RECORDING if study.is_recorded else None
+    recording = study.output(run, RECORDING) if study.is_recorded else None
+    columns = study.output(run, COLUMNS_FILE)
     try:
-        return carry_out(
-            record, run.seed, changes, variations=run.variations, recording=recording, columns=folder / COLUMNS_FILE
-        )
+        return carry_out(record, run.seed, changes, variations=run.variations, recording=recording, columns=columns)
     except (MissingDependency, StudyError):
         raise  # the machine's, and not the run's
     except (SolferError, SolferErrors) as error:

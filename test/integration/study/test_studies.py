@@ -71,6 +71,16 @@ def test_runs_repeat_to_the_bit(tmp_path):
     assert ways[0][1] == ways[1][1] and len(ways[0][0]) > 300
 
 
+def test_an_interrupt_in_a_cycle_ends_the_run(tmp_path):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    with SimulatedRun(made(tmp_path, **DRIVES).record) as simulated:
+        simulated.plugins["wheeled_motion"].cycle = interrupted
+        with pytest.raises(KeyboardInterrupt):
+            simulated.step()
+
+
 def test_a_robot_drives_as_its_scenario_asks(tmp_path):
     found = run(CONFIG / "centauro.yaml", ["odometry3::odometry", "wheeled_motion"], 20.0, **DRIVES)
     assert found.done and found.measures["way"] == pytest.approx(0.5, abs=0.03)

@@ -12,7 +12,7 @@ from support.unit.studies import made
 from solfer.errors import SolferError, SolferErrors, StudyError
 from solfer.study import Result
 from solfer.study.drive import find_run
-from solfer.study.folder import COLUMNS_FILE, STUDY, StudyFolder
+from solfer.study.folder import COLUMNS_FILE, RECORDING, STUDY, StudyFolder
 from solfer.study.plan import MOST_RUNS
 from solfer.study.report import write_report
 
@@ -150,9 +150,21 @@ def test_a_run_whose_folder_is_a_link_is_refused(original, tmp_path):
     shutil.rmtree(folder.of(run))
     (tmp_path / "elsewhere").mkdir()
     folder.of(run).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(StudyError, match="it is a link"):
-        folder.claim(run)
+    for action in (folder.claim, lambda each: folder.output(each, RECORDING)):
+        with pytest.raises(StudyError, match="it is a link"):
+            action(run)
     assert not list((tmp_path / "elsewhere").iterdir())
+
+
+def test_a_file_of_a_run_that_is_a_link_is_replaced(original, tmp_path):
+    path = tmp_path / "out"
+    shutil.copytree(original, path)
+    folder = StudyFolder(path)
+    run = folder.runs[2]
+    (tmp_path / "theirs").write_text("theirs")
+    (folder.of(run) / RECORDING).symlink_to(tmp_path / "theirs")
+    folder.output(run, RECORDING).write_text("ours")
+    assert (tmp_path / "theirs").read_text() == "theirs" and not (folder.of(run) / RECORDING).is_symlink()
 
 
 @pytest.mark.parametrize("name", ["run", "id", "seed", "failed", "failure", "tilt"])

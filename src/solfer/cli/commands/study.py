@@ -47,10 +47,10 @@ def run(options: argparse.Namespace) -> int:
 
     if options.file == REPORT_WORD:
         return actions.report(options.folder or options.out, options.map)
-    if options.rerun is not None:
-        return actions.rerun(options)
     try:
+        if options.rerun is not None:
+            return actions.rerun(options)
         return actions.dry(options) if options.dry else actions.carry_out(options)
     except KeyboardInterrupt:
-        print("ended; the same command goes on", file=sys.stderr)
+        print("ended; the same command goes on" if options.rerun is None else "ended", file=sys.stderr)
         return 130

@@ -65,7 +65,7 @@ def rerun(options: argparse.Namespace) -> int:
     folder = StudyFolder(options.out)
     chosen = find_run(folder, options.rerun)
     record, changes = folder.study.settings(chosen.variations)
-    recording = folder.of(chosen) / RECORDING if options.record else None
+    recording = folder.output(chosen, RECORDING) if options.record else None
     begin = time.monotonic()
     result = carry_out_one(
         record, chosen.seed, changes, variations=chosen.variations, recording=recording, gui=options.gui

@@ -43,7 +43,7 @@ def show(options: argparse.Namespace) -> int:
     """Show the page until the source or the user ends it."""
     with closing(PageServer(int(options.port))) as server:
         print(server.address, flush=True)
-        with _opened(options) as source, suppress(KeyboardInterrupt):
+        with suppress(KeyboardInterrupt), _opened(options) as source:
             scene = LiveScene(source.robot, source.middleware)
             page = Page(
                 server,
