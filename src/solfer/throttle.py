@@ -23,17 +23,18 @@ class Throttle:
         self._last: dict[str, float] = {}
         self._held: dict[str, int] = {}
 
-    def warning(self, key: str, text: str, *args: object) -> None:
-        """Log `text` (with `args`, as in logging) unless `key` was logged less than `interval` ago."""
+    def warning(self, key: str, text: str, *args: object) -> bool:
+        """Log `text` (with `args`, as in logging) unless `key` was logged less than `interval` ago; return whether."""
         now = time.monotonic()
         if key not in self._last and len(self._last) >= KEYS and not self._make_room(now):
             key = OTHER_KEYS
         if now - self._last.get(key, -float("inf")) < self._interval:
             self._held[key] = self._held.get(key, 0) + 1
-            return
+            return False
         held = self._held.pop(key, 0)
         self._last[key] = now
         self._logger.warning(text + (f" ({held} more like this)" if held else ""), *args)
+        return True
 
     def _make_room(self, now: float) -> bool:
         """Forget keys that were logged long ago with their counts; return whether there is room for another key."""

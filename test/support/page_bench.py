@@ -25,7 +25,7 @@ GOAL = Pose(Vector(0.5, 0.2, 0.3), Turn(*Rotation.from_euler("z", 0.3).as_quat()
 class PageBench:
     """An upper body with a plugin `hands` on a bus, its page, and one that looks at it."""
 
-    def __init__(self, robot, control, foxglove=None):
+    def __init__(self, robot, control, foxglove=False):
         self.bus, self.robot = Bus(), robot
         self.node, self.inbox, self.asked = MemoryMiddleware(self.bus, "hands"), Inbox(), []
         self.is_publishing = True

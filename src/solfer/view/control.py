@@ -1,5 +1,6 @@
 """Commands of pages: one page at a time drags references and drives the base."""
 
+import logging
 from collections.abc import Mapping
 from functools import partial
 
@@ -9,6 +10,7 @@ from viser import ClientHandle, GuiButtonHandle, GuiEvent, TransformControlsEven
 from solfer.errors import NotFinite
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
+from solfer.throttle import Throttle
 from solfer.transport import Middleware
 from solfer.view.drawing import name_of, wxyz
 from solfer.view.driving_pad import DrivingPad
@@ -19,7 +21,12 @@ from solfer.view.server import PageServer
 CONTROL_SILENCE = 0.5
 """Time without a sign of life of the page that commands after which everything comes to rest [s]."""
 
+DRAG_RANGE = 5.0
+"""Farthest that a handle is dragged from its reference [m]."""
+
 NO_PAGE_COMMANDS = "no page commands"
+
+logger = logging.getLogger(__name__)
 
 WORLD_POSE = ScenePose(np.zeros(3), np.eye(3))
 
@@ -38,7 +45,10 @@ class PageControl:
 
     def __init__(self, server: PageServer, requests: PageRequests, middleware: Middleware):
         viser = server.viser
+        server.incoming.may_command = self.may_command
+        server.incoming.is_free = lambda: self.is_free
         self._viser = viser
+        self._throttle = Throttle(logger)
         self._lives = PageLives(server, middleware.now)
         self._requests = requests
         self._dragged = DraggedReferences(middleware)
@@ -56,15 +66,15 @@ class PageControl:
 
         @take.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            requests.submit(partial(self._take, event.client_id))
+            requests.submit(("control", event.client_id), partial(self._take, event.client_id))
 
         @give.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            requests.submit(partial(self._give, event.client_id))
+            requests.submit(("control", event.client_id), partial(self._give, event.client_id))
 
         @viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:
-            requests.submit(partial(self._give, client.client_id))
+            requests.submit(("control", client.client_id), partial(self._give, client.client_id))
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is commanded; without a scene, None, nothing is."""
@@ -80,10 +90,9 @@ class PageControl:
 
     def may_command(self, client: int | None) -> bool:
         """Return whether a page commands; another one is informed that it does not."""
-        if not self._is_holder(client):
-            self._requests.show("another page, or none, commands: take control first")
-            return False
-        return True
+        if client is not None and not self._is_holder(client):
+            self._refuse(client, "another page, or none, commands: take control first")
+        return self._is_holder(client)
 
     @property
     def is_free(self) -> bool:
@@ -111,7 +120,7 @@ class PageControl:
 
     def _refuse(self, client: int, reason: str) -> None:
         page = self._viser.get_clients().get(client)
-        if page is not None:
+        if self._throttle.warning(f"{client} {reason}", "page %d: %s", client, reason) and page is not None:
             page.add_notification("solfer", reason, color="red", auto_close_seconds=5.0)
 
     def _give(self, client: int | None) -> None:
@@ -158,7 +167,8 @@ class PageControl:
         async def moved(event: TransformControlsEvent) -> None:
             place = handle.position.copy()
             turn = handle.wxyz.copy()
-            self._requests.submit(partial(self._drag, name, event.client_id, event.phase, position=place, turn=turn))
+            drag = partial(self._drag, name, event.client_id, event.phase, position=place, turn=turn)
+            self._requests.submit((name, event.client_id, event.phase), drag)
 
         handle.on_update(moved)
         return handle
@@ -175,7 +185,7 @@ class PageControl:
             pose = ScenePose(position, rotation_from_quaternion(np.roll(turn, -1)))
         except NotFinite:
             return
-        if phase == "update" and np.isfinite(position).all():
+        if phase == "update" and np.linalg.norm(position - shown.reference.position) <= DRAG_RANGE:
             frame = self._frames.get(shown.frame, WORLD_POSE)
             own = ScenePose(frame.seen(pose.position), frame.rotation.T @ pose.rotation)
             self._moved.add(name)

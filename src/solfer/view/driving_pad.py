@@ -105,7 +105,7 @@ class DrivingPad:
     def _connect(self, button: GuiButtonHandle, direction: tuple[float, float, float]) -> None:
         @button.on_hold(callback_hz=10.0)
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            self._requests.submit(partial(self._press, event.client_id, direction))
+            self._requests.submit(("press", event.client_id), partial(self._press, event.client_id, direction))
 
     def _press(self, client: int | None, direction: tuple[float, float, float]) -> None:
         if self._is_pressed_by(client):

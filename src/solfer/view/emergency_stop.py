@@ -27,19 +27,23 @@ class EmergencyStopButton:
         button = viser.gui.add_button(STOP_LABEL, color="red")
         button.on_click(self._confirm)
 
-    def _confirm(self, event: GuiEvent[GuiButtonHandle]) -> None:
+    async def _confirm(self, event: GuiEvent[GuiButtonHandle]) -> None:
         if event.client is None:
             return
+        for question in tuple(event.client.gui._modal_handle_from_uuid.values()):
+            question.close()
         with event.client.gui.add_modal("emergency stop") as modal:
             confirm = event.client.gui.add_button(CONFIRM, color="red")
             cancel = event.client.gui.add_button("cancel")
 
-        def stop(_: object) -> None:
+        @confirm.on_click
+        async def _(_: object) -> None:
+            self._requests.submit("stop", self._stop)
             modal.close()
-            self._requests.submit(self._stop)
 
-        confirm.on_click(stop)
-        cancel.on_click(lambda _: modal.close())
+        @cancel.on_click
+        async def _(_: object) -> None:
+            modal.close()
 
     def _call(self) -> None:
         self._requests.call(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer)

@@ -1,6 +1,7 @@
 """A server for Foxglove: joints, frames, odometry, forces, columns and parameters, by its websocket protocol."""
 
 import json
+import secrets
 import time
 from functools import partial
 from typing import Any
@@ -15,9 +16,10 @@ from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters
 from solfer.view.columns import PlottedColumns
 from solfer.view.control import PageControl
 from solfer.view.drawing import FORCE_SCALE, FORCES
+from solfer.view.foxglove_relay import FOXGLOVE, FoxgloveRelay
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
-from solfer.view.server import HOST
+from solfer.view.server import PageServer
 
 try:
     import foxglove
@@ -45,22 +47,19 @@ except ModuleNotFoundError as error:
         expected="pip install -r requirements-view.txt",
     ) from error
 
-FOXGLOVE_PORT = 8765
-"""Where Foxglove looks first."""
-
 
 class FoxgloveServer(ServerListener):
-    """Serves what a page shows, on this machine alone.
+    """Serves what a page shows, at the address of the page.
+
+    The server of foxglove-sdk checks neither origin nor token. So the page's server does, and relays; the one behind it
+    has a random address of this machine, which no web page finds, and only relayed clients have parameters.
 
     Args:
-        port: Its port; 0: any.
+        server: The page.
         requests: Calls the services of parameters.
         columns: Numbers over time, one message of all.
         parameters: Those of the parts.
         control: Lets parameters change while no page commands; None: they do not change.
-
-    Attributes:
-        address: Address of the server.
 
     Raises:
         MiddlewareError: It cannot be served.
@@ -68,7 +67,7 @@ class FoxgloveServer(ServerListener):
 
     def __init__(
         self,
-        port: int,
+        server: PageServer,
         requests: PageRequests,
         columns: PlottedColumns,
         parameters: KnownParameters,
@@ -89,18 +88,24 @@ class FoxgloveServer(ServerListener):
         self._odom = OdometryChannel("/odometry", context=context)
         self._forces = SceneUpdateChannel("/forces", context=context)
         self._numbers = Channel("/columns", message_encoding="json", context=context)
+        host = ".".join(map(str, (127, *(1 + secrets.randbelow(254) for _ in range(3)))))
         try:
             self._server = foxglove.start_server(
                 name="solfer",
-                host=HOST,
-                port=port,
+                host=host,
+                port=0,
                 capabilities=[Capability.Parameters],
                 server_listener=self,
                 context=context,
             )
-        except Exception as error:  # whatever the library raises for a port that is taken
-            raise MiddlewareError(f"no server for Foxglove at port {port}: {error}", expected="a free port") from None
-        self.address = f"ws://localhost:{self._server.port}"
+        except Exception as error:  # whatever the library raises
+            raise MiddlewareError(f"no server for Foxglove: {error}", expected="a free port") from None
+        self._relay = FoxgloveRelay(server, f"ws://{host}:{self._server.port}")
+
+    @property
+    def address(self) -> str:
+        """Address of the server, with the token of the page."""
+        return self._relay.address
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is new; of a channel without subscribers nothing is made."""
@@ -144,6 +149,8 @@ class FoxgloveServer(ServerListener):
         self, client: Client, param_names: list[str], request_id: str | None = None
     ) -> list[Parameter]:
         """Return parameters; without names all."""
+        if not self._relay.knows(client.id, request_id):
+            return []
         values = self._values()
         return [_parameter(name, value) for name, value in values.items() if not param_names or name in param_names]
 
@@ -151,13 +158,16 @@ class FoxgloveServer(ServerListener):
         self, client: Client, parameters: list[Parameter], request_id: str | None = None
     ) -> list[Parameter]:
         """Let parameters change; their present values are returned, and the new ones published once they count."""
+        known = self._values()
         for each in parameters:
-            self._requests.submit(partial(self._set, each.name, each.get_value()))
+            if self._relay.knows(client.id) and each.name in known:
+                self._requests.submit((FOXGLOVE, each.name), partial(self._set, each))
         return self.on_get_parameters(client, [each.name for each in parameters])
 
-    def _set(self, name: str, value: Any) -> None:
-        part, _, parameter = name.partition(".")
-        self._published.pop(name, None)  # what is refused is published as it is
+    def _set(self, changed: Parameter) -> None:
+        part, _, parameter = changed.name.partition(".")
+        value = changed.get_value()
+        self._published.pop(changed.name, None)  # what is refused is published as it is
         if self._control is None or not self._control.is_free:
             return
         text = value if isinstance(value, str) else json.dumps(value)

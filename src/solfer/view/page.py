@@ -41,10 +41,10 @@ class Page:
         stop: The emergency stop; None: the service of the lower level.
         control: Whether pages may command.
         playback: The recording that is shown; None: what is shown is live.
-        foxglove: Port at which a server for Foxglove has the same; None: there is none.
+        foxglove: Whether Foxglove gets the same.
 
     Attributes:
-        foxglove: That server.
+        foxglove: Its server; None: there is none.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Page:
         control: bool = False,
         *,
         playback: Playback | None = None,
-        foxglove: int | None = None,
+        foxglove: bool = False,
     ):
         self._viser = server.viser
         self._middleware = middleware
@@ -72,22 +72,22 @@ class Page:
         self._control: PageControl | None = None
         self.foxglove: FoxgloveServer | None = None
         if playback is not None:
-            self._time_line = TimeLine(self._viser, self._requests, playback)
-            self._plots = Plots(gui, self._requests, playback)
+            self._time_line = TimeLine(server, self._requests, playback)
+            self._plots = Plots(gui, self._requests, playback, incoming=server.incoming)
             return
         EmergencyStopButton(self._viser, self._requests, stop)
         self._columns = LiveColumns(middleware)
-        self._plots = Plots(gui, self._requests, self._columns)
+        self._plots = Plots(gui, self._requests, self._columns, incoming=server.incoming)
         self._control = PageControl(server, self._requests, middleware) if control else None
         self._parameters = KnownParameters(middleware)
         self._tabs = PluginTabs(gui, self._requests, self._parameters, control=self._control)
-        if foxglove is not None:
-            self.foxglove = self._make_foxglove(foxglove)
+        if foxglove:
+            self.foxglove = self._make_foxglove(server)
 
-    def _make_foxglove(self, port: int) -> "FoxgloveServer":
+    def _make_foxglove(self, server: PageServer) -> "FoxgloveServer":
         from solfer.view.foxglove_server import FoxgloveServer  # 54 MB, which most do without
 
-        return FoxgloveServer(port, self._requests, self._columns, parameters=self._parameters, control=self._control)
+        return FoxgloveServer(server, self._requests, self._columns, parameters=self._parameters, control=self._control)
 
     def update(self, state: SceneState | None) -> None:
         """Show a scene; None: nothing new is known."""

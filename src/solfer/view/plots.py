@@ -6,6 +6,7 @@ import numpy as np
 from viser import GuiApi, GuiUplotHandle, uplot
 
 from solfer.view.columns import PlottedColumns
+from solfer.view.incoming import IncomingMessages
 from solfer.view.requests import PageRequests
 
 SPAN = 20.0
@@ -27,9 +28,10 @@ class Plots:
         gui: Where it is.
         requests: Carries out what the user picks.
         columns: All columns.
+        incoming: Lets pages change it.
     """
 
-    def __init__(self, gui: GuiApi, requests: PageRequests, columns: PlottedColumns):
+    def __init__(self, gui: GuiApi, requests: PageRequests, columns: PlottedColumns, incoming: IncomingMessages):
         self._gui = gui
         self._columns = columns
         self._times = deque[float]()
@@ -40,8 +42,15 @@ class Plots:
             self._choice = gui.add_dropdown("column", (NO_COLUMN,))
             add = gui.add_button("add")
             clear = gui.add_button("clear")
-        add.on_click(lambda _: requests.submit(self._add))
-        clear.on_click(lambda _: requests.submit(self._clear))
+        incoming.display |= {self._choice._impl.uuid, add._impl.uuid, clear._impl.uuid}
+
+        @add.on_click
+        async def _(_: object) -> None:
+            requests.submit("add", self._add)
+
+        @clear.on_click
+        async def _(_: object) -> None:
+            requests.submit("clear", self._clear)
 
     def update(self, now: float) -> None:
         """Take a sample at some time [s]; where time goes back the plot begins again."""

@@ -109,7 +109,8 @@ class _PluginTab:
 
         @buttons.on_click
         async def _(event: GuiEvent[Any]) -> None:
-            self._requests.submit(partial(self._switch, event.client_id, buttons.value))
+            key = (self._name, event.client_id)
+            self._requests.submit(key, partial(self._switch, event.client_id, buttons.value))
 
     def _switch(self, client: int | None, verb: str) -> None:
         if self._control is None or not self._control.may_command(client):
@@ -145,7 +146,8 @@ class _PluginTab:
         async def _(event: GuiEvent[Any]) -> None:
             if event.client is not None:
                 text = control.value if isinstance(control.value, str) else json.dumps(control.value)
-                self._requests.submit(partial(self._set, event.client_id, name, text))
+                key = (self._name, name, event.client_id)
+                self._requests.submit(key, partial(self._set, event.client_id, name, text))
 
         return control
 

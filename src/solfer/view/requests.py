@@ -1,14 +1,16 @@
 """What pages request: it arrives in viser's threads, and is carried out in the loop of the page."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from queue import Empty, SimpleQueue
+from functools import partial
+from threading import Lock
 from typing import Any
 
 from viser import ViserServer
 
 from solfer.errors import MiddlewareError, SolferError, described
+from solfer.throttle import Throttle
 from solfer.transport import Middleware
 
 SERVICE_PATIENCE = 2.0
@@ -31,12 +33,16 @@ class PageRequests:
     def __init__(self, middleware: Middleware, viser: ViserServer):
         self.middleware = middleware
         self._viser = viser
-        self._pending = SimpleQueue[Callable[[], None]]()
+        self._throttle = Throttle(logger)
+        self._lock = Lock()
+        self._pending: dict[Hashable, Callable[[], None]] = {}
         self._answers: list[tuple[Future[Any], str, Callable[[Any], None]]] = []
 
-    def submit(self, work: Callable[[], None]) -> None:
-        """Let the loop do some work; from any thread."""
-        self._pending.put(work)
+    def submit(self, key: Hashable, work: Callable[[], None]) -> None:
+        """Let the loop do some work; from any thread. It overtakes what waits with the same key."""
+        with self._lock:
+            self._pending.pop(key, None)
+            self._pending[key] = work
 
     def call(
         self, service: str, interface: str, request: Any, reply: type, done: Callable[[Any], None] = lambda _: None
@@ -47,25 +53,31 @@ class PageRequests:
 
     def update(self) -> None:
         """Carry out what is there."""
-        while True:
-            try:
-                work = self._pending.get_nowait()
-            except Empty:
-                break
-            work()
+        with self._lock:
+            pending = self._pending
+            self._pending = {}
+        for work in pending.values():
+            self._carry_out(work)
         waiting = self._answers
         self._answers = []
         for answer, service, done in waiting:
             if answer.done():
-                self._finish(answer, service, done)
+                self._carry_out(partial(self._finish, answer, service, done))
             else:
                 self._answers.append((answer, service, done))
 
     def show(self, text: str) -> None:
-        """Show what has failed on all pages."""
-        logger.warning("%s", text)
+        """Show what has failed on all pages, once a second."""
+        if not self._throttle.warning(text, "%s", text):
+            return
         for client in self._viser.get_clients().values():
             client.add_notification("solfer", text, color="red", auto_close_seconds=10.0)
+
+    def _carry_out(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:  # it must not end the emergency stop of all pages
+            self._throttle.warning("request", "a request of a page failed: %s", described(error))
 
     def _finish(self, answer: Future[Any], service: str, done: Callable[[Any], None]) -> None:
         try:

@@ -1,9 +1,12 @@
 """The server of the page: on this machine alone, and for those alone that know its address."""
 
+import asyncio
 import http
+import logging
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 from unittest.mock import patch
 
@@ -15,8 +18,11 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
+from websockets.typing import Subprotocol
 
-from solfer.errors import MiddlewareError
+from solfer.errors import MiddlewareError, described
+from solfer.throttle import Throttle
+from solfer.view.incoming import LARGEST_MESSAGE, IncomingMessages
 
 HOST = "127.0.0.1"
 
@@ -28,12 +34,38 @@ FIRST_PORT = 8080
 LIFE = "life"
 """Path of the websockets by which pages show that they live."""
 
+PROGRAM_ORIGINS = ("https://app.foxglove.dev", "file://")
+"""Origins that `routes` accept besides that of the page and none: Foxglove in the browser, and on the desktop."""
+
 HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "frame-ancestors 'none'",
     "Referrer-Policy": "no-referrer",
 }
 """Of the page: neither stored nor shown inside of another one, and its address is not passed on."""
+
+logger = logging.getLogger(__name__)
+
+throttle = Throttle(logger)
+
+
+class _OneLine(logging.Handler):
+    """Logs in one line, once a second, what the server logs with a traceback for each connection."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """See `logging.Handler.emit`."""
+        error = record.exc_info[1] if record.exc_info else None
+        _log(record.getMessage(), error)
+
+
+def _log(text: str, error: BaseException | None) -> None:
+    throttle.warning(text, "%s%s", text, "" if error is None else f": {described(error)}")
+
+
+quiet = logging.getLogger(f"{__name__}.websockets")
+quiet.propagate = False
+quiet.setLevel(logging.WARNING)
+quiet.addHandler(_OneLine())
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
 Process = Callable[[ServerConnection, Request], Response | None | Awaitable[Response | None]]
@@ -50,6 +82,8 @@ class PageServer:
     Attributes:
         viser: What is on the page.
         address: Address of the page.
+        incoming: Judges what pages send.
+        routes: What serves websockets of other programs, by the path below the token.
         lives: What notes a sign of life, in the server's thread, by the random key of a page.
 
     Raises:
@@ -61,14 +95,14 @@ class PageServer:
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
         self.lives: dict[str, Callable[[], None]] = {}
+        self.routes: dict[str, Handler] = {}
         # viser has no hook for requests
         with patch.object(websockets.asyncio.server, "serve", self._guarded(websockets.asyncio.server.serve)):
             self.viser = viser.ViserServer(HOST, port, label="solfer", verbose=False)
         if not self._is_guarded:
             self.viser.stop()
             raise MiddlewareError("this version of viser cannot be guarded", expected="that of requirements-view.txt")
-        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):  # a way from other machines
-            self.connection.unregister_handler(message)
+        self.incoming = IncomingMessages(self.viser)
         self.address = f"http://localhost:{self.viser.get_port()}/{self._token}/"
 
     @property
@@ -95,7 +129,10 @@ class PageServer:
                 if refusal is not None:
                     return refusal
                 request.path = request.path.removeprefix(f"/{self._token}") or "/"
-                response = process_request(connection, request)
+                try:
+                    response = process_request(connection, request)
+                except OSError:  # a path that no file can have
+                    response = Response(http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"")
                 if isinstance(response, Response):
                     response.headers.update(HEADERS)
                 return response
@@ -103,7 +140,11 @@ class PageServer:
             async def handle(connection: ServerConnection) -> None:
                 assert connection.request is not None
                 kind, _, key = connection.request.path.strip("/").partition("/")
+                if kind in self.routes:
+                    return await self.routes[kind](connection)
                 if kind != LIFE:
+                    receive = partial(self.incoming.receive, connection, connection.recv)
+                    connection.recv = receive  # type: ignore[method-assign, assignment]
                     return await handler(connection)
                 with suppress(ConnectionClosed):
                     async for _ in connection:
@@ -111,6 +152,10 @@ class PageServer:
                             return
                         self.lives[key]()
 
+            asyncio.get_running_loop().set_exception_handler(
+                lambda _, context: _log(context["message"].partition("\n")[0], context.get("exception"))
+            )
+            options |= {"max_size": LARGEST_MESSAGE, "logger": quiet, "select_subprotocol": _subprotocol}
             return serve(handle, *arguments, process_request=process, **options)
 
         return guarded
@@ -119,12 +164,18 @@ class PageServer:
         """Return the answer to a request that is none of this page's; None: it is one."""
         hosts = [f"{name}:{connection.local_address[1]}" for name in HOST_NAMES]
         origins = [f"http://{host}" for host in hosts]
-        token = request.path.partition("?")[0].split("/")[1:2]
+        _, token, kind, *_ = [*request.path.partition("?")[0].split("/"), "", ""]
         headers = request.headers
+        is_routed = kind in self.routes
+        origins += PROGRAM_ORIGINS if is_routed else ()
         own = (
-            secrets.compare_digest("".join(token).encode(), self._token.encode())
+            secrets.compare_digest(token.encode(), self._token.encode())
             and headers.get_all("Host") in [[host] for host in hosts]
             and all(origin in origins for origin in headers.get_all("Origin"))
-            and ("Upgrade" not in headers or "Origin" in headers)
+            and ("Upgrade" not in headers or "Origin" in headers or is_routed)
         )
         return None if own else Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), b"")
+
+
+def _subprotocol(_: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
+    return next((each for each in offered if each.startswith(("viser-v", "foxglove."))), None)

@@ -2,10 +2,11 @@
 
 import math
 
-from viser import GuiButtonHandle, GuiInputHandle, ViserServer
+from viser import GuiButtonHandle, GuiInputHandle
 
 from solfer.view.playback import Playback
 from solfer.view.requests import PageRequests
+from solfer.view.server import PageServer
 
 TIME_LINE_STEP = 0.01
 """Of the time line [s]."""
@@ -17,30 +18,34 @@ class TimeLine:
     """Plays, pauses and scrubs.
 
     Args:
-        viser: The page.
+        server: The page.
         requests: Carries it out.
         playback: What is played.
     """
 
-    def __init__(self, viser: ViserServer, requests: PageRequests, playback: Playback):
+    def __init__(self, server: PageServer, requests: PageRequests, playback: Playback):
         self._playback = playback
         length = max(math.floor(100.0 * (playback.end - playback.begin)) / 100.0, TIME_LINE_STEP)
-        gui = viser.gui
+        gui = server.viser.gui
         self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, TIME_LINE_STEP, 0.0)
         self._button: GuiButtonHandle = gui.add_button("pause")
         speed = gui.add_dropdown("speed", PLAYBACK_SPEEDS, initial_value="1")
-        self._button.on_click(lambda _: requests.submit(self._toggle))
+        server.incoming.display |= {each._impl.uuid for each in (self._slider, self._button, speed)}
+
+        @self._button.on_click
+        async def _(_: object) -> None:
+            requests.submit("toggle", self._toggle)
 
         @self._slider.on_update
         async def _(event: object) -> None:
             time = self._slider.value
             if event.client is not None:  # type: ignore[attr-defined]
-                requests.submit(lambda: self._scrub(time))
+                requests.submit("scrub", lambda: self._scrub(time))
 
         @speed.on_update
         async def _(_: object) -> None:
             factor = float(speed.value)
-            requests.submit(lambda: setattr(playback, "speed", factor))
+            requests.submit("speed", lambda: setattr(playback, "speed", factor))
 
     def update(self) -> None:
         """Show the present time."""

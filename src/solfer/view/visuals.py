@@ -38,7 +38,7 @@ class Visual:
 def visuals_of(description: Description) -> dict[str, list[Visual]]:
     """Make what is seen of each link, one surface for each colour; collision shapes where a link has nothing else.
 
-    Meshes that cannot be read are left out, and logged; so is a colour that is none.
+    Shapes that cannot be read are left out, and logged; so is a colour that is none.
     """
     robot = parse(description.text)
     materials = {each.get("name", ""): each for each in robot.findall("material")}
@@ -54,7 +54,7 @@ def visuals_of(description: Description) -> dict[str, list[Visual]]:
                 parts.setdefault(color, []).extend(meshes)
                 wrong += [f"{description.where}:{fault}: link '{name}'"] if fault else []
         found[name] = [Visual(_one(meshes), color) for color, meshes in parts.items()]
-    _warn("meshes that cannot be read are left out", absent)
+    _warn("shapes that cannot be read are left out", absent)
     _warn("a colour has four numbers from 0 to 1", wrong)
     return found
 
@@ -72,39 +72,45 @@ def _one(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 
 def _meshes(shape: Element, where: str, absent: list[str]) -> Iterator[trimesh.Trimesh]:
-    place = np.eye(4)
-    origin = shape.find("origin")
-    if origin is not None:
-        place[:3, :3] = rotation_from_rpy(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
-        place[:3, 3] = _numbers(origin, "xyz", (0.0, 0.0, 0.0))
     for geometry in shape.findall("geometry/*"):
-        mesh = _mesh(geometry, where)
-        if mesh is None:
+        try:
+            mesh = _mesh(geometry, where)
+            mesh.apply_transform(_place(shape.find("origin")))
+        except Exception:  # whatever a reader of a format raises
             absent.append(geometry.get("filename", geometry.tag))
             continue
-        mesh.apply_transform(place)
         yield mesh
 
 
-def _mesh(geometry: Element, where: str) -> trimesh.Trimesh | None:
-    """Make a shape; None: it cannot be made."""
+def _place(origin: Element | None) -> np.ndarray:
+    """Return the transform of an origin, shape (4, 4)."""
+    place = np.eye(4)
+    if origin is not None:
+        place[:3, :3] = rotation_from_rpy(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
+        place[:3, 3] = _numbers(origin, "xyz", (0.0, 0.0, 0.0))
+    return place
+
+
+def _mesh(geometry: Element, where: str) -> trimesh.Trimesh:
+    """Make a shape.
+
+    Raises:
+        Exception: It cannot be made, whatever its reader raises then.
+    """
     if geometry.tag == "box":
         return creation.box(_numbers(geometry, "size"))
     if geometry.tag == "sphere":
         return creation.icosphere(2, *_numbers(geometry, "radius"))
     if geometry.tag in ("cylinder", "capsule"):
-        radius, length = *_numbers(geometry, "radius"), *_numbers(geometry, "length")
+        (radius,) = _numbers(geometry, "radius")
+        (length,) = _numbers(geometry, "length")
         return creation.cylinder(radius, length) if geometry.tag == "cylinder" else creation.capsule(length, radius)
     path = find_mesh(where, geometry.get("filename", ""))
     if path is None:
-        return None
-    try:
-        mesh = trimesh.load_mesh(path)
-        unit = unit_of(path)
-    except Exception:  # whatever a reader of a format raises
-        return None
+        raise ValueError
+    mesh = trimesh.load_mesh(path)
     scale = np.eye(4)
-    scale[(0, 1, 2), (0, 1, 2)] = unit * np.array(_numbers(geometry, "scale", (1.0, 1.0, 1.0)))
+    scale[(0, 1, 2), (0, 1, 2)] = unit_of(path) * np.array(_numbers(geometry, "scale", (1.0, 1.0, 1.0)))
     mesh.apply_transform(scale)
     return mesh
 

@@ -1,7 +1,6 @@
 """The server for Foxglove, by a client of its websocket protocol."""
 
 import json
-import socket
 import struct
 from contextlib import closing, contextmanager
 
@@ -14,6 +13,7 @@ pytest.importorskip("foxglove", reason="needs pip install -r requirements-view.t
 from support.page import opened_page  # noqa: E402
 from support.page_bench import PageBench  # noqa: E402
 from support.unit.upper_body import upper_body  # noqa: E402
+from websockets.exceptions import InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 
 from solfer.transport.parameters import SetParameters  # noqa: E402
@@ -61,7 +61,7 @@ class Client:
 
 @contextmanager
 def served(repository, control):
-    bench = PageBench(upper_body(repository), control, foxglove=0)
+    bench = PageBench(upper_body(repository), control, foxglove=True)
     server = bench.page.foxglove
     with closing(bench.server), closing(server), connect(server.address, subprotocols=[PROTOCOL]) as connection:
         client = Client(connection)
@@ -125,9 +125,37 @@ def test_parameters_change_with_control_while_no_page_commands(repository):
         assert len(bench.asked) == 1
 
 
-def test_only_this_machine_is_served(repository):
-    with served(repository, False) as (bench, _):
-        port = int(bench.page.foxglove.address.rpartition(":")[2])
-        for other in ("127.0.0.2", "::1"):
-            with pytest.raises(OSError):
-                socket.create_connection((other, port), timeout=1.0).close()
+def test_only_programs_with_the_token_are_served(repository):
+    """Without it, or from the page of another origin, there is nothing; the server behind has no parameters."""
+    with served(repository, True) as (bench, _):
+        address = bench.page.foxglove.address
+        token = address.split("/")[-2]
+        for wrong, origin in ((address.replace(token, token[:-1]), None), (address, "https://evil.example")):
+            with pytest.raises(InvalidStatus):
+                connect(wrong, subprotocols=[PROTOCOL], origin=origin)
+        connect(address, subprotocols=[PROTOCOL], origin="https://app.foxglove.dev").close()
+        with connect(bench.page.foxglove._relay.behind, subprotocols=[PROTOCOL]) as connection:
+            client = Client(connection)
+            bench.clients.append(client_of(client))
+            client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 9.0}], id="set")
+            client.send(op="getParameters", parameterNames=[], id="all")
+            bench.until(lambda: "all" in client.answers)
+            bench.run(4)
+            assert not client.answers["all"] and not bench.asked
+
+
+@pytest.mark.parametrize("name", ["hands.gain", "other.gain", "..", ""])
+def test_values_that_are_none_end_nothing(repository, caplog, name):
+    """Bytes, bytes that cannot be decoded, nested values, unknown names; then a number counts."""
+    nested = 1
+    for _ in range(100):
+        nested = [nested]
+    with served(repository, True) as (bench, client):
+        for value, kind in (("AAAA", "byte_array"), ("A", "byte_array"), (nested, None), (None, None)):
+            client.send(op="setParameters", parameters=[{"name": name, "value": value, "type": kind}])
+            bench.run(2)
+        assert all("\n" not in line for line in caplog.messages)
+        bench.asked.clear()
+        client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.5}])
+        bench.until(lambda: bench.asked)
+        assert bench.asked == [SetParameters(("gain",), ("3.5",))]

@@ -189,3 +189,95 @@ def test_a_reference_is_dragged_in_the_frame_of_its_task(bench):
     bench.moved.drain()
     bench.run(6)
     assert not bench.moved.drain()
+
+
+def value(client, label):
+    return client.gui[client.find(label)]["value"]
+
+
+def test_a_page_without_control_changes_nothing_of_others(bench):
+    """Inputs and handles that all pages share keep what they have, and the page shows that again."""
+    client, other = bench.clients
+    bench.run(30)
+    for has_holder in (False, True):
+        if has_holder:
+            command(bench)
+        for label, number in (("speed [m/s]", 0.4), ("gain [1/s]", 5.0)):
+            before = value(client, label)
+            other.gui[other.find(label)]["value"] = number
+            other.change(label, number)
+            bench.until(lambda: value(other, label) == before)  # noqa: B023
+            assert value(client, label) == before
+        other.positions.pop("/drag/hands/left", None)
+        before = client.positions.get("/drag/hands/left")
+        message = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.9, 0.1, 0.4))
+        other.send(message)
+        bench.until(lambda: "/drag/hands/left" in other.positions)
+        assert client.positions.get("/drag/hands/left") == before
+        assert_allclose(other.positions["/drag/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
+    client.hold("ahead")
+    bench.run(4)
+    assert {message.fields["linear"]["x"] for message in bench.driven.drain()} == {0.1}
+    assert not bench.asked and not bench.moved.drain()
+
+
+def test_numbers_of_a_page_stay_in_the_range_of_their_slider(bench):
+    bench.run(30)
+    command(bench)
+    client = bench.clients[0]
+    numbers = {1e9: 0.5, -0.5: 0.02, 1e308: 0.5, 2**62: 0.5, np.nan: 0.1, np.inf: 0.1, "1": 0.1, True: 0.1, 0.3: 0.3}
+    for number, expected in numbers.items():
+        client.change("speed [m/s]", 0.1)
+        client.change("speed [m/s]", number)
+        client.hold("ahead")
+        bench.run(2)
+        speeds = [message.fields["linear"]["x"] for message in bench.driven.drain()]
+        assert speeds[-1] == pytest.approx(expected), number
+    drag = _messages.TransformControlsUpdateMessage
+    for place in ((1e308, 0.0, 0.0), (np.nan, 0.0, 0.0), (50.0, 0.0, 0.0)):
+        client.send(drag("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), place))
+    bench.run(4)
+    assert not bench.moved.drain()
+
+
+@pytest.mark.parametrize("bench", [False], indirect=True)
+def test_no_page_takes_the_emergency_stop_away(bench):
+    client, other = bench.clients
+    button = other.find("EMERGENCY STOP")
+    for name, content in (("removed", True), ("update_cb", []), ("is_button", False), ("value", [1])):
+        other.send(_messages.GuiUpdateMessage(button, {name: content}))
+    other.send(_messages.FileTransferStartUpload(button, "a", "a", "a", part_count=0, size_bytes=0))
+    bench.run(4)
+    for _ in range(2):  # twice: the second question replaces the first
+        client.click("EMERGENCY STOP")
+        bench.until(lambda: has(bench, "stop the robot now"))
+    bench.run(4)
+    client.send(_messages.GuiUpdateMessage([*client.gui][-2], {"value": True}))
+    bench.until(lambda: bench.asked == [NoFields()])
+
+
+def test_newer_numbers_overtake_those_that_wait(bench):
+    """A page sends 3000 numbers at once: few of them reach the plugin, the newest last."""
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    command(bench)
+    gains = np.linspace(0.1, 7.0, 3000).tolist()
+    for gain in gains:
+        bench.clients[0].change("gain [1/s]", gain)
+    bench.until(lambda: bench.asked and bench.asked[-1] == SetParameters(("gain",), (str(gains[-1]),)))
+    assert len(bench.asked) < 300
+
+
+def test_a_request_that_fails_is_one_line_and_ends_nothing(bench, caplog):
+    """A parameter whose value cannot be sent; the emergency stop behind it is carried out."""
+
+    def fails():
+        raise ValueError("no value")
+
+    for _ in range(5):
+        bench.page._requests.submit("first", fails)
+        bench.run(1)
+    assert [each.getMessage() for each in caplog.records] == ["a request of a page failed: ValueError: no value"]
+    bench.clients[0].click("EMERGENCY STOP")
+    bench.until(lambda: has(bench, "stop the robot now"))
+    bench.clients[0].click("stop the robot now")
+    bench.until(lambda: bench.asked)

@@ -1,11 +1,14 @@
 """A recording that is played shows what was recorded at each time."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
+from support.page import opened_page  # noqa: E402
 from support.unit.upper_body import upper_body  # noqa: E402
 
 from solfer import Robot  # noqa: E402
@@ -13,7 +16,7 @@ from solfer.errors import RecordingError  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
 from solfer.recording.model import JOINTS_KIND, Channel, Recording  # noqa: E402
 from solfer.scene import LiveScene  # noqa: E402
-from solfer.view import Playback  # noqa: E402
+from solfer.view import Page, PageServer, Playback  # noqa: E402
 from solfer.view.playback import robot_of_recording  # noqa: E402
 
 TIMES = 100.0 + np.arange(0.0, 4.0, 0.01)
@@ -101,3 +104,31 @@ def test_a_recording_without_joints_or_robot_is_refused(robot):
         Playback(Recording({}), MemoryMiddleware(Bus(), "recording"), robot)
     with pytest.raises(RecordingError, match="it has no robot"):
         robot_of_recording(Recording({}))
+
+
+@pytest.mark.slow
+def test_the_time_line_takes_its_own_times_and_speeds_alone(recording):
+    """Speeds and times that are none change nothing; then those of the lists count."""
+    bus = Bus()
+    shown = robot_of_recording(recording)
+    playback = Playback(recording, MemoryMiddleware(bus, "recording"), shown)
+    with closing(PageServer(0)) as server:
+        page = Page(server, shown.description, MemoryMiddleware(bus, "view"), playback=playback)
+        with opened_page(server.address) as client:
+            client.until(lambda: "time [s]" in client.labels, "a time line")
+
+            def change(label, number):
+                client.change(label, number)
+                for _ in range(3):
+                    client.receive(0.05)
+                    page.update(None)
+
+            for speed in ("nan", "inf", "-1", "1e308", float("nan"), float("inf"), 3):
+                change("speed", speed)
+                assert playback.speed == 1.0
+            for time in (float("nan"), float("inf"), "1", None):
+                change("time [s]", time)
+                assert playback.time == playback.begin and playback.plays
+            change("speed", "4")
+            change("time [s]", 1e9)
+            assert playback.speed == 4.0 and playback.time == pytest.approx(playback.end, abs=0.02)

@@ -2,7 +2,9 @@
 
 import http.client
 import socket
+from contextlib import closing
 
+import msgspec
 import pytest
 from websockets.exceptions import InvalidStatus
 
@@ -75,3 +77,51 @@ def test_no_page_opens_a_way_from_other_machines(server):
         page.send(_messages.ShareUrlRequest())
         page.receive(0.3)
     assert server.viser._share_tunnel is None
+
+
+@pytest.mark.parametrize("length", [300, 3000])
+def test_a_path_that_no_file_can_have_is_not_found(server, length):
+    path = "/" + server.address.split("/", 3)[3]
+    assert status(server, path + length * "a")[0] == 404
+    assert status(server, path + "a/" * (length // 2))[0] == 404
+
+
+JUNK = {
+    "text": "hello",
+    "empty": b"",
+    "opcode": b"\xc1",
+    "number": b"\x01",
+    "nested": b"\x91" * 20000 + b"\x01",
+    "nested maps": b"\x81\xa1a" * 20000 + b"\x01",
+    "list": msgspec.msgpack.encode([1, 2]),
+    "no type": msgspec.msgpack.encode({"uuid": "a"}),
+    "other type": msgspec.msgpack.encode({"type": "RunJavascriptMessage", "source": "1"}),
+    "type of a list": msgspec.msgpack.encode({"type": [1]}),
+    "wrong field": msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": 3, "updates": {"value": 1}}),
+    "no value": msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": "a", "updates": {"nothing": 1}}),
+    "camera": msgspec.msgpack.encode({"type": "ViewerCameraMessage", "wxyz": [1.0]}),
+}
+
+
+def test_junk_is_one_line_and_the_page_goes_on(caplog, capfd):
+    with closing(PageServer(0)) as server, opened_page(server.address) as page:
+        page.receive(0.3)
+        for _ in range(20):
+            for junk in JUNK.values():
+                page._connection.send(junk)
+        server.viser.gui.add_button("still there")
+        page.until(lambda: "still there" in page.labels, "the page")
+    lines = [each.getMessage() for each in caplog.records if each.name.startswith("solfer")]
+    assert 1 <= len(lines) <= 3 and all("no message" in each for each in lines)
+    assert "Traceback" not in caplog.text + "".join(capfd.readouterr())
+
+
+def test_junk_instead_of_a_request_is_one_line(server, caplog, capfd):
+    for junk in (b"\x00\xff\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 300 + b"\r\n"):
+        for _ in range(5):
+            with socket.create_connection(("127.0.0.1", server.viser.get_port()), timeout=5.0) as connection:
+                connection.sendall(junk)
+                connection.shutdown(socket.SHUT_WR)
+                connection.recv(65536)
+    assert "Traceback" not in caplog.text + "".join(capfd.readouterr())
+    assert len(caplog.records) <= 3

@@ -49,7 +49,7 @@ def test_a_mesh_without_a_unit_that_can_be_read_is_left_out(tmp_path, caplog, un
     text = robot('rgba="1 1 1 1"', '<mesh filename="a.dae"/>')
     with caplog.at_level(logging.WARNING):
         assert not visuals_of(Description.from_text(text, str(tmp_path / "r.urdf")))["a"]
-    assert "meshes that cannot be read are left out: a.dae" in caplog.text
+    assert "shapes that cannot be read are left out: a.dae" in caplog.text
 
 
 def test_units_of_a_mesh_and_its_scale_count(tmp_path):
@@ -57,3 +57,15 @@ def test_units_of_a_mesh_and_its_scale_count(tmp_path):
     text = robot('rgba="1 1 1 1"', '<mesh filename="a.dae" scale="1 1 2"/>')
     (visual,) = visuals_of(Description.from_text(text, str(tmp_path / "r.urdf")))["a"]
     np.testing.assert_allclose(np.ptp(visual.mesh.bounds, axis=0), (0.1, 0.2, 0.6), atol=1e-6)
+
+
+@pytest.mark.parametrize("size", ["a b c", "1 2", ""])
+def test_a_shape_that_cannot_be_read_is_left_out(caplog, size):
+    """Also one whose numbers the reader of the robot has not refused."""
+    text = robot('rgba="1 1 1 1"', '<box size="1 1 1"/><cone/><sphere radius="2"/>')
+    description = Description.from_text(text, "r.urdf")
+    description.links["a"].visuals[0].find("geometry/box").set("size", size)
+    with caplog.at_level(logging.WARNING):
+        (visual,) = visuals_of(description)["a"]
+    np.testing.assert_allclose(np.ptp(visual.mesh.bounds, axis=0), 4.0, atol=0.1)
+    assert caplog.messages == ["shapes that cannot be read are left out: box and 1 more"]

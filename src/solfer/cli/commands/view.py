@@ -25,12 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="port, or the next free one (default: 8080; 0: any)",
     )
     parser.add_argument(
-        "--foxglove",
-        metavar="PORT",
-        nargs="?",
-        const=8765,
-        type=Number(0, 65535, "", int),
-        help="a server for Foxglove beside it, for this machine alone (default: 8765; 0: any)",
+        "--foxglove", action="store_true", help="a server for Foxglove beside it, at the second address that is printed"
     )
     parser.add_argument(
         "--control", action="store_true", help="let one page at a time command: references, the base, plugins"
@@ -43,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         SolferError: There is no such robot or source, or viser is missing.
     """
-    others = (options.namespace, options.study, options.foxglove, options.control or None)
+    others = (options.namespace, options.study, options.foxglove or None, options.control or None)
     if options.file is not None and any(each is not None for each in others):
         options.parser.error("a recording with --namespace, --run, --foxglove or --control, expected FILE alone")
     from solfer.cli.view.actions import show
