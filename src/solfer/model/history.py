@@ -25,6 +25,7 @@ class History:
         sender: Name of the publisher of the newest message.
         count: Messages of this cycle; 0: nothing new.
         dropped: Messages that were lost so far because there were more than N in a cycle, the oldest of them.
+        unread: Those of them that were lost before the pipe read them.
     """
 
     def __init__(self, interfaces: Sequence[str], dofs: np.ndarray, size: int):
@@ -33,7 +34,7 @@ class History:
         self.stamps = np.zeros(size)
         self.arrivals = np.zeros(size)
         self.values = np.zeros((size, len(self.interfaces), len(dofs)))
-        self.count = self.dropped = 0
+        self.count = self.dropped = self.unread = 0
         self.sender = ""
 
     @property

@@ -174,6 +174,10 @@ Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a 
 """
 
 
+RETURNED, AGREED = 0.02, 0.5
+"""Distance from where a joint was accepted last at which it is right again [rad, m]: less than a contradiction; and for
+how long it has to move by its velocities until then [s]. A joint without ends may be anywhere."""
+
 STRUCK, JOLT, SHAKEN = 5, 2.0, 0.5
 """Number of joints that change their velocities at once by more than the second between two messages [rad/s, m/s] where
 the robot strikes something: a wrong encoder does not. Time for which the velocities of joints do not show their ways
@@ -190,7 +194,17 @@ def _is_struck(velocity, part, before, stamp):
     return count >= STRUCK
 
 
-def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp):
+@part
+def _is_right_again(before, k, step, doubt, stamp, is_near):
+    """Whether a joint that contradicted its velocities has moved by them for long, and was near its place meanwhile."""
+    before[12, k] += step
+    if not is_near or abs(step) > doubt or abs(before[12, k]) > CHECK_STEP:
+        before[11, k] = stamp
+        before[12, k] = 0.0
+    return stamp - before[11, k] > AGREED
+
+
+def _find_leap(position, velocity, part, before, fastest, turns, endless, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
@@ -203,10 +217,11 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
         before: Position, arrival and stamp of the last measurement that was possible, of each joint; velocity, stamp
             and position of the last one; then summed how far it moved otherwise than by its velocities, and how far it
             may have; for how long it was frozen in motion: what comes after that is compared with nothing; and how far
-            that sum may be for its position and its velocities to agree again, 0 while they do; and until when its
-            velocities do not show its ways.
+            that sum may be for its position and its velocities to agree again, 0 while they do; until when its
+            velocities do not show its ways; and since when they agree again, and the sum since then.
         fastest: Largest speed of each joint; infinity: none is known.
         turns: What positions may jump by; 0: nothing.
+        endless: Whether each joint has no ends.
         arrival: Arrival of the measurement.
         stamp: Its stamp.
 
@@ -236,8 +251,12 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                 before[6, k] = before[7, k] = before[9, k] = 0.0
             elif passed > 0.0 and before[9, k] > 0.0:  # all counts until they agree, and no doubt excuses it meanwhile
                 before[6, k] += step
+                doubt = CHECK_STEP + CHECK_LATENESS * max(abs(fast), abs(slow))
+                is_near = endless[k] or abs(away) < RETURNED
                 if abs(before[6, k]) <= before[9, k]:
                     before[9, k] = 0.0
+                elif _is_right_again(before, k, step, doubt, stamp, is_near):
+                    before[6, k] = before[7, k] = before[9, k] = 0.0
             elif 0.0 < passed < KNOWN and (fast != 0.0 or slow != 0.0 or before[7, k] > 0.0):
                 keep = SUMMED / (SUMMED + passed)
                 speed = max(abs(fast), abs(slow))
@@ -249,9 +268,11 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                 if abs(step) > doubt:
                     before[6, k] = step
                     before[9, k] = doubt
+                before[11, k] = stamp
+                before[12, k] = 0.0
             if wrong < 0 and before[9, k] > 0.0:
                 wrong = k + 2 * len(position)
-            if passed > 0.0 or passed < -LONGEST_INTERVAL:
+            if passed != 0.0:
                 before[3, k], before[4, k], before[5, k] = fast, stamp, position[k]
                 before[8, k] = before[8, k] + passed if is_frozen else 0.0
     if wrong < 0:
@@ -263,7 +284,8 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
 
 
 find_leap = cached(
-    "int64(float64[::1], float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], float64, float64)",
+    "int64(float64[::1], float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], boolean[::1],"
+    " float64, float64)",
     _find_leap,
 )
 
@@ -278,31 +300,37 @@ which the orientation turns otherwise: they are spikes."""
 APART, APART_SHARE = 0.08, 0.3
 """Difference of two turns that contradict each other [rad], and as a share of both."""
 
-CHECK_SKEW = 0.4
-"""Angle between the vertical and a mean specific force that contradict each other [rad]."""
+CHECK_SKEW, SKEWED_TIME, WITNESSED = 0.1, 2.0, 0.5
+"""Angle between the vertical and a mean specific force that contradict each other [rad]; time over which that is the
+mean [s], so that a robot may change its velocity by 2 m/s; and for how long it has to agree with a tilt that leapt."""
 
 GRAVITY, CHECK_UNEVENNESS, CHECK_TURN_LIMIT = 9.81, 1.0, 0.5
 """Specific force at rest, how far it may be from that [m/s^2], and how fast its sensor may turn [rad/s]: beyond that
 it is not gravity that is measured, as in a fall."""
 
+NO_GRAVITY = 3.0
+"""Difference of the mean specific force of 2 s from gravity that no motion explains [m/s^2]: it is in other units, or
+without gravity."""
 
-def _check_turn(values, own_axes, force, arrival, stamp, before):
-    """Check whether a link can have turned like this since the measurement before, and remember it if it can.
 
-    Args:
-        values: Quaternion (x, y, z, w), position, linear and angular velocity.
-        own_axes: Whether velocities are in the axes of the link.
-        force: Specific force in the axes of the link; zeros if it is not measured.
-        arrival: Arrival of the measurement.
-        stamp: Its stamp.
-        before: Quaternion, arrival and stamp of the measurement before; sums of turns by orientation and by rates; sum
-            of the specific force in the world's axes; whether the turns contradicted each other;
-            and for how long the orientation was frozen.
+@part
+def _tilted(x, y, z, w, before, row):
+    """Return by what angle the vertical of a quaternion differs from that of the one at `row` [rad]."""
+    u = before[row]
+    v = before[row + 1]
+    s = before[row + 2]
+    c = before[row + 3]
+    upright = (
+        4.0 * (x * z - y * w) * (u * s - v * c)
+        + 4.0 * (y * z + x * w) * (v * s + u * c)
+        + (1.0 - 2.0 * (x * x + y * y)) * (1.0 - 2.0 * (u * u + v * v))
+    )
+    return math.acos(min(1.0, max(-1.0, upright)))
 
-    Returns:
-        1 and an angle: the tilt leaps by it. 2: it turns by this angle, and otherwise by its rates. 3: the specific
-        force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow. 0: none.
-    """
+
+@part
+def _find_fault(values, own_axes, force, arrival, stamp, before):
+    """Check an orientation as `_check_turn` does; remember it, whether it counts or not."""
     x = values[0]
     y = values[1]
     z = values[2]
@@ -315,47 +343,58 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     known = before[4] > -math.inf
     passed = stamp - before[5]
     if known:
-        upright = (
-            4.0 * (x * z - y * w) * (u * s - v * c)
-            + 4.0 * (y * z + x * w) * (v * s + u * c)
-            + (1.0 - 2.0 * (x * x + y * y)) * (1.0 - 2.0 * (u * u + v * v))
-        )
-        tilt = math.acos(min(1.0, max(-1.0, upright)))
+        tilt = _tilted(x, y, z, w, before, 0)
         if tilt > TILTED + TILTING * min(elapsed, TILT_WINDOW):
-            return 1, tilt
+            before[6:16] = 0.0
+            before[21] = max(before[21], _tilted(x, y, z, w, before, 17))
+            before[22] = 0.0
+    else:
+        before[14] = SKEWED_TIME * GRAVITY  # a robot that starts by accelerating is not askew
+        before[23] = GRAVITY
     before[0] = x
     before[1] = y
     before[2] = z
     before[3] = w
     before[4] = arrival
     before[5] = stamp
-    if not known:
-        before[14] = SUMMED * GRAVITY  # a robot that starts by accelerating is not askew
     is_frozen = x == u and y == v and z == s and w == c
     if passed >= GAP or passed < -LONGEST_INTERVAL or (before[16] > GAP and not is_frozen):
         before[6:12] = 0.0
         before[15] = 0.0
     before[16] = before[16] + passed if is_frozen else 0.0
-    if not (known and 0.0 < passed < GAP):
-        return 0, 0.0
-    keep = SUMMED / (SUMMED + passed)
+    is_next = known and 0.0 < passed < GAP
+    rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
     fx = force[0]
     fy = force[1]
     fz = force[2]
-    rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
-    if rate < CHECK_TURN_LIMIT and abs(math.sqrt(fx * fx + fy * fy + fz * fz) - GRAVITY) < CHECK_UNEVENNESS:
+    even = abs(math.sqrt(fx * fx + fy * fy + fz * fz) - GRAVITY) < CHECK_UNEVENNESS
+    if is_next and even and rate < CHECK_TURN_LIMIT:
         # R f = f + 2 w (a x f) + 2 a x (a x f), where a is the axis of the quaternion
         px = y * fz - z * fy
         py = z * fx - x * fz
         pz = x * fy - y * fx
+        keep = SKEWED_TIME / (SKEWED_TIME + passed)
         before[12] = keep * before[12] + passed * (fx + 2.0 * (w * px + y * pz - z * py))
         before[13] = keep * before[13] + passed * (fy + 2.0 * (w * py + z * px - x * pz))
         before[14] = keep * before[14] + passed * (fz + 2.0 * (w * pz + x * py - y * px))
-        askew = math.atan2(math.sqrt(before[12] ** 2 + before[13] ** 2), before[14])
-        if askew > CHECK_SKEW:
-            return 3, askew
-    if rate == 0.0:  # many senders leave them zero
+        before[22] += passed
+    if is_next and fx * fx + fy * fy + fz * fz > 0.0:
+        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+        before[23] += (size - before[23]) * passed / SKEWED_TIME
+    askew = math.atan2(math.sqrt(before[12] ** 2 + before[13] ** 2), before[14])
+    if before[21] > 0.0:
+        is_witnessed = before[22] > WITNESSED and askew < CHECK_SKEW
+        if not is_witnessed and _tilted(x, y, z, w, before, 17) > TILTED:
+            return 1, before[21]
+        before[21] = 0.0
+        before[14] += SKEWED_TIME * GRAVITY
+        askew = 0.0
+    if askew > CHECK_SKEW:
+        return 3, askew
+    if not is_next or rate == 0.0:  # many senders leave them zero
         return 0, 0.0
+    fault = 5 if abs(before[23] - GRAVITY) > NO_GRAVITY else 0
+    keep = SUMMED / (SUMMED + passed)
     # the turn since then: in the axes of the link, or in those of the world
     side = 1.0 if own_axes else -1.0
     sign = 2.0 if c * w + u * x + v * y + s * z >= 0.0 else -2.0
@@ -368,7 +407,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     if rate > CHECK_TURN_SHARE and math.sqrt(dx * dx + dy * dy + dz * dz) > FOLLOWED * passed * rate:
         return 4, rate
     if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + CHECK_TURN_SHARE * passed:
-        return 0, 0.0
+        return fault, before[23]
     if before[15]:  # what contradicted stays in the sums until it agrees again
         keep = 1.0
     turned = rates = apart = 0.0
@@ -380,7 +419,32 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
         apart += (before[6 + axis] - before[9 + axis]) ** 2
     contradicts = math.sqrt(apart) > APART + APART_SHARE * (math.sqrt(turned) + math.sqrt(rates))
     before[15] = 1.0 if contradicts else 0.0
-    return (2, math.sqrt(turned)) if contradicts else (0, 0.0)
+    return (2, math.sqrt(turned)) if contradicts else (fault, before[23])
+
+
+def _check_turn(values, own_axes, force, arrival, stamp, before):
+    """Check whether a link can have turned like this since the measurement before.
+
+    Args:
+        values: Quaternion (x, y, z, w), position, linear and angular velocity.
+        own_axes: Whether velocities are in the axes of the link.
+        force: Specific force in the axes of the link; zeros if it is not measured.
+        arrival: Arrival of the measurement.
+        stamp: Its stamp.
+        before: Quaternion, arrival and stamp of the measurement before; sums of turns by orientation and by rates; sum
+            of the specific force in the world's axes; whether the turns contradicted each other; for how long the
+            orientation was frozen; the quaternion that was accepted last; by how much the tilt has leapt from there, 0:
+            it has not; for how long the specific force was measured since then; and its mean size.
+
+    Returns:
+        1 and an angle: the tilt has leapt by it. 2: it turns by this angle, and otherwise by its rates. 3: the specific
+        force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow. 0: none.
+        5: the mean specific force is so large [m/s^2], which refutes nothing.
+    """
+    fault, size = _find_fault(values, own_axes, force, arrival, stamp, before)
+    if fault == 0 or fault == 5:
+        before[17:21] = values[:4]
+    return fault, size
 
 
 check_turn = cached(

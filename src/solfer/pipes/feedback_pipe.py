@@ -8,14 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.errors import Contradiction, NotFinite, PipeError, SolferError, UnknownName, Unrelated
+from solfer.errors import NotFinite, PipeError, SolferError, UnknownName, Unrelated
 from solfer.model import History, State
 from solfer.numerics.filters import LowPass
+from solfer.pipes.complaints import PipeComplaints
 from solfer.pipes.precedence import Precedence, Watch
 from solfer.pipes.state_field import StateField
-from solfer.throttle import Throttle
 from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, MessageStatus, Publisher, Reader
 from solfer.transport.messages import Message
+from solfer.transport.sender_clock import SenderClock
 
 logger = logging.getLogger(__name__)
 
@@ -24,10 +25,6 @@ MakeFilter = Callable[[int], LowPass]
 
 UNFIT = (PipeError, UnknownName, NotFinite)
 """Errors of a message that does not fit."""
-
-NAMING_DELAY = 0.2
-"""Time within which a plugin receives that its robot was put into another state, and within which joints agree with
-their velocities again after an impact: a contradiction that is still there then is one of a sensor [s]."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +48,8 @@ class Reception:
 class FeedbackPipe(abc.ABC):
     """A pipe that a plugin receives.
 
-    A message that does not fit is refused whole: nothing of it is used, and the refusal is counted and logged once a
-    second. One that has nothing of what the pipe receives is no fault as soon as another one fits.
-    What contradicts earlier measurements is logged `NAMING_DELAY` later, unless the pipe restarts meanwhile, or it was
-    an impact.
+    A message that does not fit is refused whole: nothing of it is used, see `PipeComplaints`. One that has nothing of
+    what the pipe receives is no fault as soon as another one fits.
     Where a topic has several publishers, the newest message counts, and their names are logged; for measured States
     the first publisher counts, see `StateFeedbackPipe`.
 
@@ -68,18 +63,17 @@ class FeedbackPipe(abc.ABC):
         received: Whether all values of the pipe have been received since the start or the last `restart`.
         arrival: Arrival of the newest accepted message, in the pipe's own clock [s]; infinity while there is none since
             the start or the last `restart`. If several publishers are required it is that of the stalest of them.
-        stamp: When its numbers were true, by the sender's clock [s]; zero before the first.
+        stamp: When the numbers of the newest accepted message were true, by the sender's clock [s]; zero before the
+            first. For measured States see `SenderClock`.
         handovers: How often another publisher replaced one that had timed out.
         changed: Arrival of the newest message that changed any number of the State [s]; infinity: that is not known.
-        refusal: Sender and reason of the newest refusal; of several in a row of the first.
-        refused_at: When the newest message was refused, in the pipe's own clock [s].
+        complaints: What is wrong with its messages.
     """
 
     _watch: Watch | None = None
+    _clock: SenderClock | None = None  # of the sender of the message that was read last; None: any stamp counts
     handovers = 0
     changed = math.inf
-    refusal = ""
-    refused_at = -math.inf
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name = name
@@ -89,16 +83,13 @@ class FeedbackPipe(abc.ABC):
         self.received = False
         self.arrival = math.inf
         self.stamp = 0.0
-        self._refused = 0
-        self._throttle = Throttle(logger)
-        self._accepted_before = -1  # number of accepted messages before `refusal`
-        self._doubt: tuple[str, Contradiction, float] | None = None  # sender, error and arrival; not logged yet
-        self._contradicted = -1  # number of accepted messages before the last one that is logged
+        self._stamp = 0.0  # of the message that was read last
+        self.complaints = PipeComplaints(logger, name, reader)
 
     @property
     def refused(self) -> int:
         """Number of messages that did not fit."""
-        return self._refused + self.reader.refused
+        return self.complaints.refused + self.reader.refused
 
     @property
     def measures(self) -> bool:
@@ -118,9 +109,8 @@ class FeedbackPipe(abc.ABC):
     @property
     def lacks(self) -> str:
         """Description of the values that have not been received yet, and why messages with them are refused."""
-        if self.accepted != self._accepted_before or self._doubt is not None:
-            return self.place
-        return f"{self.place}, which refuses messages of {self.refusal}"
+        refusal = self.complaints.lasting
+        return f"{self.place}, which refuses messages of {refusal}" if refusal else self.place
 
     @property
     def place(self) -> str:
@@ -186,9 +176,7 @@ class FeedbackPipe(abc.ABC):
         """Begin again: discard what was received so far. Written values stay."""
         self.received = False
         self.arrival = math.inf
-        if self._doubt is not None:
-            self._doubt = None
-            self._accepted_before = -1
+        self.complaints.restart()
 
     def repeat(self, arrival: float) -> None:
         """Count numbers that were written where messages are decoded to as all of a message of `arrival` [s]."""
@@ -203,21 +191,25 @@ class FeedbackPipe(abc.ABC):
     def _accept(self) -> bool:
         """Decode the message that was read last; return whether it fits."""
         reader = self.reader
-        if self._doubt is not None and reader.arrival >= self._doubt[2] + NAMING_DELAY:
-            self._log_refusal(*self._doubt[:2])
-            self._contradicted = self.accepted
-            self._doubt = None
+        complaints = self.complaints
+        if complaints.doubt is not None:
+            complaints.look()
+        message = reader.message
+        if message is not None:
+            clock = self._clock
+            self._stamp = message.stamp if clock is None else clock.time(message.stamp, reader.arrival)
+            if clock is not None and clock.is_distrusted:
+                complaints.mention("clock", f"{message.sender} sends {clock.fault}; arrivals count instead")
         try:
-            self._decode(reader.message)
+            self._decode(message)
         except UNFIT as error:
             self._refuse(error)
             return False
-        if self._doubt is not None and self._doubt[1].fleeting:
-            self._doubt = None
+        if complaints.is_open:
+            complaints.close()
         self.accepted += 1
         self.arrival = reader.arrival
-        if reader.message is not None:
-            self.stamp = reader.message.stamp
+        self.stamp = self._stamp
         if not self.received:
             self.received = self._complete()
         return True
@@ -226,27 +218,16 @@ class FeedbackPipe(abc.ABC):
         unrelated = isinstance(error, Unrelated)
         if unrelated and self.arrival < math.inf:
             return  # another publisher has what the pipe receives
-        sender = self.reader.message.sender or self.reader.topic
-        if self.accepted != self._accepted_before:
-            self.refusal = f"{sender}: {error.line}"
-            self._accepted_before = self.accepted
         if unrelated and self.measures:
-            return  # a plugin that waits for the pipe logs it
-        self._refused += 1
-        self.refused_at = self.reader.arrival
-        if not isinstance(error, Contradiction) or self._contradicted == self.accepted:
-            self._log_refusal(sender, error)
-        elif self._doubt is None:
-            self._doubt = sender, error, self.refused_at
-
-    def _log_refusal(self, sender: str, error: SolferError) -> None:
-        self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
+            self.complaints.note(error)  # a plugin that waits for the pipe logs it
+        else:
+            self.complaints.refuse(error)
 
     def _name_publishers(self) -> None:
         reader = self.reader
         recent_senders = reader.recent_senders(reader.arrival - RIVALRY)
         if len(recent_senders) > 1:
-            self._throttle.warning(
+            self.complaints.throttle.warning(
                 "publishers",
                 "feedback '%s': %s publish on %s at the same time; the newest message counts, now that of %s",
                 self.name,
@@ -351,7 +332,6 @@ class StateFeedbackPipe(FeedbackPipe):
         if reception.history:
             self.history = History([each.interface for each in self.state_fields], dofs, reception.history)
             state.histories.append(self.history)
-        self._dropped = 0
 
     @property
     def measures(self) -> bool:
@@ -391,6 +371,7 @@ class StateFeedbackPipe(FeedbackPipe):
             sole = precedence.sole
             if len(publishers) == 1 and sole is not None and sole.name == publishers[0].name:
                 status = reader.read_from(publishers[0])
+                self._clock = publishers[0].clock
                 if status is NEW and not self._accept():
                     status = OLD
                 if status is NEW:
@@ -424,6 +405,8 @@ class StateFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.restart`; resets the filters as well."""
         super().restart()
         self._filtering = False
+        for publisher in self.reader.publishers:
+            publisher.clock.restart()
         for state_field in self.state_fields:
             state_field.reset()
         if self.history is not None:
@@ -473,19 +456,20 @@ class StateFeedbackPipe(FeedbackPipe):
         rest = history.size * max(1, len(reader.publishers))
         while publisher is not None:
             if self._take(publisher):
-                history.add(reader.message.stamp, reader.arrival, self.values, self.part)
+                history.add(self.stamp, reader.arrival, self.values, self.part)
                 history.sender = publisher.name
                 parts.append(self.part)
             rest -= 1
             publisher = reader.read_next() if rest else None
-        history.dropped += reader.dropped - self._dropped
-        self._dropped = reader.dropped
+        history.dropped += reader.dropped - history.unread
+        history.unread = reader.dropped
         return self._unite(parts)
 
     def _take(self, publisher: Publisher) -> bool:
         """Accept the message that was read last, if its publisher counts; return whether it does and fits."""
         sole = self._precedence.sole
         counts = (sole is not None and sole.name == publisher.name) or self._counts(publisher)
+        self._clock = publisher.clock
         if not counts or not self._accept():
             return False
         self._precedence.note(publisher.name, self.part, self.reader.arrival)
@@ -517,7 +501,7 @@ class StateFeedbackPipe(FeedbackPipe):
                 "feedback %s: %s counts from now on, since the one before timed out", self.place, publisher.name
             )
         if not counts:
-            self._throttle.warning(
+            self.complaints.throttle.warning(
                 publisher.name,
                 "feedback %s; %d messages of %s were ignored",
                 self.rivalry(reader.arrival) or self.place,

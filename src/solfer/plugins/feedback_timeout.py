@@ -22,11 +22,15 @@ TIMEOUT_PERIODS = 5
 FEEDBACK_FREEZE_TIME = 0.15
 """Time by the stamps without a change of any number after which a feedback is frozen, if joints are to move [s]."""
 
+CONTRADICTION_PATIENCE = 0.3
+"""Time after which a feedback of which each message is refused since others contradict it is wrong, and not late [s]:
+what it measured last is not kept, whatever its `on_timeout` says."""
+
 ENCODER_STEPS = 5e-3
 """Way that a joint has to be commanded to move meanwhile: several steps of its encoder [rad, m]."""
 
 RECENT = 0.5
-"""Time for which a refused message is a warning of the plugin's health [s]."""
+"""Time for which a message that is refused or odd is a warning of the plugin's health [s]."""
 
 TIMEOUT_ACTIONS = {
     "keep": "the last message stays valid",
@@ -39,22 +43,37 @@ TIMEOUT_ACTIONS = {
 SEVERITY = tuple(TIMEOUT_ACTIONS)
 
 
+class NewestChange:
+    """The newest change of a feedback's numbers.
+
+    Attributes:
+        arrival: When it arrived; infinity: that is not known [s].
+        stamp: When it was true, by the sender's clock [s].
+        distance: How far joints had been commanded to move until then [rad, m].
+    """
+
+    def __init__(self) -> None:
+        self.arrival = math.inf
+        self.stamp = self.distance = 0.0
+
+
 class FeedbackTimeout:
     """One feedback, and its timeout.
 
     A cycle in which the newest message is older than `timeout` is a strike, and so is one in which no measured number
     has changed for long, though joints were commanded to move: it is frozen. After `strikes` of them in a row the pipe
     has timed out, until a new message comes. Ages count in the pipe's own clock: in a paused simulation nothing ages.
+    `keep` bridges silence alone: with messages that contradict others the plugin holds.
 
     Args:
         feedback: The pipe.
         timeout: Age above which a cycle is a strike [s].
         strikes: Strikes in a row until the pipe has timed out.
-        action: What the plugin does then: one of ACTIONS.
+        action: What the plugin does then: one of TIMEOUT_ACTIONS.
         where: Where the configuration names its topic.
 
     Attributes:
-        timeout, action: See above.
+        timeout: See above.
         timed_out: Whether no message has come for too long.
         timeouts: How often it timed out.
         doubt: Why no plugin may start with the received messages; empty: it may, or this was not checked yet.
@@ -62,7 +81,7 @@ class FeedbackTimeout:
 
     def __init__(self, feedback: FeedbackPipe, timeout: float, strikes: int, action: str, where: str = ""):
         self.feedback = feedback
-        self.action = action
+        self._action = action
         self.where = where
         self.timed_out = False
         self.timeouts = 0
@@ -70,10 +89,8 @@ class FeedbackTimeout:
         self.timeout = timeout
         self._strikes = strikes
         self._count = 0
-        # the newest change, its stamp, and the commanded way until then
-        self._changed = math.inf
-        self._stamp = 0.0
-        self._moved = 0.0
+        self._change = NewestChange()
+        self._is_wrong = False
         self._young = False  # whether a message came in time since the start
         self._handovers = feedback.handovers
         self._handed_over = False
@@ -101,14 +118,17 @@ class FeedbackTimeout:
         """
         feedback = self.feedback
         status = feedback.run()
-        late = now - feedback.arrival > self.timeout
-        if feedback.changed != self._changed:
-            self._changed = feedback.changed
-            self._stamp = feedback.stamp
-            self._moved = distance
+        age = now - feedback.arrival
+        self._is_wrong = age > CONTRADICTION_PATIENCE and feedback.complaints.contradicts
+        late = age > self.timeout or self._is_wrong
+        change = self._change
+        if feedback.changed != change.arrival:
+            change.arrival = feedback.changed
+            change.stamp = feedback.stamp
+            change.distance = distance
         # in a simulation that pauses the stamps stay, too
-        stays = self._changed < math.inf and feedback.stamp - self._stamp > FEEDBACK_FREEZE_TIME
-        frozen = stays and distance - self._moved > ENCODER_STEPS and feedback.measures
+        stays = change.arrival < math.inf and feedback.stamp - change.stamp > FEEDBACK_FREEZE_TIME
+        frozen = stays and distance - change.distance > ENCODER_STEPS and feedback.measures
         late = late or frozen
         self._handed_over = handed_over = feedback.handovers != self._handovers
         if handed_over:  # another publisher measures another start
@@ -125,6 +145,11 @@ class FeedbackTimeout:
             if self._count == self._strikes:
                 self._time_out(now, frozen)
         return not self.timed_out and ((feedback.received and self._young) or not feedback.required)
+
+    @property
+    def action(self) -> str:
+        """What the plugin does at a timeout: one of TIMEOUT_ACTIONS."""
+        return "hold" if self._is_wrong and self._action == "keep" else self._action
 
     def missed(self, running: bool) -> bool:
         """Whether a timeout keeps a plugin that is `running` or not from its work.
@@ -156,10 +181,12 @@ class FeedbackTimeout:
         return f"{feedback.lacks}, where {feedback.silent} is silent" if is_known else feedback.lacks
 
     def refusal(self, now: float) -> str:
-        """Return why messages were refused lately, before the time `now` [s]; empty: none was, or the reader knows."""
-        feedback = self.feedback
-        is_recent = feedback.refusal and now - feedback.refused_at < RECENT
-        return f"{feedback.place} refuses messages of {feedback.refusal}" if is_recent else ""
+        """Return why messages were refused, or odd, lately, before the time `now` [s]; empty: none was."""
+        place = self.feedback.place
+        complaints = self.feedback.complaints
+        if complaints.refusal and now - complaints.refused_at < RECENT:
+            return f"{place} refuses messages of {complaints.refusal}"
+        return f"{place}: {complaints.remark}" if now - complaints.remarked_at < RECENT else ""
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""

@@ -7,6 +7,7 @@ from collections.abc import Container, Sequence
 from typing import Any
 
 from solfer.transport.messages import Message
+from solfer.transport.sender_clock import SenderClock
 
 
 class MessageStatus(enum.IntEnum):
@@ -36,10 +37,12 @@ class Publisher:
     Attributes:
         name: Its name.
         arrival: When its newest message arrived, in the pipe's own clock [s]; minus infinity before the first.
+        clock: Finds when the numbers of its messages were true.
     """
 
     def __init__(self, name: str):
         self.name = name
+        self.clock = SenderClock()
         self.arrival = -math.inf
 
 

@@ -4,7 +4,7 @@ import pytest
 from breaking.alarms import find_alarms
 from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
 
-from solfer.pipes.feedback_pipe import NAMING_DELAY
+from solfer.pipes.complaints import NAMING_DELAY
 
 NAMED = {
     "gyro_spikes": "an angular velocity of",

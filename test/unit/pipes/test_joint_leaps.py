@@ -188,7 +188,7 @@ def test_velocities_that_are_not_measured_contradict_nothing(leaps, left_out):
 @pytest.mark.parametrize(("struck", "is_refused"), [(6, False), (5, False), (4, True), (1, True)])
 def test_where_the_robot_strikes_something_velocities_do_not_show_ways(struck, is_refused):
     """Joints that bounce between two messages: of a whole robot an impact, of a few joints wrong encoders."""
-    limits = SimpleNamespace(velocity=np.full(6, 10.0))
+    limits = SimpleNamespace(position=np.ones(6), velocity=np.full(6, 10.0))
     robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, turns=np.zeros(6))
     leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)
     position, refused = np.zeros(6), []
@@ -205,7 +205,7 @@ def test_where_the_robot_strikes_something_velocities_do_not_show_ways(struck, i
 
 
 def test_after_an_impact_joints_are_judged_again():
-    limits = SimpleNamespace(velocity=np.full(6, 10.0))
+    limits = SimpleNamespace(position=np.ones(6), velocity=np.full(6, 10.0))
     robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, turns=np.zeros(6))
     leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)
     position, refused = np.zeros(6), []
@@ -217,3 +217,28 @@ def test_after_an_impact_joints_are_judged_again():
         time = cycle * PERIOD
         refused.append(check(leaps, time, measured, velocity, part, stamp=time) != "")
     assert not any(refused[:250]) and all(refused[250:260])
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_an_encoder_that_is_right_again_counts_after_half_a_second(leaps, joint):
+    """Its velocity was wrong while it rested; a joint without ends moved meanwhile, by numbers that were held."""
+    wrong = []
+    for cycle in range(1, 800):
+        time = cycle * PERIOD
+        is_wrong = 1.0 < time < 2.0
+        numbers = np.zeros((2, 2))
+        if joint == 0:
+            numbers[:, 0] = 0.3, (0.5 + 0.01 * math.sin(30.0 * time)) * is_wrong
+        else:
+            numbers[:, 1] = 5.0 * (0.1 * math.floor(time / 0.1) if is_wrong else time), 5.0
+        if check(leaps, time, *numbers, stamp=time):
+            wrong.append(time)
+    assert 1.0 < wrong[0] < 1.3 and 2.0 < wrong[-1] < 2.7
+
+
+def test_an_encoder_that_stays_off_does_not_count_again(leaps):
+    for cycle in range(1, 2000):
+        time = cycle * PERIOD
+        away = 0.06 if time > 1.0 else 0.0
+        error = check(leaps, time, (away + 1e-3 * math.sin(time), 0.0), (1e-3 * math.cos(time), 0.0), stamp=time)
+        assert bool(error) == (time > 1.0)

@@ -353,8 +353,10 @@ def test_a_history_lacks_messages_that_are_refused(wire, case):
     end = Histories(wire, case)
     wrong = numbers(case, 11)
     wrong[0] = np.nan
-    (before,), (after,) = end.series(10, 1), end.series(12, 1)
-    end.arrive("first", before, case.message(wrong), after)
+    before, _, after = end.series(10, 3)
+    refused = case.message(wrong)
+    refused.stamp = 10.022
+    end.arrive("first", before, refused, after)
     assert end.pipe.run() is MessageStatus.NEW
     end.holds(10, 12)
     assert end.pipe.refused == 1

@@ -4,27 +4,17 @@ import math
 
 from solfer.transport.stamp_faults import StampFault
 
-FUTURE = 0.05
-"""A stamp is of the future that is this much earlier at its arrival than others [s]."""
-
 FOREIGN = 0.1
 """Largest difference of the newest stamps of two sensors that both send [s]."""
 
-STAMP_FORGETTING_TIME = 1.0
-"""Time in which a smallest delay is forgotten: a simulation that is slower than real time falls behind [s]."""
-
-LONGEST_COUNTED = 0.02
-"""Longest time that counts for that between two messages: what comes late after a stall comes together [s]."""
-
-STAMP_KINDS = ("zero", "of the future", "of another clock", "older than the estimate")
+STAMP_KINDS = ("zero", "of another clock", "older than the estimate")
 
 
 class StampCheck:
     """Refuses stamps that no sample can have, and counts them by what is wrong with them.
 
-    A stamp and the arrival of its message need not be of one clock. What counts is their difference: the delay of the
-    transport and a constant, hardly ever smaller than it has been. It grows without end where a simulation is slower
-    than real time, so that only the stamps themselves show whether two sensors share a clock.
+    Whether they go on as the arrivals of their messages do is judged by the pipes, see `SenderClock`. A stamp and an
+    arrival need not be of one clock: only stamps show whether two sensors share one.
 
     Args:
         reference: Check of the sensor whose clock this one shares; None: any clock counts.
@@ -44,13 +34,10 @@ class StampCheck:
         self._offset = offset
         self.refused = dict.fromkeys(STAMP_KINDS, 0)
         self.complaint = ""
-        self._before = 0.0
         self.start()
 
     def start(self) -> None:
-        """Forget the delay and the clock."""
-        self._delay = math.nan
-        self._jumped = StampFault()
+        """Forget the clock."""
         self._apart = StampFault()
         self.first = self.newest = self.before = self.arrival = math.nan
 
@@ -69,9 +56,8 @@ class StampCheck:
         """
         if stamp == 0.0 or not math.isfinite(stamp):
             return self._refuse("zero", sender)
-        if not self._is_plausible(arrival - stamp, arrival):
-            return self._refuse("of the future", sender)
-        if not self._shares_clock(stamp + self._offset, arrival):
+        reference = self._reference
+        if reference is not None and not self._shares_clock(reference, stamp + self._offset, arrival):
             return self._apart.persists(arrival) and self._refuse("of another clock", sender)
         if stamp < after:
             return self._refuse("older than the estimate", sender)
@@ -82,14 +68,11 @@ class StampCheck:
             self.arrival = arrival
         return stamp > after
 
-    def _shares_clock(self, stamp: float, arrival: float) -> bool:
+    def _shares_clock(self, reference: "StampCheck", stamp: float, arrival: float) -> bool:
         """Return whether a stamp fits those of the reference, from before this cycle to now.
 
         A few stamps that do not fit are of messages that were held up: they are too old to be of use.
         """
-        reference = self._reference
-        if reference is None:
-            return True
         if math.isnan(reference.newest):  # nothing to compare with yet
             self._apart.since = math.nan
             return False
@@ -100,22 +83,6 @@ class StampCheck:
             self._apart.since = math.nan
             return True
         return False
-
-    def _is_plausible(self, delay: float, arrival: float) -> bool:
-        """Return whether a delay is not much smaller than all before, or has been as small for long; note it."""
-        if not delay < self._delay - FUTURE:
-            passed = min(max(arrival - self._before, 0.0), LONGEST_COUNTED)
-            known = delay if math.isnan(self._delay) else self._delay
-            self._delay = min(delay, known + (delay - known) * -math.expm1(-passed / STAMP_FORGETTING_TIME))
-            self._before = arrival
-            self._jumped.since = math.nan
-            return True
-        if not self._jumped.persists(arrival):
-            return False
-        self._delay = delay
-        self._before = arrival
-        self._jumped.since = math.nan
-        return True
 
     def _refuse(self, kind: str, sender: str) -> bool:
         self.refused[kind] += 1

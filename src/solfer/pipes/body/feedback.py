@@ -122,9 +122,11 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         if "orientation" not in reading.lacks:
             options |= self._oriented
         if self._turn_check is not None:
-            self._turn_check.check(
-                reading.values, reading.own_axes, self.reader.arrival, message.stamp, force=reading.force
+            oddity = self._turn_check.check(
+                reading.values, reading.own_axes, self.reader.arrival, self._stamp, force=reading.force
             )
+            if oddity:
+                self.complaints.mention("force", oddity)
         self._mount.update()
         if reading.own_axes:
             options |= self._own_axes
@@ -153,7 +155,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
 
     def _warn(self, tilt: float) -> None:
         if abs(tilt) > STEEP:
-            self._throttle.warning(
+            self.complaints.throttle.warning(
                 "steep",
                 "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
                 "are not unique, and its rates are not to be trusted",

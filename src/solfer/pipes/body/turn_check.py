@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import Contradiction
 
-LEAPS, CONTRADICTS, TURN_SKEW, SPIKES = 1, 2, 3, 4
+LEAPS, CONTRADICTS, TURN_SKEW, SPIKES, UNSCALED = 1, 2, 3, 4, 5
 """Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
 
 UNMEASURED = np.zeros(3)
@@ -16,13 +16,14 @@ UNMEASURED = np.zeros(3)
 class TurnCheck:
     """Compares each measured orientation with the message before, and with the turn rates since.
 
-    The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
-    is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
-    rates contradict each other where the turns of a second by both differ by more than 0.08 rad and 0.3 of their sum,
-    and from then on until the turns since agree again, or until messages pause for 0.1 s. Rates that are all zero were
-    not measured; those above 10 rad/s are spikes where the orientation since the message before differs from them by
-    half. The mean specific force of a second is vertical within 0.4 rad, which is an acceleration of 4 m/s^2; it does
-    not count where it is not within 1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
+    The tilt leaps where it is more than 0.1 rad and 6 rad/s from the message before, for 0.1 s at most. It counts again
+    where it is back, within 0.1 rad, or where the specific force has been vertical within 0.1 rad for 0.5 s since then.
+    About the vertical an orientation may jump, as compasses do. Orientation and rates contradict each other where the
+    turns of a second by both differ by more than 0.08 rad and 0.3 of their sum, and from then on until the turns since
+    agree again, or until messages pause for 0.1 s. Rates that are all zero were not measured; those above 10 rad/s are
+    spikes where the orientation since the message before differs from them by half. The mean specific force of 2 s is
+    vertical within 0.1 rad, which is a change of the velocity by 2 m/s; it does not count where it is not within
+    1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
     """
 
     def __init__(self) -> None:
@@ -30,9 +31,7 @@ class TurnCheck:
         from solfer.numerics.kernels import check_turn
 
         self._check = check_turn
-        # of the message before: quaternion, arrival, stamp; then the turns of a second by orientation and by rates, and
-        # the specific force in the world's axes; whether turns contradict each other, and for how long they were frozen
-        self._before = np.zeros(17)
+        self._before = np.zeros(24)  # see the kernel
         self.forget()
 
     def forget(self) -> None:
@@ -42,8 +41,8 @@ class TurnCheck:
 
     def check(
         self, values: np.ndarray, has_own_axes: bool, arrival: float, stamp: float, force: np.ndarray = UNMEASURED
-    ) -> None:
-        """Check a message, and remember it.
+    ) -> str:
+        """Check a message, and remember it; return what is odd with it though it counts, empty if nothing is.
 
         Args:
             values: Orientation, position and twist, as in `BodyReading.values`, shape (13,).
@@ -70,3 +69,6 @@ class TurnCheck:
             )
         if result == SPIKES:
             raise Contradiction(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")
+        if result == UNSCALED:
+            return f"the accelerometer measures {angle:.3g} m/s^2 on average (expected: 9.81 at rest, in m/s^2)"
+        return ""

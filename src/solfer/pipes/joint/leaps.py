@@ -15,9 +15,10 @@ class JointLeaps:
 
     Its way in a second contradicts its velocities where they differ by more than 0.08 rad or m, a fifth of the way by
     velocities, and what these leave open between messages; so does its way between two messages 5 ms apart by more than
-    0.03 rad or m. Velocities that have always been zero were not measured. Such a joint is refused until it agrees
-    again, or until messages pause, or their numbers are frozen, for 0.1 s: it is not where its encoder measures it, and
-    what starts there would move it.
+    0.03 rad or m. Velocities that have always been zero were not measured. Such a joint is refused until both ways
+    agree again; or it has moved by its velocities for 0.5 s and is within 0.02 rad or m of where it was accepted last,
+    for which a joint without ends may be anywhere; or messages pause, or their numbers are frozen, for 0.1 s: else it
+    is not where its encoder measures it, and what starts there would move it.
 
     Args:
         robot: The Robot, with its limits.
@@ -32,7 +33,8 @@ class JointLeaps:
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
         self._turns = robot.turns[dofs]
-        self._before = np.zeros((11, len(dofs)))  # see the kernel
+        self._endless = np.isinf(robot.upper_limits.position[dofs])
+        self._before = np.zeros((13, len(dofs)))  # see the kernel
         self.forget()
 
     def forget(self) -> None:
@@ -53,7 +55,8 @@ class JointLeaps:
         Raises:
             Contradiction: A joint cannot be there, or so fast, or its velocities contradict it.
         """
-        wrong = self._find(position, velocity, part, self._before, self._fastest, self._turns, arrival, stamp)
+        given = self._fastest, self._turns, self._endless
+        wrong = self._find(position, velocity, part, self._before, *given, arrival, stamp)
         if wrong < 0:
             return
         count = len(self._names)

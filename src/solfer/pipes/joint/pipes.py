@@ -169,7 +169,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         if self._turns is not None:
             self._turns.unwrap(position, part)
         if self._leaps is not None:
-            self._leaps.check(position, self._velocity, part, self.reader.arrival, message.stamp)
+            self._leaps.check(position, self._velocity, part, self.reader.arrival, self._stamp)
         if self._turns is not None:
             self._turns.keep(position, part)
         if not self.received:

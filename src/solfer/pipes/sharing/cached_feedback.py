@@ -1,5 +1,6 @@
 """Feedbacks of plugins that share a Robot: each is read once a cycle, before the first of them."""
 
+import math
 from operator import attrgetter
 
 import numpy as np
@@ -87,13 +88,12 @@ class CachedFeedbackPipe(FeedbackPipe):
         self.source = source
         self.turn = -1
         self._pipe = pipe
+        self.complaints = pipe.complaints
         self._seen = 0
         self._turns = source.turns
         self._not_received: np.ndarray | None = None
 
     refused = property(attrgetter("_pipe.refused"))
-    refusal = property(attrgetter("_pipe.refusal"))
-    refused_at = property(attrgetter("_pipe.refused_at"))
     measures = property(attrgetter("_pipe.measures"))
     changed = property(attrgetter("_pipe.changed"))
     ignored = property(attrgetter("_pipe.ignored"))
@@ -142,7 +142,8 @@ class CachedFeedbackPipe(FeedbackPipe):
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`; restarts the source only if no other plugin goes on with it."""
-        super().restart()
+        self.received = False
+        self.arrival = math.inf
         self._not_received = None
         self.source.restart()
 
