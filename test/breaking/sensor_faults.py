@@ -561,3 +561,6 @@ FAULTS |= {
 
 MECHANICAL = {"dead_arm", "jammed_wheel"}
 """Faults that move the robot by themselves."""
+
+COMMANDS = {"command_spikes"}
+"""Faults that the robot obeys as far as it may: nobody has to name them."""

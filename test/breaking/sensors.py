@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from support.paper.full_control import Nodes
 
-from breaking.sensor_faults import FAULTS, LASTS, MECHANICAL, PERIOD, SENSORS, WHEELS
+from breaking.sensor_faults import COMMANDS, FAULTS, LASTS, MECHANICAL, PERIOD, SENSORS, WHEELS
 from solfer.demo.waving import Waving
 from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
@@ -217,8 +217,7 @@ class SensorTrial:
         outcome.named += [(duration, reason) for reason in reasons]
         outcome.obeys = "locomotion" not in stopped and outcome.rest >= OBEYS * MOTIONS[self.motion][0]
         reasons += [f"{name}: {plugin.health()[1]}" for name, plugin in stopped.items()]
-        warnings = [text for _, text in saying.said]
-        outcome.advice = (reasons or warnings or [""])[-1]
+        outcome.advice = (reasons or [text for _, text in saying.said[-1:]] or [""])[0]
         return outcome
 
     def _looks(self, robot: Driven, outcome: Outcome) -> Callable[[], float]:
@@ -384,15 +383,16 @@ def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
     without a motor falls, a wheel that jams turns it) with what it does while it comes to rest: without sensors, from
     the moment on at which the fault was named, or in which it began if it moves the robot.
 
-    A fault moves the robot if a figure comes halfway from what is usual to its bound: then it has to be named. In the
-    end the robot drives as commanded, or says why not.
+    A fault moves the robot if a figure comes halfway from what is usual to its bound: then it has to be named,
+    unless it is a command. In the end the robot drives as commanded, or says why not.
     """
     if outcome.complaints:
         return outcome
     usual = _run(trial.motion, "", 0)
     bounds = _bounds(usual, usual)
     values = {name: getattr(outcome, name) for name in bounds}
-    moves = [name for name, bound in bounds.items() if values[name] > 0.5 * (getattr(usual, name) + bound)]
+    halves = {name: 0.5 * (getattr(usual, name) + bound) for name, bound in bounds.items()}
+    moves = [f"{name} {values[name]:.3f} beyond {half:.3f}" for name, half in halves.items() if values[name] > half]
     if any(values[name] > bound for name, bound in bounds.items()):
         if trial.fault in MECHANICAL:
             bounds = _bounds(usual, _run(trial.motion, trial.fault, trial.seed, silent=0.0))
@@ -402,8 +402,8 @@ def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
         if not values[name] <= bound:
             when = outcome.when.get(name, math.nan)
             outcome.complaints.append(f"{name} {values[name]:.3f} at +{when:.2f} s, {bound:.3f} at most")
-    if moves and outcome.named_after > NAMED:
-        outcome.complaints.append(f"it moves the robot ({' and '.join(moves)}), and is not named within {NAMED} s")
+    if moves and outcome.named_after > NAMED and trial.fault not in COMMANDS:
+        outcome.complaints.append(f"it moves the robot ({', '.join(moves)}), and is not named within {NAMED} s")
     if "locomotion" in outcome.stopped and outcome.rest > 0.02:
         outcome.complaints.append(f"it stopped, and still moves by {outcome.rest:.3f} m/s")
     if not outcome.obeys and not outcome.advice:

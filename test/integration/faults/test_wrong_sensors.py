@@ -70,6 +70,13 @@ def test_an_imu_that_drifts_agrees_with_itself(fault, seed):
         assert all(np.array_equal(true.orientation, message.orientation) for true, message in pairs[len(wrong) :])
 
 
+@pytest.mark.soak
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_keeps_the_bounds_and_is_named(fault):
+    trial = SensorTrial("drives", fault, 4)
+    assert judge(trial, trial.run()).complaints == []
+
+
 def test_consecutive_seeds_have_every_fault():
     assert {drawn(seed).fault for seed in range(90_000, 90_000 + len(FAULTS))} == set(FAULTS)
 
