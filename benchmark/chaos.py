@@ -12,8 +12,11 @@ by another one, and is started again, after which the course has to go on (`test
 `wheel` is how long wheels turned on then [s].
 
 With `--sensors` sensors, motors and commands of Fig. 5 are wrong, on the virtual clock and without ROS: a seed draws
-motion, fault and size (`test/breaking/sensors.py`). In the table are the largest figures of each fault: speed of a
-joint as a share of its limit, speeds of base, heading and wheels, and tilt.
+motion and size, and consecutive seeds have each of the faults (`test/breaking/sensor_faults.py`). The robot is judged
+during a fault and after it (`test/breaking/sensors.py`). In the table are the largest figures of each fault: speed of a
+joint as a share of its limit, speeds of base, heading and wheels, and tilt; in how many trials it was named, and after
+how long at most [s]; and in how many the robot drove as commanded in the end. Where a call ends, another one goes on
+with the next seed.
 
 With `--sizes` the feedback pipes get the messages of one motion with each of these faults, larger and smaller, until
 the smallest size is found that is named within 0.5 s; `--trials` seeds draw joints, axes and signs. In the table are
@@ -39,6 +42,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from form import Figures, parser_of
 
@@ -54,6 +58,9 @@ from breaking.trial import Plan, Trial, draw  # noqa: E402
 
 from solfer.middleware.ros.node.launch import free_port  # noqa: E402
 from solfer.supervision import supervise  # noqa: E402
+
+if TYPE_CHECKING:
+    from breaking.sensors import Outcome, SensorTrial
 
 SYSTEMS: dict[str, dict[str, Callable[[Path], System]]] = {
     "fig4": {"ros": ros_figure_4, "rt": rt_figure_4},
@@ -190,35 +197,65 @@ SENSOR_FIGURES = ("joint", "base", "turn", "wheel", "tilt")
 """Largest speeds: of a joint [its limit], the base [m/s], its heading [rad/s], a wheel [rad/s]; and tilt [rad]."""
 
 
+class SensorTable:
+    """The worst of each fault of a sensor.
+
+    Attributes:
+        failed: The command that repeats each trial that failed, what it was, and its complaints.
+    """
+
+    def __init__(self) -> None:
+        self._rows: dict[str, list[Outcome]] = {}
+        self.failed: list[str] = []
+
+    def add(self, trial: "SensorTrial", outcome: "Outcome") -> None:
+        """Add a trial."""
+        self._rows.setdefault(trial.fault, []).append(outcome)
+        if outcome.complaints:
+            what = f"{trial.motion}, {trial.fault} {outcome.size}".strip()
+            command = f"./run exec python benchmark/chaos.py --sensors --trials 1 --seed {trial.seed}"
+            self.failed.append(f"{command}  # {what}: {'; '.join(outcome.complaints)}")
+
+    def show(self, figures: Figures) -> None:
+        """Print a row of each fault, and the failures to stderr."""
+        for fault, outcomes in sorted(self._rows.items()):
+            times = [each.named_after for each in outcomes if each.named]
+            figures.row(
+                fault,
+                trials=len(outcomes),
+                **{name: max(float(getattr(each, name)) for each in outcomes) for name in SENSOR_FIGURES},
+                named=len(times),
+                after=max(times, default=None),
+                drives=sum(each.obeys for each in outcomes),
+                failures=sum(bool(each.complaints) for each in outcomes),
+            )
+        for text in self.failed:
+            log(f"failed: {text}")
+
+
 def run_sensors(options: argparse.Namespace) -> int:
     """Run trials with wrong sensors; return the exit code."""
     from breaking.sensors import drawn, judge
 
-    rows: dict[str, list[float]] = {}
-    trials: dict[str, list[int]] = {}
-    begin = time.monotonic()
-    for number in range(options.trials):
-        seed = options.seed + number
-        trial = drawn(seed)
-        outcome = judge(trial, trial.run())
-        figures = [getattr(outcome, name) for name in SENSOR_FIGURES]
-        rows[trial.fault] = [max(pair) for pair in zip(rows.get(trial.fault, figures), figures, strict=True)]
-        count = trials.setdefault(trial.fault, [0, 0])
-        count[0] += 1
-        count[1] += bool(outcome.complaints)
-        left = (time.monotonic() - begin) / (number + 1) * (options.trials - number - 1)
-        what = f"{trial.motion}, {trial.fault} {trial.size}".strip()
-        named = f"+{outcome.named[0][0]:.2f} s {outcome.named[0][1][:100]}" if outcome.named else "nothing is named"
-        verdict = f"FAILED: {'; '.join(outcome.complaints)}" if outcome.complaints else "good"
-        log(f"{number + 1}/{options.trials} seed {seed}: {what}: {verdict} ({named}; {left:.0f} s left)")
-        if outcome.complaints:
-            log(f"failed: --sensors --trials 1 --seed {seed}  ({what}): {outcome.complaints[0]}")
-    table = Figures(options.json)
-    for fault, figures in sorted(rows.items()):
-        count, failures = trials[fault]
-        numbers = dict(zip(SENSOR_FIGURES, figures, strict=True))
-        table.row(fault, trials=count, **numbers, failures=failures)
-    return 1 if any(failures for _, failures in trials.values()) else 0
+    table, begin = SensorTable(), time.monotonic()
+    try:
+        for number in range(options.trials):
+            seed = options.seed + number
+            trial = drawn(seed)
+            outcome = judge(trial, trial.run())
+            table.add(trial, outcome)
+            left = (time.monotonic() - begin) / (number + 1) * (options.trials - number - 1)
+            what = f"{trial.motion}, {trial.fault} {outcome.size}".strip()
+            verdict = f"FAILED: {'; '.join(outcome.complaints)}" if outcome.complaints else "good"
+            named = f"+{outcome.named_after:.2f} s {outcome.named[0][1][:100]}" if outcome.named else "nothing is named"
+            end = "drives" if outcome.obeys else f"{', '.join(outcome.stopped) or 'nothing'} stopped: {outcome.advice}"
+            log(f"{number + 1}/{options.trials} seed {seed}: {what}: {verdict} ({named}; {end}; {left:.0f} s left)")
+    except KeyboardInterrupt:
+        log(f"interrupted; goes on with --seed {seed}")
+        table.show(Figures(options.json))
+        return 130
+    table.show(Figures(options.json))
+    return 1 if table.failed else 0
 
 
 def run_sizes(options: argparse.Namespace) -> int:

@@ -3,37 +3,33 @@
 import copy
 import logging
 import math
+import multiprocessing
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from support.paper.full_control import Nodes
 
-from solfer.components.odometry.messages import stamped_pose
+from breaking.sensor_faults import COMMANDS, FAULTS, LASTS, MECHANICAL, PERIOD, SENSORS, WHEELS
 from solfer.demo.waving import Waving
 from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.numerics.rotations import quaternion_product
 from solfer.plugins import PluginState
 from solfer.transport.messages import FieldsMessage
 
 MOTIONS = {"stands": (0.0, 0.0), "drives": (0.2, 0.0), "turns": (0.1, 0.3)}
 """Velocities of the base, ahead and about z [m/s, rad/s]."""
 
-BEFORE, AFTER, PERIOD = 2.5, 5.0, 0.02
-"""Time before a fault begins, and for which it lasts, and period of those who command [s]."""
+BEFORE, AFTER, THEN = 2.5, 5.0, 4.0
+"""Time before a fault begins, for which it lasts, and for which a trial goes on after a fault that ends [s]."""
 
-SENSORS = ("joint_states", "imu")
-"""Topics of what the robot measures."""
-
-FRICTION, JAMMED = 3.0, 500.0
-"""Friction torques of the gear of a motor without current, and of what jams [Nm]."""
-
-LEGS, ARMS, WHEELS = "hip knee ankle", "arm", "wheel"
-"""Parts of the names of joints."""
+OBEYS, NAMED = 0.8, 2.0
+"""Share of the commanded velocity from which on a robot drives as commanded, and time within which a fault that moves
+it is to be named [s]."""
 
 Change = Callable[[Any, float], None]
 """Changes a message; `time` is that since the fault began [s]."""
@@ -51,8 +47,12 @@ class Outcome:
         tilt: Largest tilt [rad].
         rest: Mean speed of the base in the last second [m/s].
         pause: Smallest mean speed of the base over a second [m/s].
+        when: When the largest figures were, since the fault began [s].
         stopped: Plugins that do not run in the end.
         named: Warnings, with the time since the fault [s], and in the end why plugins were aborted.
+        obeys: Whether it drives as commanded in the end.
+        advice: What else it says in the end: why a plugin is stopped, or the last warning.
+        size: Size of the fault, as drawn.
         complaints: What may not be.
     """
 
@@ -64,8 +64,23 @@ class Outcome:
     rest: float = 0.0
     pause: float = 0.0
     stopped: list[str] = field(default_factory=list)
+    when: dict[str, float] = field(default_factory=dict)
     named: list[tuple[float, str]] = field(default_factory=list)
+    obeys: bool = False
+    advice: str = ""
+    size: str = ""
     complaints: list[str] = field(default_factory=list)
+
+    @property
+    def named_after(self) -> float:
+        """Time from the fault to the first warning [s]; infinity: there is none."""
+        return self.named[0][0] if self.named else math.inf
+
+    def note(self, name: str, value: float, time: float) -> None:
+        """Keep a figure if it is the largest one so far."""
+        if value > getattr(self, name):
+            setattr(self, name, value)
+            self.when[name] = time
 
 
 class Saying(logging.Handler):
@@ -90,6 +105,60 @@ def logged(handler: logging.Handler) -> Iterator[None]:
         logger.removeHandler(handler)
 
 
+class Driven:
+    """A robot that is driven and waves.
+
+    Args:
+        motion: One of MOTIONS.
+        world: The robot.
+
+    Attributes:
+        world: See above.
+        joints: Its joints.
+    """
+
+    def __init__(self, motion: str, world: Nodes):
+        self.world = world
+        self.joints = list(world.simulation.kinematics.dofs[6:])
+        speed, rate = MOTIONS[motion]
+        zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+        self._velocity = FieldsMessage({"linear": zero | {"x": speed}, "angular": zero | {"z": rate}})
+        self._stick = MemoryMiddleware(world.bus, "stick").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
+        world.run(1.5)
+        self._waving = Waving(MemoryMiddleware(world.bus, "waving"), "hands", world.hands())
+        self._begin = world.bus.time
+        self.go(BEFORE)
+
+    def go(self, duration: float) -> None:
+        """Command for a while [s]."""
+        for _ in range(round(duration / PERIOD)):
+            self._stick.write(copy.deepcopy(self._velocity))
+            self._waving.send(self.world.bus.time - self._begin)
+            self.world.run(PERIOD)
+
+
+@cache
+def driven(motion: str) -> Driven:
+    """Return the robot with which all trials of a motion begin: made once, and continued in copies of this process."""
+    return Driven(motion, Nodes(None))
+
+
+def in_a_copy(work: Callable[[], Outcome]) -> Outcome:
+    """Work in a copy of this process, which stays as it is; return the result, or a complaint if there is none."""
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=lambda: sender.send(work()), daemon=True)
+    process.start()
+    sender.close()
+    try:
+        return receiver.recv()
+    except EOFError:
+        return Outcome(complaints=["the trial ended by an exception, see above"])
+    finally:
+        process.join()
+        receiver.close()
+
+
 class SensorTrial:
     """A robot that is driven and waves, and one fault.
 
@@ -102,77 +171,76 @@ class SensorTrial:
 
     Attributes:
         falls: Joints without a motor, whose speeds do not count.
+        lasts: How long the fault lasts [s].
     """
 
-    def __init__(self, motion: str, fault: str, seed: int, amount: float | None = None, silent: float = AFTER):
+    def __init__(self, motion: str, fault: str, seed: int, amount: float | None = None, silent: float = math.inf):
         self.motion, self.fault, self.draw = motion, fault, np.random.default_rng(seed)
         self.seed, self.size, self._amount, self._silent = seed, "", amount, silent
         self.falls: list[int] = []
+        self.lasts = math.inf
 
     def run(self) -> Outcome:
         """Run it."""
-        with closing(Nodes(None)) as self.world:
-            self.saying = Saying(lambda: self.world.bus.time)
-            with logged(self.saying):
-                return self._run()
+        robot = driven(self.motion)
+        return in_a_copy(lambda: self._run(robot))
 
-    def start(self, world: Nodes) -> None:
-        """Let those who command the robot begin."""
-        self.world, kinematics = world, world.simulation.kinematics
-        self.joints = list(kinematics.dofs[6:])
-        self.limits = kinematics.velocity_limit[6:]
-        self.wheels = [index for index, name in enumerate(self.joints) if WHEELS in name]
-        self.stick = MemoryMiddleware(world.bus, "stick").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
-        world.run(1.5)
-        self.waving = Waving(MemoryMiddleware(world.bus, "waving"), "hands", world.hands())
-        self.begin = world.bus.time
-
-    def _run(self) -> Outcome:
-        world, self.outcome = self.world, Outcome()
-        outcome = self.outcome
-        self.start(world)
-        rest: list[float] = []
-        world.bus.every(0.002, lambda: rest.append(self._look()))
-        self.go(BEFORE)
-        outcome.__init__()
-        fault_begin = self.begin_of_fault = world.bus.time
-        self.saying.said.clear()
+    def begin(self, robot: Driven) -> None:
+        """Let the fault begin."""
+        self.world, self.joints = robot.world, robot.joints
+        self.begin_of_fault = robot.world.bus.time
         if self.fault:
             FAULTS[self.fault](self)
-        self.go(self._silent)
-        for topic in SENSORS if self._silent < AFTER else ():
-            self.world.bus._topics[topic].publish = lambda message, sender, now: None
-        self.go(AFTER - self._silent)
-        seconds = [float(np.mean(rest[end - 500 : end])) for end in range(len(rest), len(rest) - 2000, -50)]
+
+    def _run(self, robot: Driven) -> Outcome:
+        world, outcome, saying = robot.world, Outcome(), Saying(lambda: robot.world.bus.time)
+        speeds: list[float] = []
+        look = self._looks(robot, outcome)
+        world.bus.every(0.002, lambda: speeds.append(look()))
+        with logged(saying):
+            self.begin(robot)
+            duration = AFTER if self.fault and math.isinf(self.lasts) else LASTS + THEN
+            silent = min(self._silent, duration)
+            robot.go(silent)
+            for topic in SENSORS if silent < duration else ():
+                world.bus._topics[topic].publish = lambda message, sender, now: None
+            robot.go(duration - silent)
+        seconds = [float(np.mean(speeds[end - 500 : end])) for end in range(len(speeds), len(speeds) - 2000, -50)]
         outcome.rest = seconds[0]
         outcome.pause = min(seconds)
+        outcome.size = self.size
         running = PluginState.RUNNING
-        outcome.stopped = [name for name, plugin in world.plugins.items() if plugin.life is not running]
-        outcome.named = [(time - fault_begin, text) for time, text in self.saying.said]
-        outcome.named += [(AFTER, managed.reason) for managed in world.together.plugins if managed.reason]
+        stopped = {name: plugin for name, plugin in world.plugins.items() if plugin.life is not running}
+        outcome.stopped = list(stopped)
+        outcome.named = [(time - self.begin_of_fault, text) for time, text in saying.said]
+        reasons = [managed.reason for managed in world.together.plugins if managed.reason]
+        outcome.named += [(duration, reason) for reason in reasons]
+        outcome.obeys = "locomotion" not in stopped and outcome.rest >= OBEYS * MOTIONS[self.motion][0]
+        reasons += [f"{name}: {plugin.health()[1]}" for name, plugin in stopped.items()]
+        outcome.advice = (reasons or [text for _, text in saying.said[-1:]] or [""])[0]
         return outcome
 
-    def _look(self) -> float:
-        """Note the largest figures; return the speed of the base [m/s]."""
-        v, now, outcome = self.world.simulation.v, self.world.simulation.state.now, self.outcome
-        speeds = np.abs(v[6:])
-        shares = speeds / self.limits
-        shares[self.falls] = 0.0
-        outcome.joint = max(outcome.joint, float(shares.max()))
-        outcome.wheel = max(outcome.wheel, float(speeds[self.wheels].max()))
-        speed = math.hypot(v[0], v[1])
-        outcome.base, outcome.turn = max(outcome.base, speed), max(outcome.turn, abs(float(v[5])))
-        outcome.tilt = max(outcome.tilt, math.acos(min(1.0, max(-1.0, now.rotation("pelvis")[2, 2]))))
-        return speed
+    def _looks(self, robot: Driven, outcome: Outcome) -> Callable[[], float]:
+        """Return what notes the largest figures, and returns the speed of the base [m/s]."""
+        simulation, bus = robot.world.simulation, robot.world.bus
+        v, limits = simulation.v, simulation.kinematics.velocity_limit[6:]
+        wheels = [index for index, name in enumerate(robot.joints) if WHEELS in name]
 
-    def go(self, duration: float) -> None:
-        """Command for a while [s]."""
-        speed, rate = MOTIONS[self.motion]
-        linear, angular = {"x": speed, "y": 0.0, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": rate}
-        for _ in range(round(duration / PERIOD)):
-            self.stick.write(FieldsMessage({"linear": linear, "angular": angular}))
-            self.waving.send(self.world.bus.time - self.begin)
-            self.world.run(PERIOD)
+        def look() -> float:
+            time = bus.time - self.begin_of_fault
+            speeds = np.abs(v[6:])
+            shares = speeds / limits
+            shares[self.falls] = 0.0
+            speed = math.hypot(v[0], v[1])
+            outcome.note("joint", float(shares.max()), time)
+            outcome.note("wheel", float(speeds[wheels].max()), time)
+            outcome.note("base", speed, time)
+            outcome.note("turn", abs(float(v[5])), time)
+            up = float(simulation.state.now.rotation("pelvis")[2, 2])
+            outcome.note("tilt", math.acos(min(1.0, max(-1.0, up))), time)
+            return speed
+
+        return look
 
     def joint(self, part: str) -> str:
         """Draw a joint with one of these words in its name."""
@@ -192,307 +260,13 @@ class SensorTrial:
         publish = line.publish
 
         def changed(message: Any, sender: str, now: float) -> None:
-            spoiled = copy.deepcopy(message)
-            change(spoiled, now - self.begin_of_fault)
-            publish(spoiled, sender, now)
+            time = now - self.begin_of_fault
+            if time < self.lasts:
+                change(message, time)  # of the topic alone: a writer sends a copy
+            publish(message, sender, now)
 
         line.publish = changed
 
-
-def about(axis: str, angle: float) -> np.ndarray:
-    """Return the quaternion of a turn about an axis."""
-    numbers = np.zeros(4)
-    numbers["xyz".index(axis)], numbers[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
-    return numbers
-
-
-def _turned(trial: SensorTrial, turn: Callable[[float], np.ndarray]) -> None:
-    def change(message: Any, time: float) -> None:
-        message.orientation = np.array(quaternion_product(turn(time), message.orientation))
-
-    trial.spoil("imu", change)
-
-
-def imu_jump(trial: SensorTrial) -> None:
-    """Let the orientation jump about z."""
-    angle = trial.either() * trial.amount(trial.draw.uniform(0.2, 3.0))
-    trial.size = f"{angle:.2f} rad"
-    _turned(trial, lambda time: about("z", angle))
-
-
-def imu_drift(trial: SensorTrial) -> None:
-    """Let the orientation drift about an axis."""
-    axis, rate = str(trial.draw.choice(list("xyz"))), trial.either() * trial.amount(trial.draw.uniform(0.01, 0.3))
-    trial.size = f"{rate:.3f} rad/s about {axis}"
-    _turned(trial, lambda time: about(axis, rate * time))
-
-
-def imu_freeze(trial: SensorTrial) -> None:
-    """Freeze everything, with fresh stamps."""
-    kept: dict[str, np.ndarray] = {}
-
-    def change(message: Any, time: float) -> None:
-        for name in ("orientation", "angular", "acceleration"):
-            setattr(message, name, kept.setdefault(name, getattr(message, name)).copy())
-
-    trial.spoil("imu", change)
-
-
-def imu_upside_down(trial: SensorTrial) -> None:
-    """Mount it the other way round."""
-
-    def change(message: Any, time: float) -> None:
-        message.orientation = np.array(quaternion_product(message.orientation, (1.0, 0.0, 0.0, 0.0)))
-        message.angular = message.angular * (1.0, -1.0, -1.0)
-        message.acceleration = message.acceleration * (1.0, -1.0, -1.0)
-
-    trial.spoil("imu", change)
-
-
-def gyro_sign(trial: SensorTrial) -> None:
-    """Turn the sign of the gyroscope."""
-    trial.spoil("imu", lambda message, time: setattr(message, "angular", -message.angular))
-
-
-def gyro_scale(trial: SensorTrial) -> None:
-    """Give the gyroscope another scale."""
-    scale = trial.amount(trial.draw.uniform(0.5, 2.0))
-    trial.size = f"{scale:.2f}"
-    trial.spoil("imu", lambda message, time: setattr(message, "angular", scale * message.angular))
-
-
-def gyro_spikes(trial: SensorTrial) -> None:
-    """Add spikes to the gyroscope in some of the messages."""
-    size = trial.amount(10.0 ** trial.draw.uniform(1.0, 6.0))
-    trial.size = f"{size:.0f} rad/s"
-
-    def change(message: Any, time: float) -> None:
-        if trial.draw.random() < 0.05:
-            message.angular = message.angular + size * trial.draw.choice((-1.0, 1.0), 3)
-
-    trial.spoil("imu", change)
-
-
-def accelerometer_jump(trial: SensorTrial) -> None:
-    """Add a specific force along an axis."""
-    axis, size = int(trial.draw.integers(3)), trial.either() * trial.amount(trial.draw.uniform(0.5, 20.0))
-    trial.size = f"{size:.2f} m/s^2 along {'xyz'[axis]}"
-
-    def change(message: Any, time: float) -> None:
-        message.acceleration = message.acceleration + size * np.eye(3)[axis]
-
-    trial.spoil("imu", change)
-
-
-def joints_freeze(trial: SensorTrial) -> None:
-    """Freeze all joints for 3 s, with fresh stamps."""
-    kept: dict[str, np.ndarray] = {}
-
-    def change(message: Any, time: float) -> None:
-        for name in ("position", "velocity", "effort") if time < 3.0 else ():
-            setattr(message, name, kept.setdefault(name, getattr(message, name)).copy())
-
-    trial.spoil("joint_states", change)
-
-
-def joints_swapped(trial: SensorTrial) -> None:
-    """Swap two joints of legs, or of arms."""
-    part = str(trial.draw.choice((LEGS, ARMS)))
-    first, second = trial.joint(part), trial.joint(part)
-    trial.size = f"{first} and {second}"
-
-    def change(message: Any, time: float) -> None:
-        pair = [message.names.index(first), message.names.index(second)]
-        for numbers in (message.position, message.velocity, message.effort):
-            numbers[pair] = numbers[pair[::-1]]
-
-    trial.spoil("joint_states", change)
-
-
-def _joint(trial: SensorTrial, change: Callable[[float, float, float], tuple[float, float]], part: str = "") -> None:
-    """Change position and velocity of a joint that is drawn, of a leg or an arm."""
-    name = trial.joint(part or str(trial.draw.choice((LEGS, ARMS))))
-    trial.size = f"{name} {trial.size}"
-
-    def changed(message: Any, time: float) -> None:
-        place = message.names.index(name)
-        numbers = change(message.position[place], message.velocity[place], time)
-        message.position[place], message.velocity[place] = numbers
-
-    trial.spoil("joint_states", changed)
-
-
-def joint_jump(trial: SensorTrial) -> None:
-    """Shift the zero of a joint all of a sudden."""
-    size = trial.either() * trial.amount(trial.draw.uniform(0.02, 1.0))
-    trial.size = f"{size:.2f} rad"
-    _joint(trial, lambda place, speed, time: (place + size, speed))
-
-
-def joint_drift(trial: SensorTrial) -> None:
-    """Let the zero of a joint drift."""
-    rate = trial.either() * trial.amount(trial.draw.uniform(0.01, 0.3))
-    trial.size = f"{rate:.3f} rad/s"
-    _joint(trial, lambda place, speed, time: (place + rate * time, speed))
-
-
-def joint_sign(trial: SensorTrial) -> None:
-    """Turn the sign of a joint."""
-    _joint(trial, lambda place, speed, time: (-place, -speed))
-
-
-def joint_scale(trial: SensorTrial) -> None:
-    """Give a joint another scale."""
-    scale = trial.amount(trial.draw.uniform(0.7, 1.4))
-    trial.size = f"{scale:.2f}"
-    _joint(trial, lambda place, speed, time: (scale * place, scale * speed))
-
-
-def joint_spikes(trial: SensorTrial) -> None:
-    """Add spikes to a joint in some of the messages."""
-    size = trial.amount(trial.draw.uniform(0.1, 3.0))
-    trial.size = f"{size:.2f} rad"
-    _joint(trial, lambda place, speed, time: (place + size * trial.either() * (trial.draw.random() < 0.05), speed))
-
-
-def joint_stuck(trial: SensorTrial) -> None:
-    """Let the encoder of a joint stay where it was."""
-    kept: list[float] = []
-
-    def change(place: float, speed: float, time: float) -> tuple[float, float]:
-        kept.append(place)
-        return kept[0], 0.0
-
-    _joint(trial, change)
-
-
-def velocity_sign(trial: SensorTrial) -> None:
-    """Turn the sign of a joint's velocity alone."""
-    _joint(trial, lambda place, speed, time: (place, -speed))
-
-
-def velocities_swapped(trial: SensorTrial) -> None:
-    """Swap the velocities alone of two joints."""
-    first, second = trial.joint(f"{LEGS} {ARMS}"), trial.joint(f"{LEGS} {ARMS}")
-    trial.size = f"{first} and {second}"
-
-    def change(message: Any, time: float) -> None:
-        pair = [message.names.index(first), message.names.index(second)]
-        message.velocity[pair] = message.velocity[pair[::-1]]
-
-    trial.spoil("joint_states", change)
-
-
-def _contacts(trial: SensorTrial, change: Callable[[np.ndarray, float], np.ndarray]) -> None:
-    """Change the forces of all contacts."""
-    for topic in [name for name in trial.world.bus._topics if name.startswith("contacts/")]:
-        trial.spoil(topic, lambda message, time: setattr(message, "force", change(message.force, time)))
-
-
-def contacts_jump(trial: SensorTrial) -> None:
-    """Add a force to all contacts."""
-    size = trial.amount(10.0 ** trial.draw.uniform(1.0, 4.0)) * trial.draw.choice((-1.0, 1.0), 3)
-    trial.size = f"{size} N"
-    _contacts(trial, lambda force, time: force + size)
-
-
-def contacts_sign(trial: SensorTrial) -> None:
-    """Turn the sign of all contacts."""
-    _contacts(trial, lambda force, time: -force)
-
-
-def contacts_spikes(trial: SensorTrial) -> None:
-    """Add spikes to the forces in some of the messages."""
-    size = trial.amount(10.0 ** trial.draw.uniform(2.0, 6.0))
-    trial.size = f"{size:.0f} N"
-    _contacts(trial, lambda force, time: force + size * (trial.draw.random() < 0.05))
-
-
-def contacts_lost(trial: SensorTrial) -> None:
-    """Let all forces be zero."""
-    _contacts(trial, lambda force, time: 0.0 * force)
-
-
-def base_jump(trial: SensorTrial) -> None:
-    """Put the base elsewhere."""
-    x, y, heading = trial.draw.uniform((-6.0, -6.0, -3.0), (6.0, 6.0, 3.0))
-    trial.size = f"({x:.1f}, {y:.1f}) m, {heading:.1f} rad"
-    odometry = trial.world.plugins["odometry"].component
-    odometry.set_pose(stamped_pose("odom", np.array((x, y, 0.0)), about("z", heading), 1e-4 * np.eye(6)))
-
-
-def command_spikes(trial: SensorTrial) -> None:
-    """Send velocities far beyond what the base may do."""
-    size = trial.amount(10.0 ** trial.draw.uniform(0.0, 4.0))
-    trial.size = f"{size:.0f} m/s"
-
-    def change(message: Any, time: float) -> None:
-        if trial.draw.random() < 0.2:
-            message.fields["linear"] = {**message.fields["linear"], "x": size * trial.either()}
-
-    trial.spoil("locomotion/cmd_vel", change)
-
-
-def second_stick(trial: SensorTrial) -> None:
-    """Let another node send another velocity."""
-    writer = MemoryMiddleware(trial.world.bus, "other").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
-    zero = {"x": 0.0, "y": 0.0, "z": 0.0}
-    velocity = FieldsMessage({"linear": {**zero, "x": -0.2}, "angular": {**zero, "z": -0.3}})
-    trial.world.bus.every(PERIOD, lambda: writer.write(velocity))
-
-
-def _braked(trial: SensorTrial, name: str, torque: float, is_driven: bool) -> None:
-    """Hold a joint by a friction torque [Nm], beside its motor or instead of it."""
-    body, dof = trial.world.simulation.body, 6 + trial.joints.index(name)
-    trial.size = name
-    bullet, apply = body._bullet, body.apply
-    count = bullet.getNumJoints(body.id, physicsClientId=body._client)
-    joints = {
-        bullet.getJointInfo(body.id, each, physicsClientId=body._client)[1].decode(): each for each in range(count)
-    }
-
-    def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
-        driven = np.array(torques)
-        driven[dof] *= is_driven
-        apply(driven, speeds)
-        bullet.setJointMotorControl2(
-            body.id,
-            joints[name],
-            bullet.VELOCITY_CONTROL,
-            targetVelocity=0.0,
-            force=torque,
-            physicsClientId=body._client,
-        )
-
-    body.apply = applied
-
-
-def dead_arm(trial: SensorTrial) -> None:
-    """Take the current from the motor of an arm's joint: what hangs on it turns it against the friction of its gear."""
-    name = trial.joint(ARMS)
-    trial.falls = [trial.joints.index(name)]
-    _braked(trial, name, FRICTION, is_driven=False)
-
-
-def jammed_wheel(trial: SensorTrial) -> None:
-    """Jam a wheel."""
-    _braked(trial, trial.joint(WHEELS), JAMMED, is_driven=True)
-
-
-FAULTS: dict[str, Callable[[SensorTrial], None]] = {
-    each.__name__: each
-    for each in (
-        *(imu_jump, imu_drift, imu_freeze, imu_upside_down, gyro_sign, gyro_scale, gyro_spikes),
-        *(accelerometer_jump, velocity_sign, velocities_swapped),
-        *(contacts_jump, contacts_sign, contacts_spikes, contacts_lost),
-        *(joints_freeze, joints_swapped, joint_jump, joint_drift, joint_sign, joint_scale, joint_spikes, joint_stuck),
-        *(base_jump, command_spikes, second_stick, dead_arm, jammed_wheel),
-    )
-}
-"""What may be wrong, by name."""
-
-MECHANICAL = {"dead_arm", "jammed_wheel"}
-"""Faults that move the robot by themselves."""
 
 SIZES: dict[str, tuple[float, float, str]] = {
     "imu_drift": (0.01, 10.0, "rad/s"),
@@ -519,7 +293,7 @@ class Messages:
     """
 
     def __init__(self, motion: str):
-        self._trial = SensorTrial(motion, "", 0)
+        self._motion = motion
         self._world = Nodes(None)
         self._heard: list[tuple[str, Any]] = []
         pipes = {}
@@ -529,10 +303,9 @@ class Messages:
         self._pipes = {topic: pipes[topic] for topic in ("imu", "joint_states")}
         for topic in self._pipes:
             self._listen(topic)
-        self._trial.start(self._world)
-        self._trial.go(BEFORE)
+        robot = self._robot = Driven(motion, self._world)
         self._begin = self._world.bus.time
-        self._trial.go(SOON)
+        robot.go(SOON)
         self._heard = [each for each in self._heard if each[1].stamp > self._begin - EARLIER]
         for pipe in self._pipes.values():
             pipe.reader = SimpleNamespace(arrival=0.0)
@@ -568,11 +341,10 @@ class Messages:
 
     def _named(self, fault: str, seed: int, amount: float) -> str:
         """Return why a message is refused soon after a fault began; empty: none is."""
-        trial = SensorTrial(self._trial.motion, fault, seed, amount)
-        trial.world, trial.joints = self._world, self._trial.joints
+        trial = SensorTrial(self._motion, fault, seed, amount)
         changes: dict[str, Change] = {}
         trial.spoil = changes.__setitem__  # type: ignore[method-assign]
-        FAULTS[fault](trial)
+        trial.begin(self._robot)
         for pipe in self._pipes.values():
             pipe.restart()
         for topic, message in self._heard:
@@ -588,46 +360,62 @@ class Messages:
         return ""
 
 
-_compared: dict[tuple, Outcome] = {}
-
-
-def _run(motion: str, fault: str, seed: int, silent: float = AFTER) -> Outcome:
+@cache
+def _run(motion: str, fault: str, seed: int, silent: float = math.inf) -> Outcome:
     """Return what a robot does that others are compared with; each runs once."""
-    key = motion, fault, seed, silent
-    if key not in _compared:
-        _compared[key] = SensorTrial(motion, fault, seed, silent=silent).run()
-    return _compared[key]
+    return SensorTrial(motion, fault, seed, silent=silent).run()
 
 
-def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
-    """Add what the robot may not do.
-
-    It is compared with what it does without a fault, and where it moves by itself (hands that stop let it sway, an arm
-    without a motor falls, a wheel that jams turns it) with what it does while it comes to rest: without sensors, from
-    the moment on at which the fault was named, or in which it began if it moves the robot.
-    """
-    usual = rests = _run(trial.motion, "", 0)
-    if trial.fault in MECHANICAL:
-        rests = _run(trial.motion, trial.fault, trial.seed, silent=0.0)
-    elif outcome.named:
-        rests = _run(trial.motion, "", 0, silent=round(min(outcome.named[0][0], AFTER), 1))
-    bounds = {
+def _bounds(usual: Outcome, rests: Outcome) -> dict[str, float]:
+    return {
         "joint": max(1.0, usual.joint, 1.2 * rests.joint),
         "base": 1.2 * max(usual.base, rests.base) + 0.03,
         "turn": 1.2 * max(usual.turn, rests.turn) + 0.1,
         "wheel": 1.2 * usual.wheel + 0.5,
         "tilt": usual.tilt + math.radians(5.0),
     }
+
+
+def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
+    """Add what the robot may not do, during the fault and after it.
+
+    It is compared with what it does without a fault, and where it moves by itself (hands that stop let it sway, an arm
+    without a motor falls, a wheel that jams turns it) with what it does while it comes to rest: without sensors, from
+    the moment on at which the fault was named, or in which it began if it moves the robot.
+
+    A fault moves the robot if a figure comes halfway from what is usual to its bound: then it has to be named,
+    unless it is a command. In the end the robot drives as commanded, or says why not.
+    """
+    if outcome.complaints:
+        return outcome
+    usual = _run(trial.motion, "", 0)
+    bounds = _bounds(usual, usual)
+    values = {name: getattr(outcome, name) for name in bounds}
+    halves = {name: 0.5 * (getattr(usual, name) + bound) for name, bound in bounds.items()}
+    moves = [f"{name} {values[name]:.3f} beyond {half:.3f}" for name, half in halves.items() if values[name] > half]
+    if any(values[name] > bound for name, bound in bounds.items()):
+        if trial.fault in MECHANICAL:
+            bounds = _bounds(usual, _run(trial.motion, trial.fault, trial.seed, silent=0.0))
+        elif outcome.named:
+            bounds = _bounds(usual, _run(trial.motion, "", 0, silent=round(min(outcome.named_after, AFTER), 1)))
     for name, bound in bounds.items():
-        value = getattr(outcome, name)
-        if not value <= bound:
-            outcome.complaints.append(f"{name} {value:.3f}, {bound:.3f} at most")
+        if not values[name] <= bound:
+            when = outcome.when.get(name, math.nan)
+            outcome.complaints.append(f"{name} {values[name]:.3f} at +{when:.2f} s, {bound:.3f} at most")
+    if moves and outcome.named_after > NAMED and trial.fault not in COMMANDS:
+        outcome.complaints.append(f"it moves the robot ({', '.join(moves)}), and is not named within {NAMED} s")
     if "locomotion" in outcome.stopped and outcome.rest > 0.02:
         outcome.complaints.append(f"it stopped, and still moves by {outcome.rest:.3f} m/s")
+    if not outcome.obeys and not outcome.advice:
+        outcome.complaints.append(f"it neither drives as commanded ({outcome.rest:.3f} m/s) nor says why")
     return outcome
 
 
+ORDER = np.random.default_rng(0).permutation(list(FAULTS)).tolist()
+"""Faults in the order of seeds: consecutive ones draw each of them."""
+
+
 def drawn(seed: int) -> SensorTrial:
-    """Draw motion and fault of a trial."""
-    draw = np.random.default_rng(seed)
-    return SensorTrial(str(draw.choice(list(MOTIONS))), str(draw.choice(list(FAULTS))), seed)
+    """Draw motion and size of a trial, the fault of which has its turn."""
+    motion = str(np.random.default_rng(seed).choice(list(MOTIONS)))
+    return SensorTrial(motion, ORDER[seed % len(ORDER)], seed)

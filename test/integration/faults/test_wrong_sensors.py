@@ -1,10 +1,18 @@
 """The short form of `benchmark/chaos.py --sensors`: Fig. 5 with sensors, motors and commands that are wrong."""
 
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 from breaking.alarms import find_alarms
+from breaking.sensor_faults import FAULTS, GRAVITY, LASTS, turn_about
 from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
 
+from solfer.middleware.memory import Bus
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.pipes.complaints import NAMING_DELAY
+from solfer.transport.messages import ImuMessage, copied
 
 NAMED = {
     "gyro_spikes": "an angular velocity of",
@@ -15,6 +23,62 @@ NAMED = {
     "jammed_wheel": "does not follow",
 }
 """What the log says of faults, of each in any case."""
+
+POSTURES = [
+    ("stands", "joints_swapped", 20119),
+    ("stands", "joint_scale", 20183),
+    ("stands", "joint_sign", 20105),
+    ("turns", "joint_scale", 20036),
+]
+"""Motion, fault and seed of trials with legs that are measured where they are not."""
+
+
+def turning_imu(fault, seed):
+    """Return the true and the wrong messages of an IMU that turns."""
+    bus = Bus()
+    line = bus.topic("imu", "sensor_msgs/Imu")
+    trial = SensorTrial("stands", fault, seed)
+    trial.begin(SimpleNamespace(world=SimpleNamespace(bus=bus), joints=[]))
+    rate = np.array((0.1, -0.2, 0.3))
+    pairs = []
+    for time in np.arange(0.0, LASTS + 0.5, 0.002):
+        orientation = turn_about(rate / np.linalg.norm(rate), time * np.linalg.norm(rate))
+        force = rotation_from_quaternion(orientation).T @ (0.0, 0.0, GRAVITY)
+        message = ImuMessage("imu", orientation, rate, acceleration=force, stamp=time)
+        line.publish(copied(message), "robot", time)
+        pairs.append((message, line.newest))
+    return pairs
+
+
+@pytest.mark.parametrize(("fault", "seed"), [("imu_tilt_drift", 4), ("gyro_warms", 4)])
+def test_an_imu_that_drifts_agrees_with_itself(fault, seed):
+    """Orientations turn as the gyroscope says; while an IMU turns on its link, its force still points upwards.
+
+    After the drift all is right again.
+    """
+    pairs = turning_imu(fault, seed)
+    wrong = [message for true, message in pairs if true.stamp < LASTS]
+    for before, after in pairwise(wrong):
+        between = rotation_from_quaternion(before.orientation).T @ rotation_from_quaternion(after.orientation)
+        turned = 2.0 * quaternion_from_rotation(between)[:3] / 0.002
+        assert turned == pytest.approx(0.5 * (before.angular + after.angular), abs=1e-3)
+    true, last = pairs[len(wrong) - 1]
+    assert np.abs(last.angular - true.angular).max() > 0.02
+    if fault == "imu_tilt_drift":
+        assert rotation_from_quaternion(last.orientation) @ last.acceleration == pytest.approx((0.0, 0.0, GRAVITY))
+        assert np.abs(last.acceleration - true.acceleration).max() > 0.2
+        assert all(np.array_equal(true.orientation, message.orientation) for true, message in pairs[len(wrong) :])
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_keeps_the_bounds_and_is_named(fault):
+    trial = SensorTrial("drives", fault, 4)
+    assert judge(trial, trial.run()).complaints == []
+
+
+def test_consecutive_seeds_have_every_fault():
+    assert {drawn(seed).fault for seed in range(90_000, 90_000 + len(FAULTS))} == set(FAULTS)
 
 
 @pytest.mark.daily(1)
@@ -28,10 +92,10 @@ def test_a_wrong_sensor_moves_nothing(motion, fault):
 
 
 @pytest.mark.daily(1)
-@pytest.mark.parametrize("seed", [20119, 20183, 20105, 20036])
-def test_a_wrong_posture_moves_no_leg(seed):
+@pytest.mark.parametrize(("motion", "fault", "seed"), POSTURES)
+def test_a_wrong_posture_moves_no_leg(motion, fault, seed):
     """Swapped joints, another sign and other scales of legs that stand: the posture stays refused, or topples it."""
-    trial = drawn(seed)
+    trial = SensorTrial(motion, fault, seed)
     outcome = judge(trial, trial.run())
     assert outcome.complaints == [] and outcome.named[0][0] < NAMING_DELAY + 0.02
 
