@@ -28,7 +28,9 @@ def server():
 def asked(server, length: bytes, body: bytes = CALL) -> bytes:
     """Return how an answer to a call begins."""
     with socket.create_connection(server.server_address, 5.0) as connection:
-        connection.sendall(b"POST /RPC2 HTTP/1.1\r\nContent-Type: text/xml\r\nContent-Length: %b\r\n\r\n" % length + body)
+        connection.sendall(
+            b"POST /RPC2 HTTP/1.1\r\nContent-Type: text/xml\r\nContent-Length: %b\r\n\r\n" % length + body
+        )
         return connection.recv(12)
 
 
