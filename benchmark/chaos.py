@@ -8,8 +8,9 @@ and wheels turn at 1 to 2 rad/s; then one of the processes, or two, are stopped 
 `test/breaking/bounds.py` has the limits of what the robot may do afterwards.
 
 With `--scheme fig5` a navigation drives the robot of Fig. 5 along its course; one process is killed, has to be missed
-by another one, and is started again, after which the course has to go on (`test/breaking/course.py`). In the table
-`wheel` is how long wheels turned on then [s].
+by another one, and is started again, after which the course has to go on (`test/breaking/course.py`). Seeds take the
+processes in turn. With `--stop S` a process stands still for so long [s] instead. In the table `wheel` is how long
+wheels turned on then [s].
 
 With `--sensors` sensors, motors and commands of Fig. 5 are wrong, on the virtual clock and without ROS: a seed draws
 motion and size, and consecutive seeds have each of the faults (`test/breaking/sensor_faults.py`). The robot is judged
@@ -98,10 +99,12 @@ class Bench:
         scheme: The figure.
         name: Its name.
         folder: Folder for the output of its processes.
+        stop: For how long a process of Fig. 5 is stopped; 0: it is killed [s].
     """
 
-    def __init__(self, scheme: str, name: str, folder: Path):
+    def __init__(self, scheme: str, name: str, folder: Path, stop: float = 0.0):
         self._scheme, self._name, self._folder, self._count = scheme, name, folder, 0
+        self._stop = stop
         self._system: System | None = None
 
     def run(self, seed: int) -> tuple[Plan, Verdict]:
@@ -113,7 +116,7 @@ class Bench:
             return Plan(()), Verdict(complaints=[str(error)])
         names = system.processes.names
         course = self._scheme == "fig5"
-        trial = CourseTrial(system, draw_kill(seed, names)) if course else Trial(system, draw(seed, names))
+        trial = CourseTrial(system, draw_kill(seed, names, self._stop)) if course else Trial(system, draw(seed, names))
         plan, verdict = trial.plan, trial.run()
         if verdict.complaints:
             self.close()
@@ -170,7 +173,7 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
     """Run all trials."""
     names, table = [options.system] if options.system != "both" else ["ros", "rt"], Table()
     for name in names:
-        with contextlib.closing(Bench(options.scheme, name, folder)) as bench:
+        with contextlib.closing(Bench(options.scheme, name, folder, options.stop)) as bench:
             for number in range(options.trials):
                 seed, begin = options.seed + number, time.monotonic()
                 plan, verdict = bench.run(seed)
@@ -184,7 +187,8 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
                     log(f"    {complaint}")
                 if verdict.complaints:
                     log(
-                        f"failed: --scheme {options.scheme} --system {name} --trials 1 --seed {seed}  ({what}): "
+                        f"failed: --scheme {options.scheme} --system {name} --stop {options.stop:g} --trials 1 --seed {seed}"
+                        f"  ({what}): "
                         f"{verdict.complaints[0]}"
                     )
     return table
@@ -310,6 +314,7 @@ def main() -> int:
     parser.add_argument(
         "--system", choices=("ros", "rt", "both"), default="both", help="what is broken (default: both)"
     )
+    parser.add_argument("--stop", type=float, default=0.0, help="stop a process of Fig. 5 for so long instead [s]")
     parser.add_argument("--sensors", action="store_true", help="wrong sensors of Fig. 5, on the virtual clock")
     parser.add_argument("--sizes", action="store_true", help="smallest sizes of wrong sensors that are named")
     parser.add_argument("--alarms", action="store_true", help="sensors that are right and never to be named")

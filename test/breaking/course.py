@@ -1,7 +1,8 @@
-"""Fig. 5 of the paper, one of whose processes is killed: the robot comes to rest, and its course goes on."""
+"""Fig. 5 of the paper, one of whose processes is killed or stopped: the robot comes to rest, and its course goes on."""
 
 import random
 import re
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -117,14 +118,19 @@ def rt_figure_5(folder: Path) -> System:
 
 @dataclass(frozen=True)
 class Kill:
-    """What happens: a process is killed some time after the robot has begun to drive [s]."""
+    """What happens: a process is killed some time after the robot has begun to drive [s], or stopped for a while [s]."""
 
     victim: str
     moment: float
-    kind = "kill"
+    stop: float = 0.0
+
+    @property
+    def kind(self) -> str:
+        """What it is called."""
+        return "stop" if self.stop else "kill"
 
     def __str__(self) -> str:
-        return f"kill {self.victim} after {self.moment:.1f} s"
+        return f"{self.kind} {self.victim} after {self.moment:.1f} s"
 
 
 @dataclass(frozen=True)
@@ -134,10 +140,10 @@ class KillPlan:
     faults: tuple[Kill, ...]
 
 
-def draw_kill(seed: int, victims: tuple[str, ...]) -> KillPlan:
-    """Draw a plan at random; equal seeds make equal plans."""
-    chance = random.Random(f"course {seed}")
-    return KillPlan((Kill(chance.choice(victims), chance.uniform(0.0, LATEST)),))
+def draw_kill(seed: int, victims: tuple[str, ...], stop: float = 0.0) -> KillPlan:
+    """Draw the moment; seeds take the victims in turn, and equal seeds make equal plans."""
+    moment = random.Random(f"course {seed}").uniform(0.0, LATEST)
+    return KillPlan((Kill(victims[seed % len(victims)], moment, stop),))
 
 
 class CourseTrial:
@@ -169,9 +175,17 @@ class CourseTrial:
         self._drive("a robot that drives")
         record.forget()
         robot, moment, lengths = record.robots, record.time, self._lengths()
-        system.processes.kill(victim)
+        (system.processes.stop if self._kill.stop else system.processes.kill)(victim)
         wanted = system.wanted
-        if victim == system.simulator:
+        if self._kill.stop:
+            if victim == system.simulator:
+                time.sleep(self._kill.stop)
+            else:
+                system.passes(self._kill.stop)
+                self._judge(verdict, record.samples(robot), moment, wanted)
+            system.processes.go_on(victim)
+            system.passes(1.0)
+        elif victim == system.simulator:
             system.replace_robot()
             system.passes(1.0)
             self._judge_new(verdict, record.samples(record.robots))
@@ -180,6 +194,8 @@ class CourseTrial:
             self._judge(verdict, record.samples(robot), moment, wanted)
             system.processes.start(victim)
         self._drive(f"a robot that drives on after a new {victim}")
+        if self._kill.stop:
+            return
         news = {name: text for name, text in self._news(lengths).items() if name != victim}
         told = [name for name, text in news.items() if re.search(TOLD[victim], text)]
         if not told:

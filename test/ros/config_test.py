@@ -90,6 +90,7 @@ class ConfigTest(unittest.TestCase):
         before = client.get_configuration(timeout=START)
         self.addCleanup(client.update_configuration, {"speed": before["speed"]})
         self.assertEqual(client.update_configuration({"speed": 0.7})["speed"], 0.7)
+        self.assertEqual(rospy.get_param("/joint_states/parameters/speed"), 0.7)
         self.assertEqual(self.params("get", "speed").stdout, "speed=0.7\n")
         self.assertEqual(client.update_configuration({"speed": 1000.0})["speed"], 100.0)
         self.params("set", "speed=0.6")

@@ -20,6 +20,9 @@ FILTER_PATIENCE = 2.0
 REST_SUM = 1e-9
 """Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
 
+FURTHEST_TARGET = 1e4
+"""Largest coordinate of a target [m]; one beyond it counts as not finite."""
+
 TAKEN, NOT_FINITE, NOT_A_TURN = range(3)
 """Outcomes of `ReferenceFilter.aim`."""
 
@@ -222,7 +225,7 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
     velocity = streams[index]
     last = first + len(numbers)
     for k in range(len(numbers)):
-        if not numbers[k] - numbers[k] == 0.0:
+        if not abs(numbers[k]) <= FURTHEST_TARGET:
             return NOT_FINITE
     length = 1.0
     if last == 7:

@@ -4,7 +4,7 @@ import json
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from solfer.components.base import Component
 from solfer.config import Record
 from solfer.config.records.live import LiveField, Path, live_fields, revised, value_at
 from solfer.config.yaml.nodes import dotted
-from solfer.errors import ComponentError, Overtaken, SizeMismatch, SolferError, UnknownName, singles
+from solfer.errors import ComponentError, Overtaken, SizeMismatch, SolferError, UnknownName, described, singles
 from solfer.interfaces.declaration import Accepted, LiveParameter, Service
 from solfer.transport.parameters import (
     GET_PARAMETERS,
@@ -173,6 +173,23 @@ class Tuning:
             prepare=self._describe,
             quick=True,
         )
+
+    def begin(self, setting: Service, values: Mapping[str, Any]) -> None:
+        """Begin with other values than those of the files, if all of them fit; before the first start.
+
+        Args:
+            setting: That of `setting`, which notes the request.
+            values: Values by name.
+        """
+        texts = ("" if value == "" else json.dumps(value, default=str) for value in values.values())
+        try:
+            setting.prepared(SetParameters(tuple(values), tuple(texts)))()
+        except (SolferError, ValueError, RecursionError) as error:
+            logger.warning(
+                "%s: first values of parameters are refused: %s", self._component.name, described(error, lines=True)
+            )
+        self.finish()
+        self.log()
 
     def advance(self, step: float) -> None:
         """Move numbers on by `step` [s]; where `moves` is False there is nothing to do."""

@@ -29,7 +29,10 @@ _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _MCAP_CHUNK = struct.Struct("<QQQI")
 _CONTENT = _HEAD.size + _MESSAGE.size
-_MCAP_LARGEST = 1 << 28  # [B], of a record and of the messages in a chunk: solfer's own have some hundred kB
+_MCAP_LARGEST = 1 << 25  # [B], of a record: solfer's own have some hundred kB
+_MCAP_CHUNK_LARGEST = 1 << 24  # [B], of the messages in a chunk, likewise
+_MCAP_OTHERS = 1 << 27  # [B], of all that is no chunk
+_MCAP_ROOM = 1 << 27, 32  # [B], of all messages; and how many bytes more for each byte of the file
 _MCAP_EXPECTED = "a file that `solfer record` made"
 _DAMAGES = (
     ValueError,
@@ -90,6 +93,9 @@ class _Reader:
         self._attachments: dict[str, bytes] = {}
         self._texts: dict[str, Mapping[str, str]] = {}
         self._missing: list[str] = []
+        self._size = os.fstat(file.fileno()).st_size
+        self._others = 0
+        self._unpacked = 0
         self._ended = False
 
     def recording(self) -> Recording:
@@ -116,7 +122,7 @@ class _Reader:
 
     def _records(self) -> Iterator[tuple[int, bytes]]:
         """Yield what each record is, and its content. A part of one at the end is left out."""
-        rest = os.fstat(self._file.fileno()).st_size - len(MCAP0_MAGIC)
+        rest = self._size - len(MCAP0_MAGIC)
         while rest > 0:
             self.place = f"byte {self._file.tell()}"
             head = self._file.read(_HEAD.size)
@@ -133,6 +139,9 @@ class _Reader:
         if opcode == Opcode.CHUNK:
             self._chunk(content)
             return
+        self._others += len(content)
+        if self._others > _MCAP_OTHERS:
+            raise ValueError(f"more than {_MCAP_OTHERS} bytes that are no messages")
         stream = ReadDataStream(io.BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
@@ -155,7 +164,9 @@ class _Reader:
         length = stream.read8()
         packed = stream.read(length)
         try:
-            if size > _MCAP_LARGEST or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
+            if size > _MCAP_CHUNK_LARGEST or (
+                packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)
+            ):
                 raise zstandard.ZstdError("as much memory would be taken as a damaged number says")
             messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
         except zstandard.ZstdError:
@@ -163,6 +174,9 @@ class _Reader:
         if packing not in ("", "zstd") or len(messages) != size or (checksum and zlib.crc32(messages) != checksum):
             self._missing.append(f"damaged rows between {1e-9 * first:.3f} s and {1e-9 * last:.3f} s")
             return
+        self._unpacked += size
+        if self._unpacked > _MCAP_ROOM[0] + _MCAP_ROOM[1] * self._size:
+            raise ValueError(f"a file of {self._size} bytes that unpacks to more than {self._unpacked} bytes")
         data = np.frombuffer(messages, dtype=np.uint8)
         for number, (places, lengths) in _messages_of(messages).items():
             self._messages(number, data, places, lengths=lengths)

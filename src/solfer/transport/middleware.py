@@ -145,6 +145,10 @@ class Middleware(abc.ABC):
             UnknownName: There is no such parameter; `where` is the place that names it.
         """
 
+    def first_values(self, owner: str) -> Mapping[str, Any]:
+        """Return values with which live parameters of a part begin, by name; by default those of its files count."""
+        return {}
+
     def resolve(self, topic: str) -> str:
         """Return the one name of a topic for all that may be given: by default without a leading slash."""
         return topic.lstrip("/")

@@ -398,6 +398,8 @@ def test_a_jump_of_the_base_moves_no_joint(centauro, tmp_path, asked):
         (SetReference("pose", (0.0,) * 3), SizeMismatch, "the 7 of its pose"),
         (SetReference("pose", (float("nan"), *(0.0,) * 5, 1.0)), NotFinite, "task 'pose'"),
         (SetReference("pose", (0.0,) * 7), NotFinite, "a quaternion of length 1"),
+        (SetReference("pose", (0.0, 1e308, 0.0, 0.0, 0.0, 0.0, 1.0)), NotFinite, "coordinates of up to 10000 m"),
+        (SetReference("pose", (1e20, *(0.0,) * 5, 1.0), relative=True), NotFinite, "task 'pose'"),
         (SetReference("turn", (0.0, 0.0, 0.0, 2.0), relative=True), NotFinite, "a quaternion of length 1"),
     ],
 )
@@ -410,7 +412,7 @@ def test_wrong_requests_change_nothing(arm, request_, error, text):
 
 def test_wrong_numbers_of_a_pipe_are_held(arm, caplog):
     port = arm.targets["pose"].port
-    for wrong in (np.nan, 0.0):
+    for wrong in (np.nan, 0.0, (1e20, *(0.0,) * 5, 1.0)):
         port.value[:], port.fresh = wrong, True
         positions = run(arm, 0.05)
         assert np.isfinite(positions).all() and np.ptp(positions, axis=0).max() < 1e-6

@@ -478,6 +478,9 @@ def test_velocities_are_bounded(make):
         (1, WheelsState(x=0.1, cs=(0.1, 0.1)), SizeMismatch),
         (2, WheelsSupport(position=(0.1,) * 11), SizeMismatch),
         (2, WheelsSupport(velocity=(np.nan,) * 12), NotFinite),
+        (2, WheelsSupport(velocity=(1e20,) * 12), NotFinite),
+        (2, WheelsSupport(position=(1e308,) * 12), NotFinite),
+        (0, Twist(Vector(1.7e308, 1.7e308), Vector()), ComponentError),
     ],
 )
 def test_messages_that_do_not_fit_change_nothing(make, topic, message, kind):

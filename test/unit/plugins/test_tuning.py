@@ -12,6 +12,7 @@ from support.recording.sine import recorded, tree
 from solfer.cli.main import main
 from solfer.components import Component, LiveParameter
 from solfer.errors import ComponentError, MiddlewareError, Overtaken
+from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins.tuning import MOVING_PARAMETERS, RAMP, WAITING_CHANGES, Tuning
 from solfer.recording.reader import read
 from solfer.transport.parameters import SetParameters
@@ -238,3 +239,27 @@ def test_changes_are_recorded_and_repeated(tmp_path, capsys):
     assert events[0] == '["set_parameters", {"names": ["gain"], "values": ["1.1"]}]'
     assert main(["replay", str(file), "-n", "first"]) == 0, capsys.readouterr()
     assert "the same commands" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("values", "word"),
+    [
+        ({"gain": 1.3, "law": "line", "limit": 2.5, "parts.hand.weight": [1, 2]}, ""),
+        ({"gain": "1.3"}, "a number"),
+        ({"gain": float("nan")}, "a number"),
+        ({"gain": 1.3, "sizes": {"a": 1}}, "unknown parameter"),
+        ({"gain": 1.3, "law": 10**6 * "x"}, "'sine' or 'line'"),
+        ({"gain": 1.3, "least": b"x"}, "a number"),
+    ],
+)
+def test_a_plugin_begins_with_values_of_its_middleware(tmp_path, monkeypatch, caplog, values, word):
+    monkeypatch.setattr(MemoryMiddleware, "first_values", lambda self, owner: values)
+    changed = tree(TUNED)
+    changed["modules"]["first"] |= TAGS
+    made = Fleet(tmp_path, changed, ("first",), together=False)
+    made.cycle(**still())
+    component = made.plugins[0].component
+    assert component.gain == component.tags.gain == (0.3 if word else 1.3)
+    assert component.tags.law == ("sine" if word else "line")
+    assert len([each for each in caplog.records if each.levelno >= logging.WARNING]) == bool(word)
+    assert word in caplog.text and len(caplog.text) < 2000

@@ -12,6 +12,7 @@ from mcap.records import Channel as ChannelRecord
 
 from solfer.cli.main import main
 from solfer.errors import RecordingError
+from solfer.recording import reader
 from solfer.recording.model import COLUMNS_KIND, Channel, Recording
 from solfer.recording.reader import read
 from solfer.recording.writer import save
@@ -104,4 +105,34 @@ def test_a_chunk_with_a_message_beyond_its_end_is_an_error(file):
 def test_zeros_behind_the_beginning_are_an_error_at_once(tmp_path, file):
     file.write_bytes(file.read_bytes()[:8] + bytes(1000))
     with pytest.raises(RecordingError, match="a record of the kind 0"):
+        read(file)
+
+
+def test_a_file_that_unpacks_to_much_is_an_error(file, monkeypatch, capsys):
+    """Chunks of a megabyte, a thousand bytes each in the file; and one that is too large by itself."""
+    data = file.read_bytes()
+    _, place, length = [each for each in records(data) if each[0] == 6][-1]
+    old = data[place + 9 : place + 9 + length]
+    message = zstandard.decompress(old[44:])
+    message = message[: 9 + struct.unpack_from("<Q", message, 1)[0]]
+
+    def chunk(count):
+        packed = zstandard.compress(count * message)
+        head = old[:16] + struct.pack("<QI", count * len(message), 0) + old[28:36] + struct.pack("<Q", len(packed))
+        return struct.pack("<BQ", 6, len(head) + len(packed)) + head + packed
+
+    many = 2**20 // len(message)
+    monkeypatch.setattr(reader, "_MCAP_ROOM", (2**21, 32))
+    file.write_bytes(data[:place] + 5 * chunk(many) + data[place + 9 + length :])
+    with pytest.raises(RecordingError, match="unpacks to more than"):
+        read(file)
+    assert main(["log", "info", str(file)]) == 2
+    assert capsys.readouterr().err.count("error: ") == 1
+    file.write_bytes(data[:place] + chunk(20 * many) + data[place + 9 + length :])
+    assert any("damaged rows" in sentence for sentence in read(file).missing)
+
+
+def test_attachments_and_texts_have_bounds(file, monkeypatch):
+    monkeypatch.setattr(reader, "_MCAP_OTHERS", 100)
+    with pytest.raises(RecordingError, match="that are no messages"):
         read(file)

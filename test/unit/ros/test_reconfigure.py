@@ -21,10 +21,13 @@ class Ros:
     Attributes:
         topics: Messages by the topic.
         services: What rospy calls with a request, by the service.
+        kept: What is on the parameter server.
     """
 
     def __init__(self, monkeypatch):
-        self.topics, self.services = {}, {}
+        self.topics, self.services, self.kept = {}, {}, {"first/parameters": {"least": 1.5, "most": 4.0}}
+        monkeypatch.setattr(reconfigure.rospy, "get_param", self.kept.get)
+        monkeypatch.setattr(reconfigure.rospy, "set_param", self.kept.__setitem__)
         for module in (services, reconfigure):
             monkeypatch.setattr(module.rospy, "Service", self._offer)
             monkeypatch.setattr(module, "bound_requests", lambda *limits, **named: None)
@@ -111,6 +114,10 @@ def test_numbers_beyond_their_range_become_its_end(ros, fleet):
         ({"least": 6.0, "gain": 1.0}, "above 'most'"),
         ({"size": 3}, "unknown parameter 'size'"),
         ({"limit": "much"}, "limit"),
+        ({"gain": "1.0"}, "expected a number"),
+        ({"gain": True}, "expected a number"),
+        ({"law": 1.0}, "'sine' or 'line'"),
+        ({"law": 10**6 * "x"}, "'sine' or 'line'"),
     ],
 )
 def test_what_is_refused_changes_nothing(ros, fleet, caplog, values, word):
@@ -123,6 +130,19 @@ def test_what_is_refused_changes_nothing(ros, fleet, caplog, values, word):
 def test_a_change_by_the_plugins_own_service_is_published(ros):
     reply = ros.services["first/set_parameters"](SetParametersRequest(["gain"], ["0.9"]))
     assert reply.success and ros.newest["gain"] == 0.9
+
+
+def test_the_parameter_server_has_what_counts(ros):
+    """Values that are in it are made true at the start; others come in when they change."""
+    assert ros.kept.pop("first/parameters/least") == 0.0 and ros.kept.pop("first/parameters/most") == 5.0
+    ros.put(gain=1.5, limit="2.5", **{"parts.hand.weight": "[1, 2]"})
+    ros.put(gain=float("nan"))
+    ros.kept.pop("first/parameters")
+    assert ros.kept == {
+        "first/parameters/gain": 1.5,
+        "first/parameters/limit": 2.5,
+        "first/parameters/parts.hand.weight": [1.0, 2.0],
+    }
 
 
 def test_a_client_may_send_all_values(ros, fleet):

@@ -100,7 +100,8 @@ def _info(recording: Recording) -> Iterator[str]:
 
 
 def _row(channel: Channel) -> tuple[str, ...]:
-    rate = f"{1.0 / np.median(np.diff(channel.times)):.1f}" if len(channel.times) > 1 else "-"
+    step = np.median(np.diff(channel.times)) if len(channel.times) > 1 else 0.0
+    rate = f"{1.0 / step:.1f}" if step else "-"
     return channel.name, str(len(channel.columns)), str(len(channel.times)), rate, channel.kind
 
 

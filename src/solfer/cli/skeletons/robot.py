@@ -2,8 +2,9 @@
 
 import os
 from pathlib import Path
+from xml.sax.saxutils import escape
 
-from solfer.cli.skeletons.skeleton import Skeleton
+from solfer.cli.skeletons.skeleton import Skeleton, scalar
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 from solfer.model.srdf.semantics import Semantics
@@ -23,7 +24,7 @@ ROBOT_TEMPLATES = {
 SRDF_LINES = {
     "@SRDF_FILE@": "srdf: {srdf}  # groups and named states\n",
     "@SRDF_SOURCE@": "      srdf: /robot_semantic_description\n",
-    "@SRDF_PARAMETER@": '  <param name="/robot_semantic_description" textfile="$(arg folder)/{srdf}"/>\n',
+    "@SRDF_PARAMETER@": '  <param name="/robot_semantic_description" textfile="$(arg folder)/{file}"/>\n',
 }
 """What the files say of an SRDF, if there is one."""
 
@@ -88,6 +89,8 @@ TIP_STACK = """\
           - [tip, posture]
 """
 
+_QUOTES = {'"': "&quot;"}
+
 FOOT_HEIGHT = 0.1
 """Links that are no higher than this part of the base's height above the lowest one are feet."""
 
@@ -120,26 +123,29 @@ class RobotSkeleton(Skeleton):
         self.dofs = kinematics.size
         if srdf is not None:
             Semantics.from_file(srdf, description)
+        seen = self._seen_from_bundle(urdf, name)
         self._words = {
-            "@URDF@": self._seen_from_bundle(urdf, name),
+            "@URDF@": scalar(seen),
+            "@URDF_FILE@": escape(seen, _QUOTES),
             "@FLOATING@": "true" if kinematics.base is not None else "false",
         }
         feet = feet_of(kinematics)
-        base = kinematics.base_link
+        base = scalar(kinematics.base_link or "")
         tip = tip_of(kinematics)
         for word, part in BASE_PARTS.items():
             self._words[word] = part.format(base=base) if feet else ""
         if feet:
             foot = "pose" if len(feet) < 3 else "position"  # few feet carry a robot by their soles
-            stack = BASE_STACK.format(base=base, feet=", ".join(feet), foot=foot)
+            stack = BASE_STACK.format(base=base, feet=", ".join(map(scalar, feet)), foot=foot)
             module = {"what": "the base above its feet", "robot": "standing", "stack": stack}
         else:
-            stack = TIP_STACK.format(tip=tip)
+            stack = TIP_STACK.format(tip=scalar(tip or ""))
             module = {"what": "the tip of an arm", "robot": "whole_body", "stack": stack}
         self._words["@TASKS@"] = f", and inverse_kinematics {module['what']}" if feet or tip else ""
         self._words["@TASKS_MODULE@"] = MODULE.format(**module) if feet or tip else ""
+        seen = "" if srdf is None else self._seen_from_bundle(srdf, name)
         for word, line in SRDF_LINES.items():
-            self._words[word] = "" if srdf is None else line.format(srdf=self._seen_from_bundle(srdf, name))
+            self._words[word] = line.format(srdf=scalar(seen), file=escape(seen, _QUOTES)) if seen else ""
         self._words |= {"@NAME@": name, "@PACKAGE@": self.package}
 
     def write(self) -> None:

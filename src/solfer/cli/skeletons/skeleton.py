@@ -1,5 +1,6 @@
 """A catkin package that is written from templates."""
 
+import json
 import keyword
 import re
 from collections.abc import Mapping
@@ -9,6 +10,8 @@ from pathlib import Path
 from solfer.errors import ConfigError, SolferError
 
 PACKAGE_NAME = re.compile(r"[a-z][a-z0-9_]*")
+PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./-]*")
+_YAML_WORDS = ("true", "false", "null", "yes", "no", "on", "off", "y", "n")
 ANOTHER = "another name, or --package DIR"
 
 
@@ -57,10 +60,17 @@ class Skeleton:
             raise SolferError(what, where=where, expected="a folder that you may write to") from error
 
 
+def scalar(text: str) -> str:
+    """Write a text that may hold anything, such as the name of a link, as a scalar of YAML."""
+    if PLAIN.fullmatch(text) and text.lower() not in _YAML_WORDS:
+        return text
+    quoted = json.dumps(text, ensure_ascii=False)
+    return "".join(each if each.isprintable() else f"\\U{ord(each):08x}" for each in quoted)
+
+
 def _filled(text: str, words: Mapping[str, str]) -> str:
-    for word, value in words.items():
-        text = text.replace(word, value)
-    return text
+    """Replace words at once: a name may look like one of them."""
+    return re.sub("|".join(map(re.escape, words)), lambda found: words[found[0]], text)
 
 
 def _check(name: str, kind: str) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import NotFinite, SizeMismatch
 from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.reference_filter import FURTHEST_TARGET
 from solfer.numerics.rotations import is_unit, quaternion_product
 from solfer.points import Constant
 from solfer.points.space import ORIENTATION, POSE
@@ -59,7 +60,7 @@ class PoseNumbers:
 
         Raises:
             SizeMismatch: There are not as many numbers.
-            NotFinite: One is NaN or infinite, or a quaternion has not the length 1.
+            NotFinite: One is NaN, infinite or far beyond any place, or a quaternion has not the length 1.
         """
         if len(values) != self.size:
             raise SizeMismatch(
@@ -68,6 +69,12 @@ class PoseNumbers:
         numbers = np.array(values, dtype=float)
         if not np.isfinite(numbers).all():
             raise NotFinite(f"a reference of {numbers.tolist()}", where=where)
+        if np.any(abs(numbers[self.place]) > FURTHEST_TARGET):
+            raise NotFinite(
+                f"a reference at {numbers[self.place].tolist()} m",
+                where=where,
+                expected=f"coordinates of up to {FURTHEST_TARGET:g} m",
+            )
         if self.quantity != "position" and not is_unit(numbers[-4:].tolist()):
             raise NotFinite(
                 f"a reference with the quaternion {numbers[-4:].tolist()}",

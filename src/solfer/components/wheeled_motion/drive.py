@@ -124,8 +124,9 @@ class Drive:
         speed, turn_speed = self._speeds
         share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
         if share < SPIKE:
+            times = 1.0 / max(share, 1e-300)  # which may be 0
             raise ComponentError(
-                f"a velocity of {desired}, which is {1.0 / share:.0f} times what the base may do",
+                f"a velocity of {desired}, which is {times:.3g} times what the base may do",
                 where=where,
                 expected=f"{speed:g} m/s and {turn_speed:g} rad/s at most",
             )

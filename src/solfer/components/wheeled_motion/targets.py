@@ -13,6 +13,7 @@ from solfer.errors import ComponentError, NotFinite, SizeMismatch
 from solfer.interfaces.port import Port
 from solfer.interfaces.support import BASE_PORT, LEAD, VELOCITIES_PORT, VERTICES_PORT
 from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.reference_filter import FURTHEST_TARGET
 
 TARGETS_PATIENCE = 0.55
 """Time after the last velocity, or the last place of a stream, when what it drives begins to stop [s]."""
@@ -128,8 +129,8 @@ class Targets:
         for name, port in self.ports.items():
             if not port.fresh:
                 continue
-            if not np.isfinite(port.value).all():
-                wrong = f"'{name}' is not finite"
+            if not (abs(port.value) <= FURTHEST_TARGET).all():
+                wrong = f"'{name}' is not finite, or has a number beyond {FURTHEST_TARGET:g}"
             elif name == BASE_PORT:
                 wrong = self._aim_base(port.value) or wrong
             elif name == VERTICES_PORT:
@@ -258,9 +259,11 @@ def check(what: str, numbers: Sequence[float], size: int) -> None:
 
     Raises:
         SizeMismatch: It has not `size` numbers.
-        NotFinite: One is NaN or infinite.
+        NotFinite: One is NaN or infinite, or far beyond any place or speed.
     """
     if numbers and len(numbers) != size:
         raise SizeMismatch(f"{len(numbers)} numbers", where=what, expected=f"{size}, or none")
     if not all(map(math.isfinite, numbers)):
         raise NotFinite("a number that is not finite", where=what, expected="finite numbers")
+    if any(abs(number) > FURTHEST_TARGET for number in numbers):
+        raise NotFinite(f"{max(numbers, key=abs):g}", where=what, expected=f"numbers of up to {FURTHEST_TARGET:g}")

@@ -24,7 +24,7 @@ from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.master import lives
 from solfer.middleware.ros.node.node import RosNode
 from solfer.middleware.ros.node.waiting import wait_for
-from solfer.middleware.ros.reconfigure import ReconfigureServer
+from solfer.middleware.ros.reconfigure import ReconfigureServer, first_values
 from solfer.middleware.ros.services import RosService
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
@@ -138,6 +138,16 @@ class RosMiddleware(Middleware):
             raise MiddlewareError(
                 f"parameter '{name}' cannot be read: {error}",
                 where=where,
+                expected="a running master (roscore) at ROS_MASTER_URI",
+            ) from error
+
+    def first_values(self, owner: str) -> Mapping[str, Any]:
+        """See `Middleware.first_values`; they are below `<owner>/parameters`, as those of dynamic_reconfigure."""
+        try:
+            return first_values(owner)
+        except (OSError, rospy.ROSException) as error:
+            raise MiddlewareError(
+                f"parameters of '{owner}' cannot be read: {error}",
                 expected="a running master (roscore) at ROS_MASTER_URI",
             ) from error
 

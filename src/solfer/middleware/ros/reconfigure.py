@@ -76,10 +76,18 @@ class _Row:
         return type(self.least)(json.loads(text))
 
     def write(self, value: Any) -> str:
-        """Write a value, within its range, as YAML."""
-        if self.type in ("int", "double"):
+        """Write a value, within its range, as YAML; one of another type is for the plugin to refuse."""
+        if self.type in ("int", "double") and isinstance(value, int | float):
             value = min(max(value, self.least), self.most)
-        return value if self.type == "str" and not self.is_text else json.dumps(value)
+        is_yaml = self.type == "str" and not self.is_text and isinstance(value, str)
+        return value if is_yaml else json.dumps(value)
+
+    def kept(self, value: Any) -> Any:
+        """Return a value as the parameter server keeps it: numbers and lists as such."""
+        if self.type == "str" and not self.is_text:
+            with suppress(ValueError):  # a word among other kinds
+                return json.loads(value)
+        return value
 
     @property
     def edit_method(self) -> str:
@@ -93,6 +101,8 @@ class _Row:
 
 class ReconfigureServer:
     """Serves the live parameters of a plugin to clients of dynamic_reconfigure.
+
+    The parameter server has those that are in it from the beginning, and all that change later.
 
     Numbers beyond their range become its end, as these clients expect. What the plugin refuses is logged, and the
     client receives the values that count.
@@ -110,6 +120,7 @@ class ReconfigureServer:
         self._lock = threading.Lock()
         self._throttle = Throttle(logger)
         self._rows: dict[str, _Row] = {}
+        self._kept: dict[str, Any] = {}
         self._parts: list[rospy.Publisher] = []
         self._server: rospy.Service | None = None
         # the answer may come from a bridge, whose loop has called here
@@ -143,6 +154,7 @@ class ReconfigureServer:
             for name, kind in (("parameter_descriptions", ConfigDescription), ("parameter_updates", Config))
         )
         self._parts += (described, self._updates)
+        self._kept = self._values() | first_values(self._owner)
         described.publish(self._description(found))
         self._publish()
         self._setting.done = self._publish
@@ -172,8 +184,14 @@ class ReconfigureServer:
         return _message(self._values())
 
     def _publish(self) -> None:
-        with self._lock, suppress(rospy.ROSException):  # the node ends
-            self._updates.publish(self._config())
+        with self._lock, suppress(*FAILURES):  # the node ends
+            values = self._values()
+            self._updates.publish(_message(values))
+            for name, value in values.items():
+                kept = self._rows[name].kept(value)
+                if self._kept[name] not in (value, kept):
+                    rospy.set_param(f"{self._owner}/{RECONFIGURE_NAME}/{name}", kept)
+                self._kept[name] = kept
 
     def _description(self, found: Any) -> ConfigDescription:
         rows = self._rows.values()
@@ -188,6 +206,12 @@ class ReconfigureServer:
             _message({row.name: row.least for row in rows}),
             _message({name: self._rows[name].read(text) for name, text in defaults}),
         )
+
+
+def first_values(owner: str) -> dict[str, Any]:
+    """Return the values that a plugin's live parameters have on the parameter server."""
+    found = rospy.get_param(f"{owner}/{RECONFIGURE_NAME}", {})
+    return found if isinstance(found, dict) else {RECONFIGURE_NAME: found}
 
 
 def _message(values: dict[str, Any]) -> Config:

@@ -458,6 +458,11 @@ class Generator:
         tuning = self._guarded(lambda: Tuning(component, component.live_parameters()), "list its live parameters")
         self.tuning = tuning
         setting = cast(Service, self.requests.noted(tuning.setting()))
+        first = self.middleware.first_values(component.name)
+        if first:
+            self.requests.enabled = True  # a replay repeats it
+            tuning.begin(setting, first)
+            self.requests.enabled = False
         self.middleware.serve(component.name, (setting,), self.inbox.submit_one_by_one)
         self.middleware.serve(component.name, (tuning.getting(),), answer_at_once)
 

@@ -74,6 +74,10 @@ class SpaceMember(Middleware):
         """See `Middleware.parameter`."""
         return self._outside.parameter(name, where)
 
+    def first_values(self, owner: str) -> Mapping[str, Any]:
+        """See `Middleware.first_values`."""
+        return self._outside.first_values(owner)
+
     def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
         """See `Middleware.reader`; what another component of the shared plugin publishes comes from there alone."""
         resolved = self.resolve(topic)

@@ -19,6 +19,7 @@ from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.clock import make_clock
 from solfer.middleware.ros.node.master import CALL_TIMEOUT, knows, refuse_twin, require_master
 from solfer.middleware.ros.node.master_watch import MasterWatch
+from solfer.middleware.ros.node.ports import bound_ports
 from solfer.middleware.ros.node.waiting import ShutdownRequested
 from solfer.realtime.process import ProcessEnd
 
@@ -67,6 +68,7 @@ class RosNode:
         refuse_twin(rosgraph.names.ns_join(namespace, base))
         set_caller(rosgraph.names.ns_join(namespace, "unnamed"))  # rospy has read it from the process' own arguments
         self._end = ProcessEnd(self._ends.set)
+        bound_ports()
         try:
             rospy.init_node(base, argv=argv, disable_signals=True, disable_rostime=True)
         except rospy.ROSException as error:

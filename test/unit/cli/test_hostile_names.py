@@ -1,0 +1,49 @@
+"""Names of links and files that look like YAML, XML, or words of the templates: files of a robot read as they are."""
+
+import xml.etree.ElementTree as ElementTree
+from xml.sax.saxutils import quoteattr
+
+import pytest
+import yaml
+
+from solfer.cli.skeletons.robot import RobotSkeleton
+
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+NAMES = [
+    "x], y: {z",
+    "a\nb: c",
+    "true",
+    "1.0",
+    "../evil",
+    "*x",
+    "a'b\"c",
+    "@FLOATING@",
+    "{base}",
+    "<a>&b",
+    "a\u0085b",
+    10_000 * "x",
+]
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("name", NAMES)
+def test_files_of_a_robot_hold_any_name(tmp_path, name, floating):
+    link = quoteattr(name, {"\n": "&#10;"})
+    urdf = tmp_path / ("a 'b\" & #c.urdf" if len(name) < 100 else "long.urdf")
+    urdf.write_text(
+        f'<robot name={link}><link name="base">{INERTIAL}</link><link name={link}>{INERTIAL}</link>'
+        f'<joint name={link} type="revolute"><origin xyz="0 0 -1"/><parent link="base"/><child link={link}/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    RobotSkeleton("good", tmp_path / "good", urdf, None, floating).write()
+    assert {each.name for each in tmp_path.iterdir()} == {urdf.name, "good"}
+    made = tmp_path / "good" / "config"
+    tasks = yaml.safe_load((made / "good.yaml").read_text())["mwoibn"]["modules"]["inverse_kinematics"]["stack"][
+        "tasks"
+    ]
+    assert tasks["feet"]["link"] == [name] if floating else tasks["tip"]["link"] == name
+    bundle = made / "robots" / "good"
+    robot = yaml.safe_load((bundle / "robot.yaml").read_text())
+    assert (bundle / robot["urdf"]).resolve() == urdf and robot["floating_base"] is floating
+    parameters = ElementTree.parse(tmp_path / "good" / "launch" / "good.launch").iter("param")
+    assert any(each.get("textfile", "").endswith(urdf.name) for each in parameters)
