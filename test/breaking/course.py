@@ -118,7 +118,7 @@ def rt_figure_5(folder: Path) -> System:
 
 @dataclass(frozen=True)
 class Kill:
-    """What happens: a process is killed some time after the robot has begun to drive [s], or stopped for a while [s]."""
+    """A process is killed some time after the robot has begun to drive [s], or stopped for a while [s]."""
 
     victim: str
     moment: float

@@ -52,7 +52,7 @@ def _axis(trial: "SensorTrial") -> np.ndarray:
     return axis / np.linalg.norm(axis)
 
 
-def _turn_mounting(message: Any, parts: Sequence[str], axis: np.ndarray, angle: float, rate: float = 0.0) -> None:
+def turn_mounting(message: Any, parts: Sequence[str], axis: np.ndarray, angle: float, rate: float = 0.0) -> None:
     """Turn an IMU on its link by an angle [rad] about one of its axes, at a rate [rad/s], in some of its numbers."""
     turn = turn_about(axis, angle)
     back = turn * (-1.0, -1.0, -1.0, 1.0)
@@ -362,7 +362,7 @@ def imu_tilt_drift(trial: "SensorTrial") -> None:
     parts = trial.draw.permutation(numbers)[: trial.draw.integers(1, len(numbers) + 1)]
     axis, rate = _axis(trial), trial.amount(trial.draw.uniform(0.03, 0.3))
     trial.size = f"{rate:.3f} rad/s about {axis.round(2)} in {' and '.join(sorted(parts))}"
-    trial.spoil("imu", lambda message, time: _turn_mounting(message, parts, axis, rate * time, rate=rate))
+    trial.spoil("imu", lambda message, time: turn_mounting(message, parts, axis, rate * time, rate=rate))
 
 
 def gyro_warms(trial: "SensorTrial") -> None:
@@ -397,7 +397,7 @@ def second_imu(trial: "SensorTrial") -> None:
             message = copied(newest[0])
             message.stamp = message.stamp + SHIFT
             message.sender = name or message.sender
-            _turn_mounting(message, NUMBERS["imu"], axis, angle)
+            turn_mounting(message, NUMBERS["imu"], axis, angle)
             publish(message, message.sender, trial.world.bus.time)
 
     trial.world.bus.every(2.0 * SHIFT, publish_other, start=trial.world.bus.time + SHIFT)

@@ -300,16 +300,16 @@ which the orientation turns otherwise: they are spikes."""
 APART, APART_SHARE = 0.08, 0.3
 """Difference of two turns that contradict each other [rad], and as a share of both."""
 
-CHECK_SKEW, SKEWED_TIME, WITNESSED = 0.1, 2.0, 0.5
+CHECK_SKEW, SKEWED_TIME, WITNESSED = 0.1, 1.5, 0.5
 """Angle between the vertical and a mean specific force that contradict each other [rad]; time over which that is the
-mean [s], so that a robot may change its velocity by 2 m/s; and for how long it has to agree with a tilt that leapt."""
+mean [s], so that a velocity may change by 1.5 m/s; and for how long it has to agree with a tilt that leapt [s]."""
 
 GRAVITY, CHECK_UNEVENNESS, CHECK_TURN_LIMIT = 9.81, 1.0, 0.5
 """Specific force at rest, how far it may be from that [m/s^2], and how fast its sensor may turn [rad/s]: beyond that
 it is not gravity that is measured, as in a fall."""
 
 NO_GRAVITY = 3.0
-"""Difference of the mean specific force of 2 s from gravity that no motion explains [m/s^2]: it is in other units, or
+"""Difference of the mean specific force of 1.5 s from gravity that no motion explains [m/s^2]: it is in other units, or
 without gravity."""
 
 

@@ -32,7 +32,7 @@ _CONTENT = _HEAD.size + _MESSAGE.size
 _MCAP_LARGEST = 1 << 25  # [B], of a record: solfer's own have some hundred kB
 _MCAP_CHUNK_LARGEST = 1 << 24  # [B], of the messages in a chunk, likewise
 _MCAP_OTHERS = 1 << 27  # [B], of all that is no chunk
-_MCAP_ROOM = 1 << 27, 32  # [B], of all messages; and how many bytes more for each byte of the file
+_MCAP_ROOM = 1 << 28, 64  # [B], of all messages; and how many bytes more for each byte of the file
 _MCAP_EXPECTED = "a file that `solfer record` made"
 _DAMAGES = (
     ValueError,

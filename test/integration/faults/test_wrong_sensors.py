@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from breaking.alarms import find_alarms
-from breaking.sensor_faults import FAULTS, GRAVITY, LASTS, turn_about
+from breaking.sensor_faults import FAULTS, GRAVITY, LASTS, NUMBERS, SENSORS, turn_about, turn_mounting
 from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
 
 from solfer.middleware.memory import Bus
@@ -79,6 +79,69 @@ def test_a_fault_keeps_the_bounds_and_is_named(fault):
 
 def test_consecutive_seeds_have_every_fault():
     assert {drawn(seed).fault for seed in range(90_000, 90_000 + len(FAULTS))} == set(FAULTS)
+
+
+def drifts(*parts, axis, rate):
+    """Let an IMU drift about one of its axes at a rate [rad/s], in some of its numbers, for 3 s."""
+
+    def fault(trial):
+        def change(message, time):
+            if time < LASTS:
+                turn_mounting(message, parts, np.eye(3)["xyz".index(axis)], rate * time, rate=rate)
+
+        trial.spoil("imu", change)
+
+    return fault
+
+
+def stamped(stamp, *topics):
+    """Let topics have other stamps for 3 s; `stamp` is given the right one, the time and the drawn numbers."""
+
+    def fault(trial):
+        def change(message, time):
+            if time < LASTS:
+                message.stamp = stamp(message.stamp, time, trial.draw)
+
+        for topic in topics or SENSORS:
+            trial.spoil(topic, change)
+
+    return fault
+
+
+def jitters(size, *topics):
+    return stamped(lambda stamp, time, draw: stamp + draw.uniform(-size, size), *topics)
+
+
+QUIET = {
+    "the tilt drifts": ("drives", drifts("orientation", "angular", axis="x", rate=-0.138)),
+    "the heading drifts": ("drives", drifts("orientation", "angular", axis="z", rate=0.35)),
+    "stamps jitter by 73 ms": ("turns", jitters(0.073)),
+    "stamps jitter by 40 ms": ("stands", jitters(0.04)),
+    "stamps of joints jitter": ("turns", jitters(0.02, "joint_states")),
+    "stamps are zero": ("turns", stamped(lambda stamp, time, draw: 0.0)),
+    "stamps run backwards": ("turns", stamped(lambda stamp, time, draw: stamp - 2.0 * time)),
+}
+"""Motions, and faults that pass under thresholds and are right again after 3 s."""
+
+
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("name", QUIET)
+def test_a_fault_that_ends_moves_the_robot_no_faster_than_commanded(monkeypatch, name):
+    """Meanwhile, and when what is measured is right again; then it drives on."""
+    motion, fault = QUIET[name]
+    monkeypatch.setitem(FAULTS, name, fault)
+    trial = SensorTrial(motion, name, 7)
+    outcome = judge(trial, trial.run())
+    assert outcome.complaints == [] and outcome.obeys
+
+
+@pytest.mark.soak
+def test_an_imu_that_turns_on_its_link_and_is_right_again_topples_nothing(monkeypatch):
+    """All that it measures is consistent, so the legs follow it by up to 0.3 m/s; what leaps back is refused first."""
+    monkeypatch.setitem(FAULTS, "the IMU turns", drifts(*NUMBERS["imu"], axis="y", rate=-0.204))
+    outcome = SensorTrial("turns", "the IMU turns", 7).run()
+    assert outcome.joint < 1.0 and outcome.base < 0.3 and outcome.wheel < 4.4 and outcome.tilt < 0.12
+    assert any("the tilt leaps by" in text for _, text in outcome.named)
 
 
 @pytest.mark.daily(1)

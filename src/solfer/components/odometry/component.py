@@ -10,6 +10,7 @@ from solfer.components.base import Component
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.consensus import WHEELS_APART_TIME
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
@@ -150,6 +151,16 @@ class Odometry(Component):
             if check.complaint:
                 self._throttle.warning(check.complaint, "%s: %s, it does not count", self.name, check.complaint)
                 check.complaint = ""
+        if isinstance(self.law, FilteredOdometry) and self.law.consensus.contradicted > WHEELS_APART_TIME:
+            self._throttle.warning("turn", "%s: %s", self.name, self._doubt())
+
+    def _doubt(self) -> str:
+        """Return how wheels and gyroscope contradict each other; empty: they do not."""
+        law = self.law
+        if not isinstance(law, FilteredOdometry) or law.consensus.contradicted < WHEELS_APART_TIME:
+            return ""
+        apart = law.consensus.contradiction
+        return f"the gyroscope turns by {apart:.2g} rad/s otherwise than the wheels, which slip, or it is wrong"
 
     def send(self) -> None:
         """Write the base into the desired State."""
@@ -222,9 +233,18 @@ class Odometry(Component):
             state = "lifted" if lifted else "rolls" if rolls else "slips"
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
-        summary = "a wheel slips" if slips else "all wheels that touch roll"
+        doubt = self._doubt()
+        summary = doubt or ("a wheel slips" if slips else "all wheels that touch roll")
         return Statuses(
-            status=(Status(int(slips), f"{self.name}: wheels", summary, hardware_id=self.name, values=tuple(entries)),)
+            status=(
+                Status(
+                    int(slips or bool(doubt)),
+                    f"{self.name}: wheels",
+                    summary,
+                    hardware_id=self.name,
+                    values=tuple(entries),
+                ),
+            )
         )
 
     def set_pose(self, message: StampedUncertainPose) -> None:

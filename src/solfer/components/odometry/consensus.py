@@ -1,11 +1,17 @@
 """Robust consensus of wheels: which of them slip, and how far each is from what most of them measure."""
 
+import math
+
 import numpy as np
 
 from solfer.components.odometry import consensus_kernel as kernel
 
 COMPARED = 0.3
 """Time over which wheels are compared [s]: encoders are too coarse for less."""
+
+WHEELS_APART, WHEELS_APART_TIME = 0.1, 0.5
+"""Difference of the turn of wheels that agree with each other and that of the gyroscope [rad/s], and time after which
+it is named [s]: they slip together, or it is wrong."""
 
 
 class WheelConsensus:
@@ -29,11 +35,14 @@ class WheelConsensus:
     Attributes:
         inliers: Which wheels do not slip, shape (k,); live.
         distances: Squared distances d^2, shape (k,) [m^2/s^2]; live.
+        contradiction: By how much the turn of the wheels contradicts the gyroscope [rad/s].
+        contradicted: For how long that has been more than `WHEELS_APART` [s].
     """
 
     def __init__(self, count: int, slip_time: float = 0.02):
         self.inliers = np.ones(count, dtype=bool)
         self.distances = np.zeros(count)
+        self.contradiction = self.contradicted = 0.0
         self._slip_time = slip_time
         self._weights = np.zeros(count)
         self._recent = np.zeros((count + 1, 3))
@@ -43,6 +52,7 @@ class WheelConsensus:
     def start(self) -> None:
         """Begin at rest."""
         self.inliers[:] = True
+        self.contradiction = self.contradicted = 0.0
         for numbers in (self.distances, self._recent, self._speeds):
             numbers[:] = 0.0
 
@@ -88,12 +98,15 @@ class WheelConsensus:
             By how much the turn of the wheels contradicts the gyroscope beyond what is likely [rad^2/s^2].
         """
         keep = COMPARED / (COMPARED + time)
-        return float(
+        contradiction = float(
             kernel.estimate(
                 speeds, arms, self.inliers, rate, variance, keep, tolerance,
                 self._speeds, self.distances, self._weights, variances,
             )
         )  # fmt: skip
+        self.contradiction = math.sqrt(max(contradiction, 0.0))
+        self.contradicted = self.contradicted + time if self.contradiction > WHEELS_APART else 0.0
+        return contradiction
 
 
 def turn_of(displacements: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:

@@ -21,8 +21,8 @@ class TurnCheck:
     About the vertical an orientation may jump, as compasses do. Orientation and rates contradict each other where the
     turns of a second by both differ by more than 0.08 rad and 0.3 of their sum, and from then on until the turns since
     agree again, or until messages pause for 0.1 s. Rates that are all zero were not measured; those above 10 rad/s are
-    spikes where the orientation since the message before differs from them by half. The mean specific force of 2 s is
-    vertical within 0.1 rad, which is a change of the velocity by 2 m/s; it does not count where it is not within
+    spikes where the orientation since the message before differs from them by half. The mean specific force of 1.5 s is
+    vertical within 0.1 rad, which is a change of the velocity by 1.5 m/s; it does not count where it is not within
     1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
     """
 
