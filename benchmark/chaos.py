@@ -187,7 +187,8 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
                     log(f"    {complaint}")
                 if verdict.complaints:
                     log(
-                        f"failed: --scheme {options.scheme} --system {name} --stop {options.stop:g} --trials 1 --seed {seed}"
+                        f"failed: --scheme {options.scheme} --system {name} --stop {options.stop:g} "
+                        f"--trials 1 --seed {seed}"
                         f"  ({what}): "
                         f"{verdict.complaints[0]}"
                     )

@@ -21,6 +21,8 @@ ALARMS = (
     "no number has changed",
     "does not follow",
     "a specific force of",
+    "the accelerometer measures",
+    "arrivals count instead",
 )
 """Parts of the messages that name a sensor, a motor or a joint."""
 

@@ -5,9 +5,12 @@ import math
 DISTRUST = 1.0
 """Time after a wrong stamp for which arrivals count [s]."""
 
-PERIODS = 1.5
-"""Periods by which a stamp may be behind the one before, or earlier at its arrival than all others: transports keep
-the order of messages, and none is faster than it has been."""
+BACK, AHEAD = 0.5, 1.5
+"""Periods by which a stamp may be behind the one before, or ahead of all others at its arrival: transports keep the
+order of messages, and are no faster than they have been."""
+
+SPREAD = 0.5
+"""Share of the mean delay beyond the least one by which a stamp may be ahead besides."""
 
 AVERAGED = 100
 """Messages over which periods and delays are averaged."""
@@ -31,9 +34,9 @@ CLOCK_DIFFERENCE = 0.1
 class SenderClock:
     """Finds the time at which the numbers of each message were true.
 
-    That is its stamp, unless stamps go back or ahead by more than 1.5 periods, are no numbers, or are zero where others
-    are not. After such a stamp arrivals count for 1 s, smoothed, with the mean delay of before. Where a clock was set,
-    times go on from there.
+    That is its stamp, unless stamps go back by more than half a period, or ahead by more than 1.5, or are no numbers,
+    or zero where others are not. After such a stamp arrivals count for 1 s, smoothed, with the mean delay of before.
+    Where a clock was set, times go on from there.
 
     A stamp and the arrival of its message need not be of one clock, nor of clocks that go equally fast.
 
@@ -82,10 +85,11 @@ class SenderClock:
             self._stamp = stamp
             self._delay = self._least = delay
             return stamp
-        tolerance = PERIODS * self._period if self._count >= LEARNED else math.inf
+        period = self._period if self._count >= LEARNED else math.inf
+        tolerance = AHEAD * period + SPREAD * (self._delay - self._least)
         speed = self._period / self._interval if self._interval else 1.0
         is_ahead = step > speed * passed + tolerance and (self.is_distrusted or delay < self._least - tolerance)
-        if not step >= -tolerance or is_ahead or not stamp:
+        if not step >= -BACK * period or is_ahead or not stamp:
             self._distrust(stamp, step, arrival - passed)
         if self.is_distrusted:
             return self._follow(stamp, arrival)
@@ -119,7 +123,7 @@ class SenderClock:
         expected = self._time + self._period
         self._time = max(expected + PULL * (target - expected), self._time + PULL * self._period)
         if math.isfinite(stamp) and stamp:
-            self._stamp = stamp if abs(stamp - self._stamp) > PERIODS * self._period else max(stamp, self._stamp)
+            self._stamp = stamp if abs(stamp - self._stamp) > AHEAD * self._period else max(stamp, self._stamp)
             difference = self._time - stamp
             known = difference if math.isnan(self._difference) else self._difference
             self._difference = known + (difference - known) / AVERAGED

@@ -19,6 +19,7 @@ FAULTS = {
     "jitter": lambda time: time + draw.uniform(-0.07, 0.07),
     "a little jitter": lambda time: time + draw.uniform(-0.01, 0.01),
     "late": lambda time: time - draw.uniform(0.0, 0.02),
+    "late by two periods": lambda time: time - draw.uniform(0.0, 2.0 * PERIOD),
     "early": lambda time: time + draw.uniform(0.0, 0.04),
     "set ahead": lambda time: time + 3600.0,
     "set back": lambda time: time - 0.2,
@@ -71,11 +72,10 @@ def test_a_sender_without_stamps_has_none_until_it_has():
     assert not clock.fault
 
 
-def test_a_repeated_message_and_one_that_was_overtaken_are_no_fault():
+def test_a_repeated_message_is_no_fault():
     clock = SenderClock()
     for step in range(1, 500):
-        late = 0 if step % 50 else 1
-        stamp = CLOCK + PERIOD * (step - late)
+        stamp = CLOCK + PERIOD * (step // 2)
         assert clock.time(stamp, PERIOD * step) == stamp
     assert not clock.is_distrusted
 
