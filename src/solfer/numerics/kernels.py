@@ -378,8 +378,8 @@ def _find_fault(values, own_axes, force, arrival, stamp, before):
         before[13] = keep * before[13] + passed * (fy + 2.0 * (w * py + z * px - x * pz))
         before[14] = keep * before[14] + passed * (fz + 2.0 * (w * pz + x * py - y * px))
         before[22] += passed
-    if is_next and fx * fx + fy * fy + fz * fz > 0.0:
-        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+    if is_next and rate < CHECK_TURN_LIMIT and fx * fx + fy * fy + fz * fz > 0.0:
+        size = min(math.sqrt(fx * fx + fy * fy + fz * fz), 2.0 * GRAVITY)  # an impact is none of other units
         before[23] += (size - before[23]) * passed / SKEWED_TIME
     askew = math.atan2(math.sqrt(before[12] ** 2 + before[13] ** 2), before[14])
     if before[21] > 0.0:
