@@ -5,8 +5,8 @@ import tracemalloc
 from collections.abc import Callable
 
 BATCHES, CYCLES, WARM = 5, 300, 200
-KEPT, TAKEN = 512, 4096
-"""What all these cycles may keep together, and what they may allocate at a time [bytes]."""
+KEPT, TAKEN = 2048, 4096
+"""What all these cycles may keep together, about a byte each, and what they may allocate at a time [bytes]."""
 ATTEMPTS = 3
 """Times to measure: other threads of the process allocate, too, but not every time; a cycle that does does it again."""
 
