@@ -9,7 +9,7 @@ BACK, AHEAD = 0.5, 1.5
 """Periods by which a stamp may be behind the one before, or ahead of all others at its arrival: transports keep the
 order of messages, and are no faster than they have been."""
 
-SPREAD = 0.5
+SPREAD = 1.0
 """Share of the mean delay beyond the least one by which a stamp may be ahead besides."""
 
 AVERAGED = 100
