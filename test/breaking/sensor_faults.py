@@ -167,7 +167,7 @@ def accelerometer_jump(trial: "SensorTrial") -> None:
 
 def joints_freeze(trial: "SensorTrial") -> None:
     """Freeze all joints for a while, with fresh stamps."""
-    trial.lasts = LASTS
+    trial.lasts = LASTS + 1.0  # after LASTS the references of hands, on circles, would be back where they were
     _hold(trial, "joint_states", math.inf)
 
 

@@ -17,6 +17,10 @@ STREAM = 0.1
 FILTER_PATIENCE = 2.0
 """A stream goes on until no target has come for so many of its periods."""
 
+FIRST_RATIO, RATIO_RATE = 0.25, 0.1
+"""Ratio of its limits within which a reference goes to a stream that it has not met since its start, and by how much the
+ratio grows in a second [1/s], so that it meets fast ones, too."""
+
 REST_SUM = 1e-9
 """Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
 
@@ -34,8 +38,9 @@ class ReferenceFilter:
     b(d) = sqrt((a T / 2)^2 + 2 a d) - a T / 2 is the largest speed from which it comes to rest within d in steps of
     the period T. Its velocity changes by a T in a cycle at most. So it arrives without overshoot, but for what one
     period adds. Targets that come one after the other count as one that moves: their mean velocity is added, and the
-    target goes on with it between two
-    of them. Orientations do the same with the rotation vector to the target in world axes.
+    target goes on with it between two of them. Such a stream may have gone far away before a start: the reference goes
+    to it within a quarter of its limits, until it meets it. Orientations do the same with the rotation vector to the
+    target in world axes.
 
     Args:
         size: Number m of the references.
@@ -61,6 +66,8 @@ class ReferenceFilter:
         self._stream = np.zeros((size, 6))
         self._age = np.zeros(size)
         self._gap = np.zeros(size)
+        # ratio of the limits that a stream is followed with
+        self._ratio = np.full(size, FIRST_RATIO)
         self._is_still = np.ones(size, dtype=np.bool_)
         self.all_still = True
         self._work = np.zeros((3, 7))
@@ -72,6 +79,7 @@ class ReferenceFilter:
         self._stream[index] = 0.0
         self._age[index] = np.inf
         self._gap[index] = 0.0
+        self._ratio[index] = FIRST_RATIO
         self._is_still[index] = True
 
     def aim(self, index: int, numbers: np.ndarray, first: int, stream: bool = False) -> int:
@@ -128,6 +136,7 @@ class ReferenceFilter:
             self.rate,
             self.limits,
             self.period,
+            self._ratio,
             self._is_still,
             self._work,
         )
@@ -253,7 +262,7 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
     return TAKEN
 
 
-def _follow_all(target, stream, age, gap, value, rate, limits, period, still, work):
+def _follow_all(target, stream, age, gap, value, rate, limits, period, ratios, still, work):
     """See `ReferenceFilter.update`; return whether all are still."""
     error = work[0]
     desired = work[1]
@@ -270,9 +279,15 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
         for k in range(3):
             error[k] = aim[k] - value[i, k]
         distance = _norm(error)
-        _approach(error, stream[i, :3], rate[i, :3], limits[i, 0], limits[i, 1], period, desired)
+        ratio = ratios[i] if age[i] < math.inf else 1.0
+        speed = ratio * limits[i, 0]
+        turn_speed = ratio * limits[i, 2]
+        _approach(error, stream[i, :3], rate[i, :3], speed, ratio * limits[i, 1], period, desired)
         _turn_to(aim, value[i], error)
-        _approach(error, stream[i, 3:], rate[i, 3:], limits[i, 2], limits[i, 3], period, desired)
+        _approach(error, stream[i, 3:], rate[i, 3:], turn_speed, ratio * limits[i, 3], period, desired)
+        if ratio < 1.0:
+            has_met = distance <= speed * period and _norm(error) <= turn_speed * period
+            ratios[i] = 1.0 if has_met else min(ratio + RATIO_RATE * period, 1.0)
         for k in range(3):
             value[i, k] += period * rate[i, k]
         _turn_by(value[i], rate[i], period)
@@ -304,7 +319,7 @@ _aim = cached(
     _aim_at,
 )
 _follow = cached(
-    f"boolean({_ROWS}, {_ROWS}, {_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, boolean[::1], {_ROWS})",
+    f"boolean({_ROWS}, {_ROWS}, {_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, boolean[::1], {_ROWS})",
     _follow_all,
 )
 _halt = cached(f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, {_ROW})", _halt_at)

@@ -69,6 +69,30 @@ def place(time):
     return 0.1 * np.array((math.cos(time), math.sin(time), 0.0))
 
 
+@pytest.mark.parametrize("stream_speed", [0.1, 0.3])
+def test_after_a_start_it_goes_slowly_to_a_stream_until_they_meet(references, stream_speed):
+    """Again after each start; a fast stream is met later, and what jumps once it was met is followed at full speed."""
+
+    def follow(jump, cycles):
+        speeds = []
+        for _ in range(cycles):
+            way[0] += stream_speed * PERIOD
+            references.aim(0, np.array((way[0], jump, 0.0)), 0, True)
+            references.update()
+            speeds.append(np.linalg.norm(references.rate[0, :3]))
+        return np.array(speeds), np.linalg.norm(references.value[0, :3] - (way[0] + stream_speed * PERIOD, jump, 0.0))
+
+    for _ in range(2):
+        way = [0.2]
+        references.start(0, np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)))
+        speeds, _ = follow(0.0, 100)
+        assert speeds.max() < 0.16
+        _, distance = follow(0.0, 2500)
+        assert distance < 1e-3
+    speeds, distance = follow(0.3, 1000)
+    assert speeds.max() > 0.49 and distance < 1e-3
+
+
 def test_slow_targets_are_no_stream(references):
     for target in ((0.1, 0.0, 0.0), (0.2, 0.0, 0.0)):
         references.aim(0, np.array(target), 0, True)
