@@ -198,11 +198,14 @@ class SolferErrors(SolferError):
     """Several errors of one input, reported at once.
 
     Attributes:
-        errors: The single errors in the order of their places.
+        errors: The single errors in the order of their places, each text once.
     """
 
     def __init__(self, errors: Sequence[SolferError]):
-        self.errors = tuple(errors)
+        once: dict[str, SolferError] = {}
+        for error in errors:
+            once.setdefault(str(error), error)
+        self.errors = tuple(once.values())
         super().__init__("\n".join(str(error) for error in self.errors))
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 
-from solfer.errors import SolferError, SolferErrors
+from solfer.errors import SolferError, singles
 
 SUB_COMMANDS = {
     "check": "commands.check",
@@ -38,6 +38,9 @@ SUB_COMMANDS = {
     "completion": "commands.completion",
 }
 """Modules of the sub-commands, below this package."""
+
+MOST_ERRORS = 20
+"""Largest number of errors of one input that are printed."""
 
 PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE ended
 
@@ -97,8 +100,11 @@ def _run(words: Sequence[str]) -> int:
         return options.run(options)
     except SolferError as error:
         sys.stdout.flush()
-        for single in error.errors if isinstance(error, SolferErrors) else (error,):
+        errors = list(singles((error,)))
+        for single in errors[:MOST_ERRORS]:
             print(f"error: {single}", file=sys.stderr)
+        if len(errors) > MOST_ERRORS:
+            print(f"error: {len(errors) - MOST_ERRORS} errors more", file=sys.stderr)
         return error.exit_code
 
 

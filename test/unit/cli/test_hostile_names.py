@@ -5,7 +5,9 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 import yaml
+from support.unit.golden import CENTAURO
 
+from solfer.cli.main import main
 from solfer.cli.skeletons.robot import RobotSkeleton
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -47,3 +49,22 @@ def test_files_of_a_robot_hold_any_name(tmp_path, name, floating):
     assert (bundle / robot["urdf"]).resolve() == urdf and robot["floating_base"] is floating
     parameters = ElementTree.parse(tmp_path / "good" / "launch" / "good.launch").iter("param")
     assert any(each.get("textfile", "").endswith(urdf.name) for each in parameters)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "lines"),
+    [
+        ('value="0"', 'value="{{7*7}}"', 41),
+        ("<group_state ", '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><group_state ', 2),
+    ],
+)
+def test_a_wrong_srdf_leaves_no_package_and_few_lines(tmp_path, capsys, *, old, new, lines):
+    """Each mistake once, at most 20 of them, and how many are more."""
+    srdf = tmp_path / "wrong.srdf"
+    srdf.write_text((CENTAURO / "centauro.srdf").read_text().replace(old, new))
+    arguments = ["new", "robot", "good", "--urdf", str(CENTAURO / "centauro.urdf"), "--srdf", str(srdf)]
+    assert main([*arguments, "--package", str(tmp_path / "good")]) == 2
+    printed = capsys.readouterr().err.splitlines()
+    assert len(printed) == lines and len(set(printed)) >= lines // 2
+    assert all(str(srdf) in line for line in printed[::2][:20])
+    assert not (tmp_path / "good").exists()
