@@ -24,8 +24,8 @@ the smallest size is found that is named within 0.5 s; `--trials` seeds draw joi
 the largest of their sizes and the geometric mean; of a trial just below the largest, in which the robot has to keep its
 bounds, the figures follow. It takes less than a second for each fault and seed, and a trial for each fault.
 
-With `--alarms` the sensors are right, but have three times the shipped noise: a robot is driven, pushed by 300 N, reset
-and at last pushed over, for a minute in each trial, and no sensor, joint or motor may be named.
+With `--alarms` the sensors are right, but have three times the shipped noise: a robot is driven on a floor or a ramp,
+pushed by 300 N, reset and at last pushed over, for a minute in each trial, and no sensor, joint or motor may be named.
 
 Progress goes to stderr, a table to stdout: how fast wheels turned that have to be at rest, how far joints were from
 where they may be, quietly and while wheels brake, and how fast they moved. Exit code 1 if any trial failed; each

@@ -1,6 +1,7 @@
 """Sound sensors of a robot that is driven hard: what they measure may contradict nothing."""
 
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 from support.integration.world import CONFIG, ROBOT
@@ -40,7 +41,16 @@ FALL = 2.0
 
 
 class Noisy(Nodes):
-    """The robot of Fig. 5 with three times the errors of the shipped sensors and of the mock's joints."""
+    """The robot of Fig. 5 with three times the errors of the shipped sensors and of the mock's joints.
+
+    Args:
+        faults: Those of the transport; None: it has none.
+        world: File of the world; None: a plane.
+    """
+
+    def __init__(self, faults: FaultsRecord | None, world: Path | None):
+        self._world = world
+        super().__init__(None, faults)
 
     def offer(self, middleware):
         """See `World.offer`."""
@@ -49,7 +59,7 @@ class Noisy(Nodes):
         errors = {name: _tripled(getattr(imu, name)) for name in ("gyroscope", "accelerometer")}
         joints = _tripled(sensors.joint_noise).model_copy(update={"position": 3e-4, "velocity": 6e-3})
         sensors = sensors.model_copy(update={"imu": imu.model_copy(update=errors), "joint_noise": joints})
-        simulation = Simulation.from_file(bundle.model_copy(update={"sensors": sensors}))
+        simulation = Simulation.from_file(bundle.model_copy(update={"sensors": sensors}), world=self._world)
         return simulation, SimulationServer(simulation, middleware)
 
 
@@ -62,7 +72,7 @@ def find_alarms(seed: int, duration: float) -> tuple[list[tuple[float, str]], bo
     """Drive, push and reset a robot whose sensors are sound, and push it over in the end.
 
     Every 3 s on average another velocity is drawn, every 2 s a push, every 20 s a reset. Odd seeds have the transport
-    of `config/transport/bad.yaml`.
+    of `config/transport/bad.yaml`, every other pair of seeds a ramp of 5 degrees.
 
     Args:
         seed: Seed of what is drawn.
@@ -74,7 +84,8 @@ def find_alarms(seed: int, duration: float) -> tuple[list[tuple[float, str]], bo
     """
     faults = _without_loss(read_faults(CONFIG / "transport" / "bad.yaml"), REFUSALS_TOPIC) if seed % 2 else None
     draw = np.random.default_rng(seed)
-    with closing(Noisy(None, faults)) as world:
+    slope = CONFIG / "worlds" / "slope.yaml" if seed % 4 >= 2 else None
+    with closing(Noisy(faults, slope)) as world:
         log = Saying(lambda: world.bus.time)
         kinematics = world.simulation.kinematics
         joints = np.array(kinematics.dofs[6:])

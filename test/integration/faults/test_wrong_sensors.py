@@ -21,6 +21,7 @@ NAMED = {
     "second_stick": "are ignored while stick sends",
     "base_jump": "the estimate of the base has jumped",
     "jammed_wheel": "does not follow",
+    "effort_sign": "of the robot's weight by the joints' efforts",
 }
 """What the log says of faults, of each in any case."""
 

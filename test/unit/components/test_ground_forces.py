@@ -199,30 +199,37 @@ def test_a_group_without_contacts_is_refused(robot):
 
 
 @pytest.mark.parametrize(
-    ("forces", "friction", "summary", "entry"),
+    ("force", "others", "friction", "summary", "entry"),
     [
-        ((30.0, 40.0, 100.0), 0.51, "all contacts push", "presses with 100.0 N, 0.50 of that along the ground"),
-        ((30.0, 40.0, 100.0), 0.49, "'front_left_leg' needs a friction of 0.50, the ground has 0.49", "0.50 of that"),
-        ((30.0, 40.0, 100.0), None, "all contacts push", "0.50 of that"),
-        ((30.0, 40.0, -6.0), 0.49, "'front_left_leg' pulls, which the ground cannot do", "pulls with 6.0 N"),
-        ((30.0, 40.0, -4.0), 0.49, "all contacts push", "does not press"),
+        ((30.0, 40.0, 100.0), 280.0, 0.51, "all contacts push", "presses with 100.0 N, 0.50 of that along the ground"),
+        ((30.0, 40.0, 100.0), 280.0, 0.49, "'front_left_leg' needs a friction of 0.50, the ground has 0.49", "0.50 of"),
+        ((30.0, 40.0, 100.0), 280.0, None, "all contacts push", "0.50 of that"),
+        ((30.0, 40.0, -6.0), 300.0, 0.49, "'front_left_leg' pulls, which the ground cannot do", "pulls with 6.0 N"),
+        ((30.0, 40.0, -4.0), 300.0, 0.49, "all contacts push", "does not press"),
+        ((0.0, 0.0, 100.0), 100.0, None, "contacts carry 0.43 of the robot's weight", "presses with 100.0 N"),
+        ((0.0, 0.0, 600.0), 600.0, None, "contacts carry 2.6 of the robot's weight", "presses with 600.0 N"),
     ],
 )
-def test_forces_that_ground_cannot_have(robot, forces, friction, summary, entry):
-    """Pulling or slipping contacts are a warning with the leg's name, within a tolerance that noise needs."""
-    stood = np.zeros((4, 3))
-    stood[0], made = forces, component(robot, friction=friction)
-    names, reports = [topic.name for topic in made.topics()], []
-    report = made.topics()[names.index("/diagnostics")].collect
-    for contact, force in zip(made.contacts, stood, strict=True):
-        contact.wrench[:3] = force
+def test_forces_that_ground_cannot_have(robot, caplog, *, force, others, friction, summary, entry):
+    """Pulling or slipping contacts are a warning with the leg's name, within a tolerance that noise needs.
+
+    Forces of another sum than the weight are a warning of the log, too.
+    """
+    made = component(robot, friction=friction)
+    reports = {topic.name: topic.collect for topic in made.topics()}
+    for contact, upward in zip(made.contacts, (None, others, others, others), strict=True):
+        contact.wrench[:3] = force if upward is None else (0.0, 0.0, upward)
     made.law.update = lambda *_: None
-    for _ in range(401):
+    statuses = []
+    for _ in range(400):
         cycle(made)
-        reports.append(report())
-    (first, second, third) = [each.status[0] for each in reports if each is not None]
-    assert second == third and [reports.index(each) for each in reports if each][0] == 0
+        report = reports["/diagnostics"]()
+        statuses += [] if report is None else report.status
+    first, second = statuses
+    assert first == second
     assert second.message.startswith(summary) and second.name == "ground_forces: contacts"
     assert second.level == int(not summary.startswith("all"))
-    told = {each.key: each.value for each in second.values}
-    assert entry in told["front_left_leg"] and told["rear_right_leg"] == "does not press" and len(told) == 4
+    entries = {each.key: each.value for each in second.values}
+    assert entry in entries["front_left_leg"] and len(entries) == 4
+    logged = [summary in record.getMessage() for record in caplog.records]
+    assert logged == ([True] if summary.startswith("contacts carry") else [])

@@ -1,13 +1,26 @@
-"""Whether the ground can have the forces that are computed: it does not pull, and friction has an end."""
+"""Whether the ground can have the forces that are computed: it does not pull, and friction has an end.
+
+Together they carry the robot: M g + sum f_k = M a, and a mean acceleration a of half of g over a second is a change of
+5 m/s. Contacts that carry much less, or more, have efforts that are wrong, or the robot hangs or lies.
+"""
+
+import logging
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from solfer.components.diagnostics import Entry, Status, Statuses
+from solfer.throttle import Throttle
+
+logger = logging.getLogger(__name__)
 
 PULLS = 5.0
 """Mean force with which a contact may pull before that is reported: what noise makes [N]."""
+
+
+CARRIED = (0.5, 2.0)
+"""Ratios to the robot's weight between which its contacts carry in the mean of a second."""
 
 
 class ContactChecks:
@@ -17,15 +30,20 @@ class ContactChecks:
         names: Names of the contacts k.
         normals: Their normals, world axes, shape (k, 3).
         friction: Coefficient of friction of the ground; None: not known.
+        weight: Weight of the robot, world axes, shape (3,) [N]; None: contacts do not carry it.
 
     Attributes:
         friction: As above; may be set.
     """
 
-    def __init__(self, names: Sequence[str], normals: np.ndarray, friction: float | None):
+    def __init__(
+        self, names: Sequence[str], normals: np.ndarray, friction: float | None, weight: np.ndarray | None = None
+    ):
         self._names = tuple(names)
         self._normals = normals
         self.friction = friction
+        self._weight = weight
+        self._throttle = Throttle(logger, interval=10.0)
         self._sum = np.zeros((len(self._names), 3))
         self._count = 0
 
@@ -42,7 +60,6 @@ class ContactChecks:
     def report(self, owner: str) -> Statuses:
         """Return what each contact does in the mean since the last report; `owner` is the name of the component."""
         means = self._sum / max(self._count, 1)
-        self.start()
         along = np.sum(means * self._normals, axis=1)
         across = np.linalg.norm(means - along[:, None] * self._normals, axis=1)
         wrong = []
@@ -51,9 +68,25 @@ class ContactChecks:
             text, complaint = self._judge(normal, tangential)
             entries.append(Entry(name, text))
             wrong += [f"'{name}' {complaint}"] if complaint else []
+        load = self._judge_load(means)
+        if load:
+            wrong.insert(0, load)
+            self._throttle.warning("load", "%s: %s", owner, load)
         summary = "; ".join(wrong) or "all contacts push within the friction of the ground"
+        self.start()
         status = Status(int(bool(wrong)), f"{owner}: contacts", summary, hardware_id=owner, values=tuple(entries))
         return Statuses(status=(status,))
+
+    def _judge_load(self, means: np.ndarray) -> str:
+        """Return what is wrong with the load that the contacts carry together; empty if nothing is."""
+        weight = self._weight
+        if weight is None or not self._count:
+            return ""
+        ratio = -float(means.sum(axis=0) @ weight) / float(weight @ weight)
+        least, most = CARRIED
+        if least <= ratio <= most:
+            return ""
+        return f"contacts carry {ratio:.2g} of the robot's weight by the joints' efforts: it is lifted, or they are wrong"
 
     def _judge(self, normal: float, tangential: float) -> tuple[str, str]:
         """Return what a contact does, and what is wrong with that, empty if nothing is; forces in [N]."""

@@ -81,7 +81,8 @@ class GroundForces(Component):
         self._cycles = 0
         self._silence = 1
         self._between = 1
-        self.checks = ContactChecks(names, self._pushed.normals, tags.friction)
+        weight = None if robot.kinematics.base is None else robot.kinematics.mass * robot.gravity
+        self.checks = ContactChecks(names, self._pushed.normals, tags.friction, weight=weight)
         self.touch = None if tags.touch is None else Touch(count, **dict(tags.touch))
         self.outputs["center_of_pressure"] = Port("position")
         self.outputs["external_wrench"] = Port("wrench")
@@ -137,7 +138,7 @@ class GroundForces(Component):
         return None if self._cycles % self._silence else wrench_on_link(contact, self.model)
 
     def _report_now_and_then(self) -> Statuses | None:
-        return self.checks.report(self.name) if self._cycles % self._between == 1 else None
+        return self.checks.report(self.name) if self._cycles % self._between == 0 else None
 
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
         robot = self.model
@@ -213,12 +214,12 @@ class GroundForces(Component):
         if self._filter is not None:
             self._filter.reset()
         self._cycles = 0
-        self.checks.start()
         self.law.start(self.period)
         self._compute()
         if self.touch is not None:
             self.touch.start(self._pushed.normal_forces)
         self._finish()
+        self.checks.start()
 
     def update(self) -> None:
         """Compute the forces of this cycle."""
