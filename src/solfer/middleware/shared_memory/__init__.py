@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    "Namespace": "solfer.middleware.shared_memory.memory.namespace",
+    "Namespace": "solfer.segments.namespace",
     "XbotMiddleware": "solfer.middleware.shared_memory.middleware",
 }
 __all__ = ["Namespace", "XbotMiddleware"]

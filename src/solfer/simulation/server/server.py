@@ -126,7 +126,7 @@ class SimulationServer:
         self._health = every(HEALTH_RATE)
         middleware.serve(SERVICES_OWNER, simulator_services(self), self.inbox.submit)
         self._screenshots = Screenshots(simulation, self.inbox, pictures or Pictures())
-        middleware.serve(SERVICES_OWNER, (screenshot_service(self),), self._screenshots.submit)
+        middleware.serve(SERVICES_OWNER, (screenshot_service(self.screenshot),), self._screenshots.submit)
 
     def cycle(self) -> None:
         """Receive commands and service calls, make one step unless time stands still, publish what is due.
