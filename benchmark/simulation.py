@@ -12,7 +12,7 @@ from form import Figures, parser_of
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.simulation import Simulation, SimulationServer
-from solfer.simulation.world.engine import STEP
+from solfer.simulation.physics import STEP
 
 ROBOT = Path(__file__).resolve().parent.parent / "config" / "robots" / "centauro" / "robot.yaml"
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.lower_level import LowerLevelServer
+from solfer.simulation.physics import STEP
 from solfer.simulation.rendering.pictures import Pictures
 from solfer.simulation.sensors import Rates
 from solfer.simulation.server.pace import Pace
@@ -18,7 +19,6 @@ from solfer.simulation.server.screenshots import Screenshots
 from solfer.simulation.server.services import SERVICES_OWNER, screenshot_service, simulator_services
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
-from solfer.simulation.world.engine import STEP
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
