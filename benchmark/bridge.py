@@ -27,10 +27,10 @@ from solfer.components import Component, Port
 from solfer.middleware.bridge.bridge import BRIDGE_PERIOD
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
+from solfer.segments.namespace import Namespace
 from solfer.simulation import find_robot, read_bundle
 from solfer.simulation.server.publications import robot_parameters
 from solfer.supervision import supervise

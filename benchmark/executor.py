@@ -24,9 +24,9 @@ import yaml
 from form import Figures, parser_of
 
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
+from solfer.segments.namespace import Namespace
 from solfer.supervision import supervise
 from solfer.telemetry.histograms import quantile, since
 from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, RuntimeStatistics

@@ -26,7 +26,7 @@ from solfer.cli.skeletons.collections import EXAMPLES, PYBULLET, folder_of
 from solfer.errors import MissingDependency, SolferError
 from solfer.model.kinematics import Kinematics
 from solfer.simulation import Simulation, read_bundle
-from solfer.simulation.robot_body import differences
+from solfer.simulation.bullet import differences
 
 TARGETS, NEEDED, STARTS, STEPS = 20, 18, 20, 80
 NEAR = 1e-4

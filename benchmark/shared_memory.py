@@ -22,10 +22,10 @@ import numpy as np
 from form import Figures, parser_of
 
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import Slot
+from solfer.segments.segment import Segment
+from solfer.segments.slot import Slot
 from solfer.supervision import supervise
-from solfer.transport import JointMessage, MessageStatus
+from solfer.transport import JointMessage
 from solfer.transport.messages import JOINT_FIELDS, JOINT_MESSAGES
 
 READS = 10_000_000
@@ -82,7 +82,7 @@ def count_torn(path: Path, reads: int) -> tuple[int, int, int]:
     bad = news = plain = 0
     copy = np.zeros(WIDTH)
     while news < reads:
-        if slot.read() is MessageStatus.NEW:
+        if slot.read():
             news += 1
             bad += torn(slot.values)
             np.copyto(copy, slot._records[news % 2])

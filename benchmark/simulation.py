@@ -12,7 +12,7 @@ from form import Figures, parser_of
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.simulation import Simulation, SimulationServer
-from solfer.simulation.world.engine import STEP
+from solfer.simulation.physics import STEP
 
 ROBOT = Path(__file__).resolve().parent.parent / "config" / "robots" / "centauro" / "robot.yaml"
 
@@ -48,7 +48,6 @@ def measure_parts(steps: int, figures: Figures) -> None:
     parts = {
         "lower level (impedance law)": Stopwatch(simulation.lower_level, "update"),
         "  inertia M": Stopwatch(simulation.kinematics, "inertia"),
-        "  bias h": Stopwatch(simulation.kinematics, "bias"),
         "write torques and speeds": Stopwatch(simulation.body, "apply"),
         "stepSimulation": Stopwatch(simulation._engine, "step"),
         "read state": Stopwatch(simulation.body, "read"),

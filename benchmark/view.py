@@ -18,8 +18,8 @@ from pathlib import Path
 from executor import CONFIG, REPOSITORY, simulated_layer
 from form import Figures, parser_of
 
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import stopped
+from solfer.segments.namespace import Namespace
 from solfer.supervision import supervise
 from solfer.telemetry.summaries import LayerSummary, StatisticsReader
 

@@ -321,24 +321,13 @@ def _braked(trial: "SensorTrial", name: str, torque: float, is_driven: bool) -> 
     """Hold a joint by a friction torque [Nm], beside its motor or instead of it."""
     body, dof = trial.world.simulation.body, 6 + trial.joints.index(name)
     trial.size = name
-    bullet, apply = body._bullet, body.apply
-    count = bullet.getNumJoints(body.id, physicsClientId=body._client)
-    joints = {
-        bullet.getJointInfo(body.id, each, physicsClientId=body._client)[1].decode(): each for each in range(count)
-    }
+    brake, apply = body.robot.group([body.joints.index(name)]), body.apply
 
     def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
         driven = np.array(torques)
         driven[dof] *= is_driven
         apply(driven, speeds)
-        bullet.setJointMotorControl2(
-            body.id,
-            joints[name],
-            bullet.VELOCITY_CONTROL,
-            targetVelocity=0.0,
-            force=torque,
-            physicsClientId=body._client,
-        )
+        brake.hold_speeds(np.zeros(1), [torque])
 
     body.apply = applied
 

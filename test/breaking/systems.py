@@ -15,9 +15,9 @@ from breaking.processes import LOOK, WAIT, Processes, until
 from breaking.record import Record
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.segments.namespace import Namespace
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
 

@@ -15,6 +15,7 @@ else:
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / "src" / "solfer"
+ROS = {SOURCES / "middleware" / "ros", SOURCES / "ros_view"}
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 NAMES = {
@@ -41,7 +42,7 @@ def imported(path: Path) -> set[str]:
 
 @pytest.mark.slow
 def test_what_is_imported_is_declared_and_nothing_else():
-    files = [path for path in SOURCES.rglob("*.py") if SOURCES / "middleware" / "ros" not in path.parents]
+    files = [path for path in SOURCES.rglob("*.py") if not ROS & set(path.parents)]
     others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}
     used = (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"], *EXTRAS["study"], *EXTRAS["view"])
     declared = {Requirement(text).name for text in used}

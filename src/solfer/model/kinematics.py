@@ -11,9 +11,9 @@ from numpy.lib.stride_tricks import as_strided
 from solfer.errors import ModelError, UnknownName
 from solfer.model.actuators import Actuators
 from solfer.model.followers import Followers
+from solfer.model.kinematic_tree import Attachment, KinematicTree
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.scalar_joints import BASE_DOFS, scalar_joints
-from solfer.model.view import Attachment, KinematicTree
 from solfer.model.working_data import working_data
 from solfer.numerics import BaseChart
 

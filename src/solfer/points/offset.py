@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, SizeMismatch, SolferError, UnknownName
-from solfer.model.view import Attachment, RobotView
+from solfer.model.kinematic_tree import Attachment
+from solfer.model.view import RobotView
 from solfer.numerics.rotations import (
     QUATERNION_KINDS,
     QUATERNION_ORDERS,

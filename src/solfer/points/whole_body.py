@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import PointError
-from solfer.model.view import KinematicTree, RobotView
+from solfer.model.kinematic_tree import KinematicTree
+from solfer.model.view import RobotView
 from solfer.numerics.pointers import address
 from solfer.points.compiled import centers, momentum, posture
 from solfer.points.compiled.instruction import PRESSING

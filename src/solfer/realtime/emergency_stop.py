@@ -4,8 +4,8 @@ import os
 import time
 from pathlib import Path
 
-from solfer.middleware.shared_memory.memory.files import PREFIX
-from solfer.middleware.shared_memory.memory.latched import latched
+from solfer.segments.files import PREFIX
+from solfer.segments.latched import latched
 
 ESTOP_FILE = "estop"
 ESTOP_KIND = "estop"

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.segment import Segment
 from solfer.telemetry import STATISTICS
 
 HEARTBEAT_POLL_PERIOD = 0.05

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from solfer.errors import MiddlewareError, UnknownName, nearest
-from solfer.middleware.shared_memory.memory.files import PREFIX
-from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.files import PREFIX
+from solfer.segments.namespace import SHARED_MEMORY, Namespace, names
+from solfer.segments.segment import Segment
 from solfer.telemetry import STATISTICS
 
 

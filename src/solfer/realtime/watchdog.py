@@ -4,10 +4,10 @@ import logging
 import time
 from collections.abc import Callable
 
-from solfer.middleware.shared_memory.memory.presence import Presence
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.heartbeat import Heartbeat
 from solfer.realtime.processor import ProcessorShare
+from solfer.segments.presence import Presence
 
 logger = logging.getLogger(__name__)
 

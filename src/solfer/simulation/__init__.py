@@ -1,4 +1,4 @@
-"""A robot and its lower level in a PyBullet world."""
+"""A robot and its lower level in the world of a physics engine."""
 
 from solfer.simulation.bundle import find_robot, read_bundle
 from solfer.simulation.bundle_records import BundleRecord

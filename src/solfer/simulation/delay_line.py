@@ -4,7 +4,7 @@ from collections import deque
 from typing import Generic, TypeVar
 
 from solfer.errors import SimulationError
-from solfer.simulation.world.engine import STEP
+from solfer.simulation.physics import STEP
 
 Item = TypeVar("Item")
 

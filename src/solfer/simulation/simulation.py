@@ -1,12 +1,14 @@
-"""A robot with its lower level in a PyBullet world."""
+"""A robot with its lower level in a world."""
 
 from pathlib import Path
 
 import numpy as np
 
 from solfer.errors import SimulationError, UnknownName
+from solfer.simulation.bullet import BulletEngine
 from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.physics import STEP, PhysicsEngine
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
 from solfer.simulation.robot_body.placement import START_ORIGIN, StartPlacement, fix, put
@@ -14,7 +16,6 @@ from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
 from solfer.simulation.sensors import Sensors
 from solfer.simulation.state import BaseMotion, Moment, MotorSide, SimulationState, read_only
-from solfer.simulation.world.engine import STEP, Engine
 from solfer.simulation.world.records import WorldRecord
 from solfer.simulation.world.world import FLAT_WORLD, World, read_world
 
@@ -29,8 +30,9 @@ class Simulation:
 
     Args:
         bundle: The robot, and the state in which it begins.
-        gui: Open PyBullet's window.
+        gui: Open the window of PyBullet; no effect on `engine`.
         world: What the robot stands on and bumps into.
+        engine: What moves the robot, empty yet; it is closed with the simulation. None: PyBullet.
 
     Attributes:
         q, v: Position and velocity of the model's DoFs, those of a floating base included, shape (model size,).
@@ -51,14 +53,21 @@ class Simulation:
         ModelError: The state has a joint beyond its limits.
     """
 
-    def __init__(self, bundle: Bundle, gui: bool = False, world: WorldRecord = FLAT_WORLD):
+    def __init__(
+        self,
+        bundle: Bundle,
+        gui: bool = False,
+        world: WorldRecord = FLAT_WORLD,
+        *,
+        engine: PhysicsEngine | None = None,
+    ):
         kinematics = self.kinematics = bundle.kinematics
         drives = bundle.lower_level.drives
         self.lower_level = bundle.lower_level
         self.start = bundle.start
         self._groups = bundle.groups
         self._count = 0
-        self._engine = Engine(gui)
+        self._engine = engine or BulletEngine(gui)
         try:
             self.body = Body(
                 self._engine,
@@ -69,7 +78,7 @@ class Simulation:
                 lossless=bundle.lossless,
             )
             self.world = World(self._engine, world, bundle.friction.ground)
-            self._contacts = ContactDetector(self._engine, self.body)
+            self._contacts = ContactDetector(self.body)
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
             self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
             self._motor_torque = np.zeros(len(drives.speed_dofs))
@@ -77,7 +86,7 @@ class Simulation:
                 self.body.push_motors()
             self._postures = Postures(bundle.states, bundle.start, kinematics)
             self.state = self._make_state()
-            self.pushes = Pushes(self._engine, self.body, self.state.now)
+            self.pushes = Pushes(self.body, self.state.now)
             self.sensors = Sensors(self.state, bundle.equipment)
             self._begin = self._engine.keep()
             self.reset()

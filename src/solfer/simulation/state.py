@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.model.kinematics import Kinematics
-from solfer.simulation.robot_body.contacts import ContactPoint
+from solfer.simulation.physics import ContactPoint
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

@@ -23,8 +23,8 @@ from solfer.recording.log import Logger, LogSource
 from solfer.robot.shipped import RobotFiles
 from solfer.scenarios import Player, read_scenario
 from solfer.simulation import SimulationServer
+from solfer.simulation.physics import STEP
 from solfer.simulation.server.publications import robot_parameters
-from solfer.simulation.world.engine import STEP
 from solfer.study.measures import Columns
 from solfer.study.records import StudyRecord
 from solfer.study.robot import bundle_of, faults_of, simulation_of

@@ -237,7 +237,7 @@ def _warm_up(study: StudyFolder) -> None:
         SolferError: A configuration is wrong. SolferErrors: Several mistakes.
     """
     import solfer.study.run  # noqa: F401
-    from solfer.simulation.world.engine import load_pybullet
+    from solfer.simulation.bullet import load_pybullet
     from solfer.study.simulated_run import rehearse
 
     load_pybullet()

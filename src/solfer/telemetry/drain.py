@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.recording.model import Event
 from solfer.recording.writer import RecordingWriter
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
 from solfer.telemetry.rows import RECORDER_FILE, RECORDER_KIND, RowLayout, events_of
 
 BATCH = 256

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.header import HEADER_LINE
-from solfer.middleware.shared_memory.memory.slot import NEWEST, SLOT_STAMP, SLOT_STATE
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import indices_at, record_at, release_fence
+from solfer.segments.header import HEADER_LINE
+from solfer.segments.slot import NEWEST, SLOT_STAMP, SLOT_STATE
 from solfer.telemetry import histograms
 
 ROW_RING = np.dtype(

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.header import HEADER_LINE
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.numerics.pointers import Memory
 from solfer.recording.log import LogSource
 from solfer.recording.model import Event
+from solfer.segments.header import HEADER_LINE
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
 from solfer.telemetry.kernel import ROW_RING, append
 from solfer.telemetry.rows import EVENT_WIDTH, RECORDER_EVENTS, RECORDER_FILE, RECORDER_KIND, RowLayout, events_of
 

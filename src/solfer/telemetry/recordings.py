@@ -14,9 +14,9 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from solfer.errors import MiddlewareError, RecordingError, UnknownName
-from solfer.middleware.shared_memory.memory.files import PREFIX
-from solfer.middleware.shared_memory.memory.lock import locked
-from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
+from solfer.segments.files import PREFIX
+from solfer.segments.lock import locked
+from solfer.segments.namespace import SHARED_MEMORY, Namespace, names
 from solfer.telemetry.drain import RecordDrain, writer_of
 from solfer.telemetry.rows import RECORDER_FILE
 

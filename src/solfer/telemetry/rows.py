@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
+from solfer.segments.ring import Ring
 
 RECORDER_FILE = RECORDER_KIND = "recording"
 

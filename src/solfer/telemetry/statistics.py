@@ -10,7 +10,7 @@ import numpy as np
 
 from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.segment import Segment
 from solfer.telemetry import STATISTICS
 from solfer.telemetry.histograms import HISTOGRAM_WORDS
 from solfer.transport.plugin_state import PluginState

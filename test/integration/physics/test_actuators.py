@@ -11,7 +11,7 @@ from scipy.constants import g
 
 from solfer.errors import CommandRefused, ModelError
 from solfer.simulation import Simulation
-from solfer.simulation.world.engine import STEP
+from solfer.simulation.physics import STEP
 from solfer.transport.messages import JointMessage
 
 LINK = """<link name="{name}"><inertial><mass value="2"/>

@@ -36,7 +36,7 @@ def standing():
 
 def drive(simulation, steps, push=None):
     """Poses of the IMU, samples of it and of the base at each step; `push` is a force on the pelvis [N] for 0.1 s."""
-    kinematics, engine = simulation.kinematics, simulation._engine
+    kinematics, body = simulation.kinematics, simulation.body
     simulation.reset()
     history = []
     for step in range(steps):
@@ -44,14 +44,7 @@ def drive(simulation, steps, push=None):
             speed = TURN * min(1.0, step / 500.0)
             simulation.lower_level.accept("velocity_controller", JointMessage(WHEELS, velocity=speed))
         if push is not None and 400 <= step < 500:
-            engine.bullet.applyExternalForce(
-                simulation.body.id,
-                -1,
-                push,
-                simulation.body.position.tolist(),
-                engine.bullet.WORLD_FRAME,
-                engine.client,
-            )
+            body.robot.push(body.base_link, push, [0.0] * 3, body.position.tolist())
         simulation.step()
         imu, base = simulation.sensors["imu"].measure(), simulation.sensors["base"].measure()
         kinematics.update(simulation.q)

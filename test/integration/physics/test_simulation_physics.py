@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
+from support.bullet import raw_bullet
 from support.controllers import accept
 
 from solfer.model import Description, Kinematics
@@ -22,8 +23,8 @@ def flight(repository):
     """CENTAURO tumbling without ground, torques in its joints: (simulation, q, v, torque at each step, poses)."""
     bundle = load_bundle(repository / "config/robots/centauro/robot.yaml")
     simulation = Simulation(dataclasses.replace(bundle, friction=Friction(ground=None)))
-    engine = simulation._engine
-    engine.bullet.resetBaseVelocity(simulation.body.id, [0.3, -0.2, 0.5], [0.8, -1.1, 1.4], engine.client)
+    bullet = raw_bullet(simulation)
+    bullet.module.resetBaseVelocity(bullet.body, [0.3, -0.2, 0.5], [0.8, -1.1, 1.4], bullet.client)
     simulation._read()
     controller = simulation.lower_level.controller("position_controller")
     effort = np.random.default_rng(5).uniform(-0.2, 0.2, len(controller.joints)) * controller.limits.effort
@@ -114,11 +115,11 @@ def test_the_base_rates_are_those_of_the_twist(flight):
 
 def test_links_are_where_pinocchio_sees_them(flight):
     simulation, _ = flight
-    kinematics, engine = simulation.kinematics, simulation._engine
+    kinematics, bullet = simulation.kinematics, raw_bullet(simulation)
     kinematics.update(simulation.q)
     for index, link in enumerate(simulation.body.links[:-1]):
-        state = engine.bullet.getLinkState(
-            simulation.body.id, index, computeForwardKinematics=1, physicsClientId=engine.client
+        state = bullet.module.getLinkState(
+            bullet.body, index, computeForwardKinematics=1, physicsClientId=bullet.client
         )
         np.testing.assert_allclose(state[4], kinematics.position(link), atol=1e-6)
         np.testing.assert_allclose(rotation_from_quaternion(state[5]), kinematics.rotation(link), atol=1e-6)
@@ -127,13 +128,13 @@ def test_links_are_where_pinocchio_sees_them(flight):
 def test_lumped_links_keep_the_dynamics(flight, repository):
     """PyBullet's mass matrix of the lumped robot against Pinocchio's of the whole one, joints only."""
     simulation, _ = flight
-    engine, body = simulation._engine, simulation.body
+    bullet = raw_bullet(simulation)
     matrix = np.array(
-        engine.bullet.calculateMassMatrix(
-            body.id, simulation.q[6:][np.argsort(body._indices)].tolist(), physicsClientId=engine.client
+        bullet.module.calculateMassMatrix(
+            bullet.body, simulation.q[6:][np.argsort(bullet.joints)].tolist(), physicsClientId=bullet.client
         )
     )
-    order = 6 + np.argsort(np.argsort(body._indices))
+    order = 6 + np.argsort(np.argsort(bullet.joints))
     description = Description.from_file(repository / "config/robots/centauro/centauro.urdf")
     expected = Kinematics(description).inertia(simulation.q)[6:, 6:]
     np.testing.assert_allclose(matrix[np.ix_(order, order)], expected, atol=1e-6)

@@ -17,8 +17,8 @@ from support.processes import SOURCES
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY
 from solfer.plugins import PluginState
+from solfer.segments.namespace import SHARED_MEMORY
 from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).parents[3]

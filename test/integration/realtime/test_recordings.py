@@ -12,9 +12,9 @@ import pytest
 
 from solfer.cli.main import main
 from solfer.errors import RecordingError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.recordings import FileRecorder, place_beside
 

@@ -11,9 +11,9 @@ import pytest
 from support.integration.xbot_system import HELD, REPOSITORY, WAIT, System, until
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401  (a fixture)
 
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.segments.namespace import Namespace
 
 REST = 1.2
 """Bound of the time from the removal to wheels at rest [s]: it is noticed within 0.1 s."""

@@ -13,8 +13,8 @@ from solfer.plugins import PluginState
 from solfer.simulation import Simulation
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware, mounted
 from solfer.simulation.mock_hardware.records import HardwareRecord
+from solfer.simulation.physics import STEP
 from solfer.simulation.sensors.kinds.joints import JointNoiseRecord
-from solfer.simulation.world.engine import STEP
 
 MOCK = ROBOT / "hardware" / "mock.yaml"
 PUSH = np.array([150.0, 200.0, 0.0]), np.array([60.0, -40.0, 50.0])  # [N], [Nm]

@@ -10,14 +10,15 @@ from functools import partial
 
 import numpy as np
 import pytest
+from support.bullet import raw_bullet
 from support.unit.colladas import COLLADA, SIZE
 
 from solfer import Robot
 from solfer.errors import ModelError
 from solfer.model.collisions.distances import _geometry
 from solfer.simulation import Simulation, read_bundle
-from solfer.simulation.robot_body import body
-from solfer.simulation.robot_body.differences import differences
+from solfer.simulation.bullet import robot
+from solfer.simulation.bullet.differences import differences
 
 INERTIAL = (
     '<inertial><origin xyz="0.2 0 0"/><mass value="1.5"/>'
@@ -51,11 +52,10 @@ def simulated(tmp_path, text, bare=True):
 
 def coast(simulation, speed, duration):
     """Let the joint go at a speed [rad/s]; return its speed later."""
-    bullet, client, number = simulation.body._bullet, simulation.body._client, simulation.body.id
-    bullet.resetJointState(number, 0, -1.0, speed, physicsClientId=client)
+    simulation.body.robot.place_joint(0, -1.0, speed)
     for _ in range(round(duration * 1e3)):
         simulation.step()
-    return bullet.getJointState(number, 0, client)[1]
+    return simulation.body.robot.joint_states().velocity[0]
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.2, 1.0])
@@ -120,9 +120,8 @@ SHAPES = """
 def test_what_differs_from_the_urdf_is_named(tmp_path, before, after, named):
     text = door(shapes=SHAPES)
     with closing(simulated(tmp_path, text)) as run:
-        found = list(
-            differences(run._engine, run.body.id, text.replace('<link name="world"/>', "").replace(before, after))
-        )
+        asked = text.replace('<link name="world"/>', "").replace(before, after)
+        found = list(differences(run._engine._world, run.body.robot.number, asked))
     assert len(found) == len(named) and all(map(str.__contains__, found, named))
 
 
@@ -132,7 +131,8 @@ def test_physics_and_collisions_read_a_mesh_in_one_unit(tmp_path, unit, scale):
     shape = f'<collision><geometry><mesh filename="box.dae" scale="{scale}"/></geometry></collision>'
     run = simulated(tmp_path, door(shapes=shape))
     size = float(unit) * abs(np.array(scale.split(), dtype=float)) * SIZE
-    _, corners = run._engine.bullet.getMeshData(run.body.id, 0, physicsClientId=run._engine.client)
+    bullet = raw_bullet(run)
+    _, corners = bullet.module.getMeshData(bullet.body, 0, physicsClientId=bullet.client)
     np.testing.assert_allclose(np.ptp(corners, axis=0), size, atol=1e-5)
     kinematics = Robot.load(tmp_path / "door.urdf", None, floating_base=False).kinematics
     box = _geometry(kinematics, {"leaf"}).geometryObjects[0].geometry
@@ -149,16 +149,16 @@ def test_a_mesh_without_a_unit_is_one_error(tmp_path, unit):
 
 
 def test_differences_are_logged_when_a_robot_is_loaded(tmp_path, caplog, monkeypatch):
-    monkeypatch.setattr(body, "warn_of_differences", partial(_warn_of_another, body.warn_of_differences))
+    monkeypatch.setattr(robot, "warn_of_differences", partial(_warn_of_another, robot.warn_of_differences))
     simulated(tmp_path, door(shapes=SHAPES)).close()
     assert caplog.messages == [
         f"{tmp_path}/door.urdf: the simulation differs from it: link 'leaf': 4 of 3 collision shapes"
     ]
 
 
-def _warn_of_another(warn, engine, number, text, where):
+def _warn_of_another(warn, client, number, text, where):
     start = text.index("<collision>")
-    warn(engine, number, text[:start] + text[text.index("</collision>") + len("</collision>") :], where)
+    warn(client, number, text[:start] + text[text.index("</collision>") + len("</collision>") :], where)
 
 
 LOCALE = """
@@ -167,9 +167,9 @@ import pybullet
 from solfer.simulation import Simulation, read_bundle
 locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
 simulation = Simulation.from_file(read_bundle(sys.argv[1]))
-body = simulation.body
+robot = simulation.body.robot
 assert locale.localeconv()["decimal_point"] == ","
-print(body.mass(), *body._bullet.getJointInfo(body.id, 0, body._client)[8:12])
+print(robot.mass(), *pybullet.getJointInfo(robot.number, 0, robot._client)[8:12])
 """
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pybullet
 import pybullet_data
 import pytest
+from support.bullet import raw_bullet
 from support.unit.chains import chain
 
 from solfer.errors import ModelError, SimulationError
@@ -135,8 +136,8 @@ def test_bodies_that_cannot_exist_are_named(tmp_path, inertial, inertia, publish
 def test_bullet_takes_the_repaired_inertia():
     """Bullet itself drops an inertia that misses what a body has by a rounding: the body would have none at all."""
     with closing(Simulation.from_file(read_bundle(DATA / "mini_cheetah/mini_cheetah.urdf", floating_base=True))) as run:
-        client, index = run.body._client, run.body.index("thigh_fr")
-        principal = sorted(pybullet.getDynamicsInfo(run.body.id, index, client)[2])
+        bullet = raw_bullet(run)
+        principal = sorted(pybullet.getDynamicsInfo(bullet.body, bullet.links["thigh_fr"], bullet.client)[2])
     np.testing.assert_allclose(principal, (0.000440112, 0.00182304, 0.00226306), rtol=1e-4)
 
 

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from support.bullet import raw_bullet
 from support.controllers import accept
 from support.integration.world import World
 
@@ -198,8 +199,8 @@ def test_a_robot_that_cannot_be_put_stays(world, monkeypatch):
 
 def diverge(world):
     """Let the numbers of the world be none any more."""
-    engine = world.simulation._engine
-    engine.bullet.resetBaseVelocity(world.simulation.body.id, [NAN] * 3, [0.0] * 3, engine.client)
+    bullet = raw_bullet(world.simulation)
+    bullet.module.resetBaseVelocity(bullet.body, [NAN] * 3, [0.0] * 3, bullet.client)
 
 
 def test_a_diverged_simulation_begins_anew(world, caplog):

@@ -10,9 +10,9 @@ from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.bullet import robot as bullet_robot
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
-from solfer.simulation.robot_body import body
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = CONFIG / "robots" / "centauro"
@@ -51,7 +51,7 @@ def perfect() -> BundleRecord:
 
 parameters()
 Description.from_text = once(Description.from_text, str)
-body.body_urdf = once(body.body_urdf, lambda description: description.text)
+bullet_robot.body_urdf = once(bullet_robot.body_urdf, lambda description: description.text)
 
 
 class World:

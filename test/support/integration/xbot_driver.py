@@ -6,8 +6,8 @@ xbot_driver.py NAMESPACE SPEED
 import sys
 import time
 
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.transport.lower_level import CLAIM_INTERFACE, LOWER_LEVEL, ClaimAnswer, ClaimRequest
 from solfer.transport.messages import JointMessage

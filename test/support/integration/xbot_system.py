@@ -15,9 +15,9 @@ from support.processes import SOURCES
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import RuntimeStatistics
 
 REPOSITORY = Path(__file__).parents[3]

@@ -1,6 +1,7 @@
 """What several tests of table 1 share."""
 
 import numpy as np
+from support.bullet import raw_bullet
 from support.table_1 import FILE, GRAVITY, System
 
 
@@ -19,12 +20,9 @@ class MemorySystem(System):
         self.listener = self.world.plugin("listener", file)
         self.spring = self.world.plugin("spring", file)
         self.world.run(2.0)
-        engine = self.world.simulation._engine
-        self._bullet, self._client, self._body = engine.bullet, engine.client, self.world.simulation.body.id
-        bodies = range(-1, self._bullet.getNumJoints(self._body, self._client))
-        self._infos = [self._bullet.getJointInfo(self._body, index, self._client) for index in bodies if index >= 0]
-        masses = [self._bullet.getDynamicsInfo(self._body, index, self._client)[0] for index in bodies]
-        self.weight = GRAVITY * sum(masses)
+        self._body = self.world.simulation.body
+        self._raw = raw_bullet(self.world.simulation)
+        self.weight = GRAVITY * self._body.mass()
 
     def ask(self, **request):
         reply = self.world.ask("speaker/trajectory", **request)
@@ -35,26 +33,20 @@ class MemorySystem(System):
         self.world.run(duration)
 
     def joint(self, name):
-        number = next(info[0] for info in self._infos if info[1].decode() == name)
-        return self._bullet.getJointState(self._body, number, self._client)[:2]
+        states, number = self._body.robot.joint_states(), self._body.joints.index(name)
+        return states.position[number], states.velocity[number]
 
     def pose(self, link):
-        number = next((info[0] for info in self._infos if info[12].decode() == link), None)
-        if number is None:  # the base: PyBullet has its centre of mass
-            center = self._bullet.getBasePositionAndOrientation(self._body, self._client)
-            way = self._bullet.invertTransform(*self._bullet.getDynamicsInfo(self._body, -1, self._client)[3:5])
-            return tuple(np.array(part) for part in self._bullet.multiplyTransforms(*center, *way))
-        return tuple(
-            np.array(part) for part in self._bullet.getLinkState(self._body, number, False, True, self._client)[4:6]
-        )
+        bullet, client, body, *_ = self._raw
+        number = self._raw.links[link]
+        if number < 0:  # the base: PyBullet has its centre of mass
+            center = bullet.getBasePositionAndOrientation(body, client)
+            way = bullet.invertTransform(*bullet.getDynamicsInfo(body, -1, client)[3:5])
+            return tuple(np.array(part) for part in bullet.multiplyTransforms(*center, *way))
+        return tuple(np.array(part) for part in bullet.getLinkState(body, number, False, True, client)[4:6])
 
     def ground(self):
-        points = self._bullet.getContactPoints(self._body, physicsClientId=self._client)
-        forces = np.array(
-            [
-                np.dot(point[9], point[7]) + np.dot(point[10], point[11]) + np.dot(point[12], point[13])
-                for point in points
-            ]
-        )
-        places = np.array([point[5] for point in points])
+        points = self._body.robot.contacts()
+        forces = np.array([point.force for point in points])
+        places = np.array([point.position for point in points])
         return forces.sum(axis=0), np.average(places[:, :2], axis=0, weights=forces[:, 2])

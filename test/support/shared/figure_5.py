@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import yaml
+from support.bullet import raw_bullet
 from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.components import Component
@@ -23,11 +24,11 @@ FILES = ("actuators", "contacts")
 def hang(simulation):
     """Hold the base of a simulated robot in the air, so that its legs can move as they like."""
     simulation.reset(placement=StartPlacement(height=0.5))
-    engine, body = simulation._engine, simulation.body.id
-    place, turn = engine.bullet.getBasePositionAndOrientation(body, physicsClientId=engine.client)  # of its mass
-    engine.bullet.createConstraint(
-        body, -1, -1, -1, engine.bullet.JOINT_FIXED, (0, 0, 0), (0, 0, 0), place, (0, 0, 0, 1), turn,
-        physicsClientId=engine.client,
+    bullet, client, body, *_ = raw_bullet(simulation)
+    place, turn = bullet.getBasePositionAndOrientation(body, physicsClientId=client)  # of its mass
+    bullet.createConstraint(
+        body, -1, -1, -1, bullet.JOINT_FIXED, (0, 0, 0), (0, 0, 0), place, (0, 0, 0, 1), turn,
+        physicsClientId=client,
     )  # fmt: skip
 
 

@@ -4,9 +4,9 @@ import os
 import signal
 import time
 
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import Slot
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
+from solfer.segments.slot import Slot
 
 KIND, LAYOUT = "test", b'{"names": ["a", "b"]}'
 WIDTH = 150

@@ -5,6 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
+from support.bullet import raw_bullet
 from support.walk.digest import Digest
 from support.walk.files import SRDF, URDF
 
@@ -207,7 +208,7 @@ def simulation(folder: Path) -> str:
             for _ in range(STEPS):
                 command.write(JointMessage(("roll",), velocity=np.array([2.0])))
                 server.cycle()
-            bullet, client = robot.body._bullet, robot.body._client
+            bullet, client, *_ = raw_bullet(robot)
             bodies = [bullet.getBodyUniqueId(index, client) for index in range(bullet.getNumBodies(client))]
             heard.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
             heard.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])

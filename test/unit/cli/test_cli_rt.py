@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from solfer.cli.main import main
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.kernel import count_durations
 from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 from solfer.transport.health import Health

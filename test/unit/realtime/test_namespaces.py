@@ -6,9 +6,9 @@ import time
 import pytest
 
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import ESTOP_TEXT_BYTES, EmergencyStopLatch
 from solfer.realtime.namespaces import cure, find, living, no_layer
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import RuntimeStatistics
 
 

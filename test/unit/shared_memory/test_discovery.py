@@ -6,7 +6,7 @@ from support.unit.wires import XbotWire
 from solfer.components import TopicIn
 from solfer.middleware.shared_memory import Namespace
 from solfer.middleware.shared_memory.discovery import declared_topics, published_topics
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.segment import Segment
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
 from solfer.transport.declared.goals import GOAL_ID, STATUS

@@ -11,8 +11,8 @@ from support.unit.shared_world import SharedWorld, ask, scale
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.topics.sender_segment import SENDER_DEPTH
+from solfer.segments import files
 from solfer.transport import BodyMessage, JointMessage, MessageStatus
 from solfer.transport.messages import (
     JOINT_FIELDS,

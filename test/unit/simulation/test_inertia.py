@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from solfer.errors import SimulationError
-from solfer.simulation.robot_body.inertia import Inertias
+from solfer.simulation.bullet.inertia import Inertias
 
 MOMENTS = np.ones((3, 3)) - np.eye(3)
 

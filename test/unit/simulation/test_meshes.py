@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from solfer.errors import SimulationError
-from solfer.simulation.robot_body.meshes import Meshes
+from solfer.simulation.bullet.meshes import Meshes
 
 
 def shape(tag, name):

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.lock import Lock
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
+from solfer.segments.lock import Lock
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep, write_kept
 from solfer.telemetry.rows import RECORDER_FILE

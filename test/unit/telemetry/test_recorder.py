@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.allocations import check_that_it_keeps_no_memory
 
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.recording.log import Logger
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.rows import RECORDER_FILE, RECORDER_KIND
 

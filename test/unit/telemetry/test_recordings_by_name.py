@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from solfer.errors import MiddlewareError, RecordingError, UnknownName
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime import watchdog
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.watchdog import Watchdog
 from solfer.recording.log import Logger
+from solfer.segments.namespace import Namespace
 from solfer.telemetry import recordings
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.recordings import (

@@ -7,8 +7,8 @@ from solfer.errors import SimulationError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.robot.shipped import RobotFiles, bundle_of
 from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.physics import STEP
 from solfer.simulation.server.publications import robot_parameters
-from solfer.simulation.world.engine import STEP
 
 
 class StandingRobot:

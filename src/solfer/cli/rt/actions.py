@@ -10,9 +10,9 @@ from solfer.cli.rt.record import record
 from solfer.cli.rt.tables import lives
 from solfer.cli.rt.top import top_of_layer
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.realtime.emergency_stop import stopped
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import EXECUTOR, RuntimeStatistics
 from solfer.telemetry.summaries import StatisticsReader
 from solfer.transport.lower_level import Answer

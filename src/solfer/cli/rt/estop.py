@@ -3,9 +3,9 @@
 import time
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.namespaces import layer_of, no_layer
+from solfer.segments.namespace import Namespace
 
 LATCH_PATIENCE = 2.0
 """Longest time until the layer reads the latch, which it does in each cycle [s]."""

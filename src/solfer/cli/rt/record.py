@@ -17,8 +17,8 @@ from solfer.cli.options import Number
 from solfer.errors import MiddlewareError, RecordingError, UnknownName
 
 if TYPE_CHECKING:
-    from solfer.middleware.shared_memory.memory.namespace import Namespace
     from solfer.recording.writer import RecordingWriter
+    from solfer.segments.namespace import Namespace
     from solfer.telemetry.drain import RecordDrain
 
 RECORD_PERIOD = 0.1
@@ -76,7 +76,7 @@ def _waited(options: argparse.Namespace) -> "list[RecordDrain]":
     Raises:
         UnknownName: One of them does not within the time.
     """
-    from solfer.realtime.process import ProcessEnd
+    from solfer.process import ProcessEnd
     from solfer.telemetry.recordings import of_plugins
 
     end = time.monotonic() + options.wait
@@ -150,7 +150,7 @@ def _fill(drains: "Sequence[RecordDrain]") -> None:
 
 def _follow(drains: "Sequence[RecordDrain]", seconds: float | None, writer: "RecordingWriter") -> None:
     """Drain for `seconds`, until a signal requests the end, or until all that record have ended."""
-    from solfer.realtime.process import ProcessEnd
+    from solfer.process import ProcessEnd
 
     begin = time.monotonic()
     end = begin + seconds if seconds is not None else float("inf")

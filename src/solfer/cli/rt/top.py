@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from solfer.cli.columns import aligned
 from solfer.cli.rt.tables import overview
 from solfer.middleware.shared_memory.health_reports import Reports
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import stopped
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.realtime.emergency_stop import stopped
+from solfer.segments.namespace import Namespace
 from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport
 

@@ -9,7 +9,7 @@ from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.kernel import build, finish
 from solfer.numerics.acceleration_bounds import AccelerationBounds
 from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
-from solfer.numerics.solvers.qp import Problem
+from solfer.numerics.solvers.problem import Problem
 from solfer.robot import Robot
 
 QP_TOLERANCE = 1e-9

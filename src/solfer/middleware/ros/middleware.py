@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import rosgraph
 import rospy
 
-from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName
+from solfer.interfaces.declaration import Service
 from solfer.middleware.ros.calls import call, in_thread, replied
 from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.codecs.packed_message import present, set_epoch

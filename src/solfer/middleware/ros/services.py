@@ -9,8 +9,8 @@ from typing import Any
 
 import rospy
 
-from solfer.components import Service
 from solfer.errors import ComponentError, MiddlewareError, Overtaken, SolferError, described, located
+from solfer.interfaces.declaration import Service
 from solfer.middleware.ros.calls import alive, plain, provider
 from solfer.middleware.ros.codecs.bounded import READ_PATIENCE, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class

@@ -1,17 +1,6 @@
 """The stand-in for XBotCore: shared memory between processes, without ROS."""
 
-from importlib import import_module
-from typing import Any
+from solfer.middleware.shared_memory.middleware import XbotMiddleware
+from solfer.segments.namespace import Namespace
 
-_HOMES = {
-    "Namespace": "solfer.middleware.shared_memory.memory.namespace",
-    "XbotMiddleware": "solfer.middleware.shared_memory.middleware",
-}
 __all__ = ["Namespace", "XbotMiddleware"]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    # imported when it is first used: an emergency stop needs the memory and nothing else
-    return getattr(import_module(_HOMES[name]), name)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.services import SERVICES, offered
 from solfer.middleware.shared_memory.topics.ears import EAR_KIND as EAR
 from solfer.middleware.shared_memory.topics.ears import EARS
 from solfer.middleware.shared_memory.topics.sender_segment import PIPES, SENDER_KIND, sender_of
+from solfer.segments.namespace import Namespace
+from solfer.segments.segment import Segment
 from solfer.transport.topics import Topics
 
 Opened: TypeAlias = dict[str, dict[str, Segment]]

@@ -5,11 +5,10 @@ import logging
 from collections.abc import Mapping
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import Slot
-from solfer.middleware.shared_memory.memory.text import Text
-from solfer.transport.endpoints import MessageStatus
+from solfer.segments.namespace import Namespace
+from solfer.segments.segment import Segment
+from solfer.segments.slot import Slot
+from solfer.segments.text import Text
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
@@ -64,7 +63,7 @@ class Reports:
             self._bell.acknowledge()
             self._find()
         for name, page in self._others.items():
-            if page.slot.read() is MessageStatus.NEW:
+            if page.slot.read():
                 level, summary, values = json.loads(page.text.read())
                 self._received[name] = HealthReport(Health(level), summary, values)
         return self._received

@@ -10,14 +10,14 @@ from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory.clock import MonotonicClock
 from solfer.middleware.shared_memory.discovery import Survey
 from solfer.middleware.shared_memory.health_reports import Reports
-from solfer.middleware.shared_memory.memory.lock import locked
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
 from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
 from solfer.middleware.shared_memory.topics.ears import Ears
 from solfer.middleware.shared_memory.topics.endpoints import XbotMail, XbotQueue, XbotReader, XbotWriter
+from solfer.segments.lock import locked
+from solfer.segments.namespace import Namespace
+from solfer.segments.segment import Segment
 from solfer.transport.endpoints import JointOrder, Queue
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from solfer.middleware.shared_memory.memory.latched import latched
+from solfer.segments.latched import latched
 
 SIMULATED_TIME_FILE = "simulated_time"
 SIMULATED_TIME_KIND = "simulated time"

@@ -9,7 +9,6 @@ constraints, and R is the upper factor of L^-1 N = Q R.
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from solfer.errors import SizeMismatch
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.dense import DENSE, cholesky
 from solfer.numerics.solvers import residuals
+from solfer.numerics.solvers.problem import Problem
 from solfer.numerics.solvers.residuals import (
     add_normal,
     is_contradictory,
@@ -26,9 +26,6 @@ from solfer.numerics.solvers.residuals import (
     refine,
     worst_equality,
 )
-
-if TYPE_CHECKING:
-    from solfer.numerics.solvers.qp import Problem
 
 SOLVED, INFEASIBLE, GAVE_UP, INACCURATE, NOT_FINITE = range(5)
 """Outcomes of a problem."""
@@ -407,7 +404,7 @@ class ActiveSet:
         self._names = np.zeros(size, dtype=np.int64)
         self._is_active = np.zeros(2 * (size + inequalities), dtype=np.int64)
 
-    def solve(self, problem: "Problem", out: np.ndarray) -> tuple[int, int, float]:
+    def solve(self, problem: Problem, out: np.ndarray) -> tuple[int, int, float]:
         """Write x into `out`, shape (n,); return the outcome, the number of steps, and the largest residual.
 
         Raises:

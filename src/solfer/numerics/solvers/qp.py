@@ -1,13 +1,14 @@
-"""Quadratic programs: problems, and solutions with their outcomes."""
+"""Solutions of quadratic programs with their outcomes, and the solver."""
 
 import enum
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from solfer.errors import SizeMismatch
 from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
+from solfer.numerics.solvers.problem import Problem
 
 
 class QpStatus(enum.Enum):
@@ -23,66 +24,6 @@ class QpStatus(enum.Enum):
     on each other almost; a solution may exist."""
     NOT_FINITE = "not finite"
     """The problem contains a NaN, or an infinity in its cost or its equalities."""
-
-
-@dataclass(eq=False)
-class Problem:
-    """The least of 1/2 x^T H x + g^T x with A x = b, l <= C x <= u and x_min <= x <= x_max.
-
-    Attributes:
-        hessian: H, symmetric and positive definite, shape (n, n).
-        gradient: g, shape (n,).
-        equality_matrix: A, shape (e, n).
-        equality_vector: b, shape (e,).
-        inequality_matrix: C, shape (i, n).
-        lower: l, shape (i,); -inf where there is none.
-        upper: u, shape (i,); inf where there is none.
-        least: x_min, shape (n,); -inf where there is none.
-        largest: x_max, shape (n,); inf where there is none.
-    """
-
-    hessian: np.ndarray
-    gradient: np.ndarray
-    equality_matrix: np.ndarray
-    equality_vector: np.ndarray
-    inequality_matrix: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    least: np.ndarray
-    largest: np.ndarray
-
-    @classmethod
-    def empty(cls, size: int, equalities: int = 0, inequalities: int = 0) -> "Problem":
-        """Return a problem without cost and bounds; matrices of zeros."""
-        return cls(
-            np.zeros((size, size)),
-            np.zeros(size),
-            np.zeros((equalities, size)),
-            equality_vector=np.zeros(equalities),
-            inequality_matrix=np.zeros((inequalities, size)),
-            lower=np.full(inequalities, -np.inf),
-            upper=np.full(inequalities, np.inf),
-            least=np.full(size, -np.inf),
-            largest=np.full(size, np.inf),
-        )
-
-    def copy(self) -> "Problem":
-        """Return the problem with arrays of its own."""
-        return Problem(*(getattr(self, field.name).copy() for field in fields(self)))
-
-    def shapes(self) -> tuple[tuple[int, ...], ...]:
-        """Return the shapes of all arrays in their order."""
-        return (
-            self.hessian.shape,
-            self.gradient.shape,
-            self.equality_matrix.shape,
-            self.equality_vector.shape,
-            self.inequality_matrix.shape,
-            self.lower.shape,
-            self.upper.shape,
-            self.least.shape,
-            self.largest.shape,
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,9 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from solfer.components import Service
 from solfer.config import Configuration
 from solfer.errors import SolferError
+from solfer.interfaces.declaration import Service
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from solfer.transport.plugin_state import ACTIVE, FAILED_STATES, RESTING_STATES,
 class ManagedPlugin:
     """A plugin and its life. None of its methods raises: any exception of the plugin ends its run.
 
-    Requests to end the process come by a signal, which raises nothing here (`realtime.process.ProcessEnd`, rospy): a
+    Requests to end the process come by a signal, which raises nothing here (`process.ProcessEnd`, rospy): a
     SystemExit or a KeyboardInterrupt is a component's own.
 
     Args:

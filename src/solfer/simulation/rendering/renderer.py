@@ -10,21 +10,23 @@ import numpy as np
 from solfer.errors import SimulationError
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
+from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.simulation.bullet import BulletEngine
+from solfer.simulation.physics import CameraView, Pose
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.simulation import Simulation
-from solfer.simulation.world.engine import Engine
 from solfer.simulation.world.records import Friction, WorldRecord
-from solfer.simulation.world.world import FLAT_WORLD, Pose, World
+from solfer.simulation.world.world import FLAT_WORLD, World
 
 RENDERER_FIELD_OF_VIEW = 40.0  # [deg], vertical
 RENDERER_MARGIN = 1.6  # what is seen, over the extent of the robot
 RENDERER_SAMPLES = 2  # rays along each side of a pixel
-NEAR_PLANE, FAR_PLANE = 0.05, 50.0  # what is drawn, from the camera [m]
 HAZE = (1.2, 2.0)
 """Distances at which the floor begins to fade, and has faded into the sky, over that of the robot."""
 
 FLOOR_TILE = 0.5  # [m]
 FLOOR_TILES = 20  # along each side
+FLOOR_TILE_HEIGHT = 0.01  # [m]
 FLOOR_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
 SKY = np.array([[250.0, 251.0, 253.0], [206.0, 216.0, 228.0]])  # RGB at the lower and at the upper edge
 
@@ -59,7 +61,7 @@ class Renderer:
         self._size = (width, height)
         self._angles = (yaw, pitch)
         self._chart = kinematics.base
-        self._engine = Engine()
+        self._engine = BulletEngine()
         self._body = Body(self._engine, description, kinematics, motors=np.zeros(0, dtype=np.intp), friction=Friction())
         self._first = kinematics.size - len(self._body.joints)
         self._world = World(self._engine, world)
@@ -74,38 +76,19 @@ class Renderer:
             self._world.place(boxes)
         pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if self._chart is None else self._chart.to_pose(q[:6])
         self._body.place(q[self._first :], *pose)
-        bullet = self._engine.bullet
-        client = self._engine.client
         width, height = (RENDERER_SAMPLES * side for side in self._size)
         yaw, pitch = self._angles
         centre, size = self._extent()
         self._move_floor(centre)
         distance = RENDERER_MARGIN * size / 2.0 / math.tan(math.radians(RENDERER_FIELD_OF_VIEW / 2.0))
-        view = bullet.computeViewMatrixFromYawPitchRoll(centre, distance, yaw, pitch, 0.0, 2)
-        lens = bullet.computeProjectionMatrixFOV(RENDERER_FIELD_OF_VIEW, width / height, NEAR_PLANE, FAR_PLANE)
-        picture = bullet.getCameraImage(
-            width,
-            height,
-            view,
-            lens,
-            lightDirection=[1.5, 1.0, 5.0],
-            lightColor=[1.0, 1.0, 1.0],
-            lightDistance=8.0,
-            shadow=1,
-            lightAmbientCoeff=0.5,
-            lightDiffuseCoeff=0.55,
-            lightSpecularCoeff=0.15,
-            renderer=bullet.ER_TINY_RENDERER,
-            physicsClientId=client,
+        picture = self._engine.render(
+            CameraView(centre, distance, yaw, pitch=pitch, field_of_view=RENDERER_FIELD_OF_VIEW, size=(width, height))
         )
-        colours = np.array(picture[2], dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
-        depth = np.reshape(picture[3], (height, width))
-        away = NEAR_PLANE * FAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth) / distance
-        haze = np.clip((away - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
-        haze[np.reshape(picture[4], (height, width)) < 0] = 1.0
+        haze = np.clip((picture.depth / distance - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
+        haze[picture.is_empty] = 1.0
         share = np.linspace(1.0, 0.0, height)[:, None, None]
         sky = share * SKY[1] + (1.0 - share) * SKY[0]
-        fine = colours + haze[:, :, None] * (sky - colours)
+        fine = picture.colours + haze[:, :, None] * (sky - picture.colours)
         blocks = fine.reshape(
             height // RENDERER_SAMPLES, RENDERER_SAMPLES, width // RENDERER_SAMPLES, RENDERER_SAMPLES, 3
         )
@@ -139,35 +122,19 @@ class Renderer:
 
     def _extent(self) -> tuple[list[float], float]:
         """Compute the centre of the robot [m] and its largest extent [m]."""
-        bullet = self._engine.bullet
-        client = self._engine.client
-        boxes = np.array([bullet.getAABB(self._body.id, link, client) for link in range(-1, len(self._body.links) - 1)])
-        low = boxes[:, 0].min(axis=0)
-        high = boxes[:, 1].max(axis=0)
+        low, high = self._body.extent()
         return ((low + high) / 2.0).tolist(), float((high - low).max())
 
     def _make_floor(self) -> list[int]:
         """Add tiles below the plane of the ground, which are visual only; return their bodies."""
-        bullet = self._engine.bullet
-        client = self._engine.client
-        half = [FLOOR_TILE / 2.0, FLOOR_TILE / 2.0, 0.005]
-        shapes = [
-            bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)
-            for colour in FLOOR_COLOURS
-        ]
-        return [
-            bullet.createMultiBody(0.0, -1, shapes[(row + column) % 2], physicsClientId=client)
-            for row in range(FLOOR_TILES)
-            for column in range(FLOOR_TILES)
-        ]
+        colours = [FLOOR_COLOURS[(row + column) % 2] for row in range(FLOOR_TILES) for column in range(FLOOR_TILES)]
+        return self._engine.add_tiles((FLOOR_TILE, FLOOR_TILE, FLOOR_TILE_HEIGHT), colours)
 
     def _move_floor(self, centre: Sequence[float]) -> None:
         """Move the tiles below the robot, by whole pairs of them, so that the pattern stands still."""
-        bullet = self._engine.bullet
-        client = self._engine.client
         orientation = self._world.orientation()
-        _, back = bullet.invertTransform([0.0] * 3, orientation)
-        (x, y, _), _ = bullet.multiplyTransforms([0.0] * 3, back, centre, [0.0, 0.0, 0.0, 1.0])
+        rotation = rotation_from_quaternion(orientation)
+        x, y, _ = centre @ rotation
         pair = 2.0 * FLOOR_TILE
         first = 0.5 * (1 - FLOOR_TILES) * FLOOR_TILE
         for number, tile in enumerate(self._floor):
@@ -175,10 +142,9 @@ class Renderer:
             place = [
                 pair * round(x / pair) + first + row * FLOOR_TILE,
                 pair * round(y / pair) + first + column * FLOOR_TILE,
-                -0.005,
+                -FLOOR_TILE_HEIGHT / 2.0,
             ]
-            place, _ = bullet.multiplyTransforms([0.0] * 3, orientation, place, [0.0, 0.0, 0.0, 1.0])
-            bullet.resetBasePositionAndOrientation(tile, place, orientation, physicsClientId=client)
+            self._engine.place(tile, (rotation @ place, orientation))
 
 
 def render(simulation: Simulation, path: str | Path) -> None:

@@ -1,33 +1,25 @@
-"""A robot in a PyBullet world: its state, its motors, and where it is put."""
+"""A robot in the world of a physics engine: its state, its motors, and where it is put."""
 
 import math
-import tempfile
-from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from solfer.errors import SimulationError
 from solfer.lower_level.gains.defaults import free_inertia
 from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 from solfer.model.urdf.description import Description
+from solfer.simulation.physics import PhysicsEngine
 from solfer.simulation.robot_body.base import FloatingBase
-from solfer.simulation.robot_body.body_urdf import body_urdf
-from solfer.simulation.robot_body.differences import warn_of_differences
-from solfer.simulation.robot_body.motors import LARGEST_EFFORT, BodyMotors
-from solfer.simulation.world.engine import STDERR_DESCRIPTOR, STDOUT, STEP, Engine, decimal_points, redirected
+from solfer.simulation.robot_body.motors import BodyMotors
 from solfer.simulation.world.records import Friction
 
-LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
-MOST_BRAKING = 0.25  # share of its speed that the damping of the description takes from a joint in a step
-MOST_JOINTS = 127  # of which PyBullet measures the state
 SEARCH_DISTANCE = 100.0  # [m], how far away other bodies are searched for
 
 
 class Body:
-    """A robot in the world. Joints and DoFs have the model's order; PyBullet's own order stays inside.
+    """A robot in the world. Joints and DoFs have the model's order.
 
     Args:
         engine: The world.
@@ -38,20 +30,19 @@ class Body:
         lossless: Joints without the damping and friction of the description.
 
     Attributes:
-        id: Number of the body.
+        robot: The robot as the engine has loaded it.
         joints: Names of the joints.
-        links: Name of each of PyBullet's links; the base is the last, so that index -1 finds it.
-        owner: For each link of the description, the link of PyBullet's that it became part of.
+        links: Names of the links that the engine has; the base is the last.
+        owner: For each link of the description, the link of the engine that it became part of.
         base_link: Link that `position`, `orientation`, `linear` and `angular` belong to.
 
     Raises:
-        SimulationError: PyBullet cannot load the robot, it has more than MOST_JOINTS joints, or `friction` names a link
-            that it does not have.
+        SimulationError: The engine cannot load the robot, or `friction` names a link that it does not have.
     """
 
     def __init__(
         self,
-        engine: Engine,
+        engine: PhysicsEngine,
         description: Description,
         kinematics: Kinematics,
         motors: np.ndarray,
@@ -59,27 +50,18 @@ class Body:
         *,
         lossless: Collection[str] = (),
     ):
-        self._bullet = engine.bullet
-        self._client = engine.client
         floats = kinematics.base is not None
         self._first = 6 if floats else 0
         self.joints = tuple(kinematics.dofs[self._first :])
-        if len(self.joints) > MOST_JOINTS:
-            what = f"the robot has {len(self.joints)} moving joints, more than PyBullet can take"
-            raise SimulationError(what, where=description.where, expected=f"at most {MOST_JOINTS}")
-        with tempfile.TemporaryDirectory() as folder:
-            urdf = body_urdf(description, floats, Path(folder))
-            self.base_link = urdf.base
-            self.owner = urdf.owner
-            self.id = self._load(urdf.text, Path(folder, "robot.urdf"), description.where, floats=floats)
-        self._name_links(urdf.base)
-        warn_of_differences(engine, self.id, urdf.text, where=description.where)
-        self._set_dynamics(friction, urdf.owner)
-        losses = self._set_losses(description, lossless, kinematics)
-        self._motors = BodyMotors(engine, self.id, self._indices, kinematics=kinematics, motors=motors, losses=losses)
+        self.robot = engine.load_robot(description, self.joints, friction, floats=floats)
+        self.owner = self.robot.owner
+        self.links = self.robot.links
+        self.base_link = self.links[-1]
+        self._set_losses(description, lossless, kinematics)
+        self._motors = BodyMotors(self.robot, len(self.joints), kinematics, motors=motors)
         self._followers = Followers(self.joints, description.mimics)
         self._set_gears()
-        self._base = FloatingBase(engine, self.id, kinematics.base)
+        self._base = FloatingBase(self.robot, kinematics.base)
         self.place(np.zeros(len(self.joints)))
 
     def place(
@@ -89,13 +71,7 @@ class Body:
         orientation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0, 1.0),
     ) -> None:
         """Put the robot somewhere at rest: joint positions [rad], pose of the base link's origin in the world."""
-        self._bullet.resetJointStatesMultiDof(
-            self.id,
-            self._indices,
-            [[float(value)] for value in joints],
-            [[0.0]] * len(self._indices),
-            physicsClientId=self._client,
-        )
+        self.robot.place_joints(joints)
         self._base.place(position, orientation)
 
     @property
@@ -125,54 +101,37 @@ class Body:
 
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
         """Compute the corners of a box in world axes around all shapes, shape (3,) each [m]."""
-        boxes = np.array([self._bullet.getAABB(self.id, link, self._client) for link in range(-1, len(self.links) - 1)])
-        return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        return self.robot.box_around()
 
     def distance(self, others: Sequence[int]) -> float:
         """Compute the distance to the nearest of other bodies [m]; negative in an overlap, infinity without any."""
-        found = (
-            self._bullet.getClosestPoints(self.id, other, SEARCH_DISTANCE, physicsClientId=self._client)
-            for other in others
-        )
-        return min((point[8] for points in found for point in points), default=math.inf)
+        found = (self.robot.closest_points(other, SEARCH_DISTANCE) for other in others)
+        return min((point.distance for points in found for point in points), default=math.inf)
 
     def near(self, other: int, reach: float) -> np.ndarray:
         """Find the points on the body that are not farther than `reach` [m] from another one, shape (n, 3) [m]."""
-        found = self._bullet.getClosestPoints(self.id, other, reach, physicsClientId=self._client)
-        return np.array([point[5] for point in found]).reshape(-1, 3)
+        return np.array([point.position for point in self.robot.closest_points(other, reach)]).reshape(-1, 3)
 
     def center_of_mass(self) -> np.ndarray:
         """Compute the centre of mass of the whole body in the world, shape (3,) [m]."""
-        bullet = self._bullet
-        client = self._client
-        links = list(range(len(self.links) - 1))
-        states = bullet.getLinkStates(self.id, links, computeForwardKinematics=1, physicsClientId=client)
-        places = [bullet.getBasePositionAndOrientation(self.id, client)[0], *(state[0] for state in states)]
-        return np.average(places, axis=0, weights=self._masses())
+        return self.robot.center_of_mass()
 
     def overlap(self, others: Sequence[int]) -> tuple[float, str]:
         """Compute how deep a link that moves is inside of other bodies [m], and which one; 0 and "" without overlap."""
         deepest = 0.0, ""
-        for link, name in enumerate(self.links[:-1]):
+        for name in self.links[:-1]:
             for other in others:
-                points = self._bullet.getClosestPoints(self.id, other, 0.0, link, physicsClientId=self._client)
-                deepest = max([deepest, *((-point[8], name) for point in points)])
+                points = self.robot.closest_points(other, 0.0, name)
+                deepest = max([deepest, *((-point.distance, name) for point in points)])
         return deepest
-
-    def index(self, link: str) -> int:
-        """Return PyBullet's number of the link that a link of the description became part of."""
-        return self._numbers[self.owner[link]]
 
     def set_friction(self, link: str, coefficient: float) -> None:
         """Change the friction coefficient of a link, and of all that is fixed to it."""
-        self._bullet.changeDynamics(
-            self.id, self.index(link), lateralFriction=coefficient, physicsClientId=self._client
-        )
+        self.robot.set_friction(link, coefficient)
 
     def read(self, q: np.ndarray, v: np.ndarray, motor_torque: np.ndarray) -> None:
         """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
-        states = self._bullet.getJointStates(self.id, self._indices, self._client)
-        q[self._first :], v[self._first :], _, torques = zip(*states, strict=True)
+        q[self._first :], v[self._first :], torques = self.robot.joint_states()
         if self._followers:
             self._follow(q[self._first :], v[self._first :])
         if self._motors.rows:
@@ -188,93 +147,27 @@ class Body:
         self._motors.push()
 
     def mass(self) -> float:
-        """Sum up the mass of the whole body as PyBullet has it [kg]."""
-        return sum(self._masses())
-
-    def _masses(self) -> list[float]:
-        """Read the masses of PyBullet's links, that of the base first [kg]."""
-        links = range(-1, len(self.links) - 1)
-        return [self._bullet.getDynamicsInfo(self.id, link, self._client)[0] for link in links]
+        """Sum up the mass of the whole body as the engine has it [kg]."""
+        return self.robot.mass()
 
     def _follow(self, q: np.ndarray, v: np.ndarray) -> None:
         """Write what followers do by their leaders, and put them there: a gear holds speeds, and drifts slowly."""
         self._followers.follow(q, v)
         for joint in self._followers.dofs:
-            self._bullet.resetJointState(
-                self.id, self._indices[joint], q[joint], v[joint], physicsClientId=self._client
-            )
+            self.robot.place_joint(int(joint), q[joint], v[joint])
 
     def _set_gears(self) -> None:
         """Connect each joint that follows another one with it by a gear: v_f - r v_l = 0."""
         for joint, leader, ratio in zip(
             self._followers.dofs, self._followers.leaders, self._followers.ratios, strict=True
         ):
-            gear = self._bullet.createConstraint(
-                self.id,
-                self._indices[joint],
-                self.id,
-                self._indices[leader],
-                self._bullet.JOINT_GEAR,
-                (0.0, 1.0, 0.0),
-                (0.0, 0.0, 0.0),
-                (0.0, 0.0, 0.0),
-                physicsClientId=self._client,
-            )
-            self._bullet.changeConstraint(gear, gearRatio=-ratio, maxForce=LARGEST_EFFORT, physicsClientId=self._client)
+            self.robot.add_gear(int(joint), int(leader), ratio)
 
-    def _load(self, text: str, path: Path, where: str, floats: bool) -> int:
-        bullet = self._bullet
-        flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
-        path.write_text(text, encoding="utf-8")
-        try:
-            with redirected((STDOUT,), STDERR_DESCRIPTOR), decimal_points():
-                return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags, physicsClientId=self._client)
-        except bullet.error as error:
-            raise SimulationError(
-                f"PyBullet cannot load the robot: {error}", where=where, expected="a URDF that PyBullet can load"
-            ) from error
-
-    def _name_links(self, base: str) -> None:
-        count = self._bullet.getNumJoints(self.id, self._client)
-        infos = [self._bullet.getJointInfo(self.id, index, self._client) for index in range(count)]
-        by_name = {info[1].decode(): info[0] for info in infos}
-        self.links = (*(info[12].decode() for info in infos), base)
-        self._numbers = {link: index - 1 for index, link in enumerate((base, *self.links[:-1]))}
-        self._indices = [by_name[name] for name in self.joints]
-
-    def _set_dynamics(self, friction: Friction, owner: Mapping[str, str]) -> None:
-        unknown = [link for link in friction.links if link not in owner]
-        if unknown:
-            raise SimulationError(
-                f"friction of links that the robot does not have: {', '.join(unknown)}",
-                expected="links that the URDF of the robot has",
-            )
-        coefficients = {owner[link]: value for link, value in friction.links.items()}
-        change = self._bullet.changeDynamics
-        client = self._client
-        change(self.id, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-        change(self.id, -1, maxJointVelocity=LARGEST_SPEED, physicsClientId=client)
-        for index in range(-1, len(self.links) - 1):  # calls of their own: some values redirect a call to the base
-            change(self.id, index, jointDamping=0.0, physicsClientId=client)
-            change(
-                self.id,
-                index,
-                lateralFriction=coefficients.get(self.links[index], friction.default),
-                rollingFriction=0.0,
-                spinningFriction=0.0,
-                restitution=0.0,
-                physicsClientId=client,
-            )
-
-    def _set_losses(self, description: Description, lossless: Collection[str], kinematics: Kinematics) -> list[float]:
-        """Set the damping of the joints; return their friction, which motors make that hold them back [Nm].
-
-        PyBullet takes the speed at the begin of a step for damping, which diverges where it would turn a joint back.
-        """
-        joints = [description.joints[name] for name in self.joints]
-        most = MOST_BRAKING * free_inertia(kinematics, neutral_posture(kinematics))[self._first :] / STEP
-        for index, joint, bound in zip(self._indices, joints, most.tolist(), strict=True):
-            if joint.damping and joint.name not in lossless:
-                damping = min(joint.damping, bound)
-                self._bullet.changeDynamics(self.id, index, jointDamping=damping, physicsClientId=self._client)
-        return [0.0 if joint.name in lossless else joint.friction for joint in joints]
+    def _set_losses(self, description: Description, lossless: Collection[str], kinematics: Kinematics) -> None:
+        """Set the damping and the friction of the joints."""
+        joints = [None if name in lossless else description.joints[name] for name in self.joints]
+        self.robot.set_losses(
+            [joint.damping if joint else 0.0 for joint in joints],
+            [joint.friction if joint else 0.0 for joint in joints],
+            free_inertia(kinematics, neutral_posture(kinematics))[self._first :],
+        )

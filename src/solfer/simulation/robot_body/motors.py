@@ -1,77 +1,47 @@
-"""The motors of a robot in a PyBullet world."""
-
-from collections.abc import Sequence
+"""The motors of a robot."""
 
 import numpy as np
 
 from solfer.model.kinematics import Kinematics
-from solfer.simulation.world.engine import Engine
+from solfer.simulation.physics import RobotInEngine
 
 LARGEST_EFFORT = 1e6  # [Nm], of motors without a limit
 
 
 class BodyMotors:
-    """Motors that hold a speed, and torques of all other joints. Only friction is left to PyBullet's other motors.
+    """Motors that hold a speed, and torques of all other joints.
 
     Args:
-        engine: The world.
-        body: Number of the body.
-        indices: PyBullet's numbers of the joints, in the model's order.
+        robot: The robot as the engine has loaded it.
+        count: Number of its joints.
         kinematics: The model.
         motors: DoFs with motors that hold a speed.
-        losses: Friction of each joint [Nm].
 
     Attributes:
         rows: Joints whose motors hold a speed.
     """
 
-    def __init__(
-        self,
-        engine: Engine,
-        body: int,
-        indices: Sequence[int],
-        kinematics: Kinematics,
-        motors: np.ndarray,
-        *,
-        losses: Sequence[float],
-    ):
-        self._bullet = engine.bullet
-        self._client = engine.client
-        self._body = body
-        self._joints = list(indices)
-        self._first = kinematics.size - len(indices)
-        self._torque_dofs = np.array(
-            [dof for dof in range(self._first, kinematics.size) if dof not in motors], dtype=np.intp
-        )
-        self._torque_indices = [indices[dof - self._first] for dof in self._torque_dofs]
+    def __init__(self, robot: RobotInEngine, count: int, kinematics: Kinematics, motors: np.ndarray):
+        self._robot = robot
+        self._count = count
+        self._first = kinematics.size - count
         self.rows = [int(dof) - self._first for dof in motors]
-        self._indices = [indices[row] for row in self.rows]
+        self._drive_torques([row for row in range(count) if row not in self.rows])
+        self._motors = robot.group(self.rows)
         self._efforts = np.minimum(kinematics.effort_limit[motors], LARGEST_EFFORT).tolist()
-        self._bullet.setJointMotorControlArray(
-            body, self._joints, self._bullet.VELOCITY_CONTROL, forces=losses, physicsClientId=self._client
-        )
 
     def push(self) -> None:
         """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
-        self._torque_dofs = np.arange(self._first, self._first + len(self._joints))
-        self._torque_indices = list(self._joints)
+        self._drive_torques(list(range(self._count)))
 
     def apply(self, torque: np.ndarray, speed: np.ndarray) -> None:
         """Set what the next step does; see `Body.apply`."""
-        if self._torque_indices:
-            self._bullet.setJointMotorControlArray(
-                self._body,
-                self._torque_indices,
-                self._bullet.TORQUE_CONTROL,
-                forces=torque[self._torque_dofs].tolist(),
-                physicsClientId=self._client,
-            )
-        if self._indices:
-            self._bullet.setJointMotorControlArray(
-                self._body,
-                self._indices,
-                self._bullet.VELOCITY_CONTROL,
-                targetVelocities=speed.tolist(),
-                forces=self._efforts,
-                physicsClientId=self._client,
-            )
+        if len(self._torque_dofs):
+            self._torques.apply_torques(torque[self._torque_dofs])
+        if self.rows:
+            self._motors.hold_speeds(speed, self._efforts)
+
+    def _drive_torques(self, rows: list[int]) -> None:
+        """Choose the joints whose torques `apply` sets."""
+        self._torques = self._robot.group(rows)
+        self._torque_dofs = np.array(rows, dtype=np.intp) + self._first

@@ -14,7 +14,7 @@ from solfer.simulation.robot_body.resting import resting_orientation, rests
 from solfer.simulation.world.world import World
 
 OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
-TOUCH_DISTANCE = 2e-7  # [m], distance at which the approach to the ground ends; PyBullet measures in single precision
+TOUCH_DISTANCE = 2e-7  # [m], distance at which the approach to the ground ends; engines measure in single precision
 APPROACHES = 2000
 BOUNDS = {
     "x": (-1000.0, 1000.0, "m"),

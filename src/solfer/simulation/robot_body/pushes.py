@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import SimulationError, UnknownName
+from solfer.simulation.physics import STEP
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.state import Moment
-from solfer.simulation.world.engine import STEP, Engine
 
 Vector = Sequence[float] | np.ndarray
 
@@ -23,13 +23,11 @@ class Pushes:
     """The pushes that act on a body; those on one link add up.
 
     Args:
-        engine: The world.
         body: The robot.
         now: Where its links are at the beginning of a step.
     """
 
-    def __init__(self, engine: Engine, body: Body, now: Moment):
-        self._engine = engine
+    def __init__(self, body: Body, now: Moment):
         self._body = body
         self._now = now
         self._acting: list[tuple[str, list[float], list[float], int]] = []
@@ -72,14 +70,8 @@ class Pushes:
         """Apply the pushes in the step that begins now."""
         if not self._acting:
             return
-        bullet = self._engine.bullet
-        client = self._engine.client
-        body = self._body
         for link, force, torque, _ in self._acting:
-            index = body.index(link)
-            at = self._now.position(link).tolist()
-            bullet.applyExternalForce(body.id, index, force, at, bullet.WORLD_FRAME, client)
-            bullet.applyExternalTorque(body.id, index, torque, bullet.WORLD_FRAME, client)
+            self._body.robot.push(link, force, torque, self._now.position(link).tolist())
         self._acting = [(*push[:3], push[3] - 1) for push in self._acting if push[3] > 1]
 
     def clear(self) -> None:

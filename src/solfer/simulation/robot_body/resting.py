@@ -27,7 +27,7 @@ TOUCHING = 1e-4
 def rests(body: Body, ground: int, normal: np.ndarray) -> bool:
     """Return whether a robot, put down as it is, surely rests on a plane: its centre of mass is above lowest points.
 
-    That it is not so means nothing for soles: of a flat one PyBullet names one of the lowest points.
+    That it is not so means nothing for soles: of a flat one an engine may name one of the lowest points.
 
     Args:
         body: The robot.

@@ -1,6 +1,6 @@
 """Keeps simulated time in step with real time."""
 
-from solfer.simulation.world.engine import STEP
+from solfer.simulation.physics import STEP
 from solfer.transport.fixed_rate import Clock, FixedRateLoop
 
 CATCH_UP = 0.02  # [s]

@@ -1,8 +1,8 @@
 """Rates of publication that a user chooses."""
 
 from solfer.errors import ConfigError, SimulationError, UnknownName
+from solfer.simulation.physics import STEP
 from solfer.simulation.sensors import Rates
-from solfer.simulation.world.engine import STEP
 
 HOW = "NAME=HZ, several with commas between, such as joints=500,contacts=200"
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.lower_level import LowerLevelServer
+from solfer.simulation.physics import STEP
 from solfer.simulation.rendering.pictures import Pictures
 from solfer.simulation.sensors import Rates
 from solfer.simulation.server.pace import Pace
@@ -18,7 +19,6 @@ from solfer.simulation.server.screenshots import Screenshots
 from solfer.simulation.server.services import SERVICES_OWNER, screenshot_service, simulator_services
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
-from solfer.simulation.world.engine import STEP
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
@@ -126,7 +126,7 @@ class SimulationServer:
         self._health = every(HEALTH_RATE)
         middleware.serve(SERVICES_OWNER, simulator_services(self), self.inbox.submit)
         self._screenshots = Screenshots(simulation, self.inbox, pictures or Pictures())
-        middleware.serve(SERVICES_OWNER, (screenshot_service(self),), self._screenshots.submit)
+        middleware.serve(SERVICES_OWNER, (screenshot_service(self.screenshot),), self._screenshots.submit)
 
     def cycle(self) -> None:
         """Receive commands and service calls, make one step unless time stands still, publish what is due.

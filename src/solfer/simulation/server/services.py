@@ -1,18 +1,16 @@
 """Services of a simulator that a real robot does not offer."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Protocol
 
 from solfer.errors import SimulationError
 from solfer.interfaces.declaration import Service
 from solfer.simulation.robot_body.placement import StartPlacement
+from solfer.simulation.simulation import Simulation
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import Flag
-
-if TYPE_CHECKING:
-    from solfer.simulation.server.server import SimulationServer
 
 SERVICES_OWNER = "simulator"
 """Owner of these services."""
@@ -70,19 +68,36 @@ class ScreenshotRequest:
     path: str
 
 
-def screenshot_service(server: SimulationServer) -> Service:
-    """Declare `simulator/screenshot`. Its handler waits for the picture: it has to run outside the server's loop."""
+class SteppedSimulation(Protocol):
+    """The part of a simulation's server that its services use; see `SimulationServer`."""
+
+    simulation: Simulation
+    paused: bool
+
+    def pause(self, paused: bool) -> None:
+        """Let simulated time stand still, or go on."""
+
+    def advance(self, count: int = 1) -> None:
+        """Make steps, and publish what is due after each."""
+
+
+def screenshot_service(screenshot: Callable[[str], Path]) -> Service:
+    """Declare `simulator/screenshot`. Its handler waits for the picture: it has to run outside the server's loop.
+
+    Args:
+        screenshot: Draws a picture with a name, and returns its file.
+    """
     return Service(
         "screenshot",
         "solfer/Screenshot",
         ScreenshotRequest,
         reply=Answer,
-        handler=lambda request: Answer(True, str(server.screenshot(request.path))),
+        handler=lambda request: Answer(True, str(screenshot(request.path))),
         timeout=DRAWING,
     )
 
 
-def simulator_services(server: SimulationServer) -> tuple[Service, ...]:
+def simulator_services(server: SteppedSimulation) -> tuple[Service, ...]:
     """Declare the services `simulator/<service>`. A wrong request is refused, and nothing changes."""
     simulation = server.simulation
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from solfer.lower_level.server.heartbeat_monitor import HeartbeatMonitor
-from solfer.simulation.world.engine import STEP
+from solfer.simulation.physics import STEP
 
 
 class StepHook:

@@ -1,1 +1,1 @@
-"""The PyBullet world: ground, things on it, friction."""
+"""The world: ground, things on it, friction."""

@@ -10,15 +10,13 @@ from solfer.config import read
 from solfer.config.yaml.files import located
 from solfer.errors import UnknownName
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_rpy
-from solfer.simulation.world.engine import Engine
+from solfer.simulation.physics import PhysicsEngine, Pose
 from solfer.simulation.world.records import GROUND_NAME, BoxRecord, StairsRecord, WorldRecord
 
 WORLDS = "package://solfer/config/worlds"
 FAR_AWAY = 1e3  # [m]
 COLOUR = (0.58, 0.55, 0.50, 1.0)
 FLAT_WORLD = WorldRecord()
-
-Pose = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
 
 
 def find_world(name: str) -> Path:
@@ -46,7 +44,7 @@ def read_world(path: str | Path) -> WorldRecord:
 
 
 class World:
-    """Everything in a PyBullet world but the robot.
+    """Everything in a world but the robot.
 
     Args:
         engine: Where it is made.
@@ -57,9 +55,8 @@ class World:
         record: What it was made of.
     """
 
-    def __init__(self, engine: Engine, record: WorldRecord = FLAT_WORLD, ground_friction: float | None = None):
-        self._bullet = engine.bullet
-        self._client = engine.client
+    def __init__(self, engine: PhysicsEngine, record: WorldRecord = FLAT_WORLD, ground_friction: float | None = None):
+        self._engine = engine
         self.record = record
         self._slope = record.ground.slope
         self._bodies: dict[str, list[int]] = {}
@@ -79,7 +76,7 @@ class World:
 
     @property
     def ground(self) -> int | None:
-        """PyBullet's number of the ground; None without one."""
+        """Number of the ground; None without one."""
         return self._bodies.get(GROUND_NAME, [None])[0]
 
     def orientation(self, yaw: float = 0.0) -> np.ndarray:
@@ -90,31 +87,29 @@ class World:
 
     def reset(self) -> None:
         """Put everything back to where it was, at rest."""
-        for body, (position, orientation) in self._movable:
-            self._bullet.resetBasePositionAndOrientation(body, position, orientation, self._client)
-            self._bullet.resetBaseVelocity(body, [0.0] * 3, [0.0] * 3, self._client)
+        for body, pose in self._movable:
+            self._engine.place(body, pose)
+            self._engine.stop(body)
 
     def scatter(self) -> None:
         """Put everything that can move far away from everything else."""
         for index, (body, (_, orientation)) in enumerate(self._movable):
-            self._bullet.resetBasePositionAndOrientation(
-                body, [0.0, 0.0, FAR_AWAY * (index + 1)], orientation, self._client
-            )
+            self._engine.place(body, ([0.0, 0.0, FAR_AWAY * (index + 1)], orientation))
 
     def poses(self) -> list[Pose]:
         """Read positions [m] and quaternions (x, y, z, w) of the boxes that can move, in the order of the record."""
-        found = (self._bullet.getBasePositionAndOrientation(body, self._client) for body, _ in self._movable)
+        found = (self._engine.pose(body) for body, _ in self._movable)
         return [(np.array(position), np.array(orientation)) for position, orientation in found]
 
     def place(self, poses: Sequence[Pose]) -> None:
         """Put the boxes that can move to `poses`."""
-        for (body, _), (position, orientation) in zip(self._movable, poses, strict=True):
-            self._bullet.resetBasePositionAndOrientation(body, position, orientation, self._client)
+        for (body, _), pose in zip(self._movable, poses, strict=True):
+            self._engine.place(body, pose)
 
     def set_friction(self, name: str, coefficient: float) -> None:
         """Change the friction coefficient of one of `names`."""
         for body in self._bodies[name]:
-            self._bullet.changeDynamics(body, -1, lateralFriction=coefficient, physicsClientId=self._client)
+            self._engine.set_friction(body, coefficient)
 
     def under(self, low: np.ndarray, high: np.ndarray) -> tuple[list[int], float]:
         """Find what a body would meet on its descent.
@@ -133,7 +128,7 @@ class World:
                 if name == GROUND_NAME:
                     top = math.tan(self._slope) * (high[0] if self._slope > 0.0 else low[0])
                 else:
-                    (x, y, _), (far_x, far_y, top) = self._bullet.getAABB(body, -1, self._client)
+                    (x, y, _), (far_x, far_y, top) = self._engine.box_around(body)
                     if x > high[0] or far_x < low[0] or y > high[1] or far_y < low[1]:
                         continue
                 found.append(body)
@@ -142,36 +137,13 @@ class World:
 
     def _plane(self, friction: float) -> int:
         normal = [-math.sin(self._slope), 0.0, math.cos(self._slope)]
-        shape = self._bullet.createCollisionShape(
-            self._bullet.GEOM_PLANE, planeNormal=normal, physicsClientId=self._client
-        )
-        return self._body(0.0, shape, -1, pose=([0.0] * 3, [0.0, 0.0, 0.0, 1.0]), friction=friction)
+        return self._engine.add_plane(normal, friction)
 
     def _box(self, box: BoxRecord) -> int:
-        half = [edge / 2.0 for edge in box.size]
-        bullet = self._bullet
-        client = self._client
-        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-        visual = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=COLOUR, physicsClientId=client)
         pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))
-        body = self._body(box.mass or 0.0, shape, visual, pose=pose, friction=box.friction)
+        body = self._engine.add_box(box.size, pose, box.mass or 0.0, friction=box.friction, colour=COLOUR)
         if box.mass is not None:
             self._movable.append((body, pose))
-        return body
-
-    def _body(self, mass: float, shape: int, visual: int, pose: Pose, friction: float) -> int:
-        body = self._bullet.createMultiBody(mass, shape, visual, *pose, physicsClientId=self._client)
-        self._bullet.changeDynamics(
-            body,
-            -1,
-            lateralFriction=friction,
-            rollingFriction=0.0,
-            spinningFriction=0.0,
-            restitution=0.0,
-            linearDamping=0.0,
-            angularDamping=0.0,
-            physicsClientId=self._client,
-        )
         return body
 
 

@@ -21,7 +21,7 @@ from solfer.middleware.ros.node.master import CALL_TIMEOUT, knows, refuse_twin, 
 from solfer.middleware.ros.node.master_watch import MasterWatch
 from solfer.middleware.ros.node.ports import bound_ports
 from solfer.middleware.ros.node.waiting import ShutdownRequested
-from solfer.realtime.process import ProcessEnd
+from solfer.process import ProcessEnd
 
 logger = logging.getLogger(__name__)
 

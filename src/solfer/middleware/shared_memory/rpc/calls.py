@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.channel import DONE, RpcChannel, interface_of, packed, unpacked
 from solfer.middleware.shared_memory.rpc.services import RPC_CALLS, SERVICES, client_name, offered, services_of
+from solfer.segments.namespace import Namespace
+from solfer.segments.segment import Segment
 
 
 @dataclass

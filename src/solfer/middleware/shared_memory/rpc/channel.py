@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.header import HEADER_LINE
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.text import Text
+from solfer.segments.header import HEADER_LINE
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
+from solfer.segments.text import Text
 
 CHANNEL_KIND = "calls"
 OPEN = 4

@@ -9,10 +9,10 @@ from typing import Any
 
 from solfer.errors import MiddlewareError, SolferError, described, located
 from solfer.interfaces.declaration import Service
-from solfer.middleware.shared_memory.memory.lock import remove
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.channel import DONE, FAILED_REPLY, RpcChannel, interface_of, packed, unpacked
+from solfer.segments.lock import remove
+from solfer.segments.namespace import Namespace
+from solfer.segments.segment import Segment
 from solfer.throttle import Throttle
 from solfer.transport.middleware import Submit
 

@@ -3,8 +3,8 @@
 import json
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.namespace import Namespace
+from solfer.segments.segment import Segment
 
 EAR_KIND = "ear"
 EARS = "ears"

@@ -9,10 +9,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from solfer.middleware.shared_memory.memory.namespace import Bell, Namespace
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import NEWEST, Slot
 from solfer.middleware.shared_memory.topics.layouts import Layout, kind_of
 from solfer.middleware.shared_memory.topics.sender_segment import (
     PIPES,
@@ -25,6 +21,10 @@ from solfer.middleware.shared_memory.topics.sender_segment import (
     require_message,
 )
 from solfer.middleware.shared_memory.topics.wire_records import WireRecord
+from solfer.segments.namespace import Bell, Namespace
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
+from solfer.segments.slot import NEWEST, Slot
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Queue, Reader, Writer
 from solfer.transport.messages import Message, type_of
@@ -72,7 +72,7 @@ class XbotReader(Reader):
         bell = self._bell
         quiet = bell.words[bell.place] == bell.received
         for sender_segment in self.publishers if quiet else self.update():
-            if sender_segment.end.read() is NEW:
+            if sender_segment.end.read():
                 sent = sender_segment.arrival = sender_segment.record.sent
                 if news is None or sent >= news.arrival:
                     news = sender_segment
@@ -98,7 +98,7 @@ class XbotReader(Reader):
 
     def read_from(self, publisher: SenderSegment) -> MessageStatus:
         """See `Reader.read_from`."""
-        if publisher.end.read() is not NEW:
+        if not publisher.end.read():
             return NONE if self.message is None else OLD
         record = publisher.record
         self.message = record.decode()

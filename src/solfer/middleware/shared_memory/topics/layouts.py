@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.text import Text
 from solfer.middleware.shared_memory.topics.wire_records import (
     SEPARATE_FIELDS,
     WIRE_COLUMNS,
@@ -18,6 +17,7 @@ from solfer.middleware.shared_memory.topics.wire_records import (
     WireRecord,
     fields_text,
 )
+from solfer.segments.text import Text
 from solfer.transport.messages import FieldsMessage, Message, RefusalMessage, type_of
 
 TEXT_SIZE = 2048

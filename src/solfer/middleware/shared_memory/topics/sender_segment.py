@@ -5,12 +5,12 @@ import logging
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import Slot
 from solfer.middleware.shared_memory.topics.layouts import Layout, kind_of
 from solfer.middleware.shared_memory.topics.wire_records import WireRecord
+from solfer.segments.namespace import Namespace
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
+from solfer.segments.slot import Slot
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Publisher
 from solfer.transport.messages import type_of

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.text import Text
+from solfer.segments.text import Text
 from solfer.transport.messages import JOINT_FIELDS, FieldsMessage, JointMessage, Message, copied
 
 SENT_COLUMN, STAMP_COLUMN, WIRE_COLUMNS = 0, 1, 2

@@ -10,12 +10,12 @@ from solfer.config import Record
 from solfer.config.records.bounds import NOISE, Bounds
 from solfer.config.records.conventions import OffsetOrientationRecord, OffsetPositionRecord
 from solfer.numerics.rotations import cross, quaternion_from_rotation, rotation_from_quaternion
+from solfer.simulation.physics import STEP
 from solfer.simulation.sensors.attitude import AttitudeFilter
 from solfer.simulation.sensors.drift import Drift
 from solfer.simulation.sensors.equipment import Equipment
 from solfer.simulation.sensors.sensor import SingleSensor
 from solfer.simulation.state import Moment, SimulationState
-from solfer.simulation.world.engine import STEP
 from solfer.transport.messages import ImuMessage
 
 _Bias = Annotated[float, Field(ge=-NOISE["le"], le=NOISE["le"])]

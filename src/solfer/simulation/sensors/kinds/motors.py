@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from solfer.simulation.physics import STEP
 from solfer.simulation.sensors.equipment import Equipment
 from solfer.simulation.sensors.sensor import SingleSensor
 from solfer.simulation.state import MotorSide, SimulationState
-from solfer.simulation.world.engine import STEP
 from solfer.transport.messages import JOINT_MESSAGES, JointMessage
 
 

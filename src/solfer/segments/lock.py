@@ -7,7 +7,7 @@ import weakref
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory import files
+from solfer.segments import files
 
 LOCK_BYTES = 32  # [B], the number of a process
 LOCK_TRIES = 5

@@ -9,7 +9,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote
 
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.shared_memory.memory import files
+from solfer.segments import files
 
 SHARED_MEMORY = Path("/dev/shm")
 BELLS = "bells"

@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from solfer.simulation.world.engine import Engine
+from solfer.simulation.bullet.client import BulletClient
 
 DIFFERENCES_TOLERANCE = 1e-4
 """Relative error that counts as none: PyBullet keeps some numbers with single precision."""
@@ -21,16 +21,16 @@ DIFFERENCES_SIZES = {"box": "size", "sphere": "radius", "cylinder": "length radi
 logger = logging.getLogger(__name__)
 
 
-def warn_of_differences(engine: Engine, body: int, text: str, where: str) -> None:
+def warn_of_differences(client: BulletClient, body: int, text: str, where: str) -> None:
     """Log by which masses, collision shapes, joints and limits a body differs from its URDF, in one message.
 
     Args:
-        engine: The world.
+        client: The world.
         body: Number of the body.
         text: The URDF that PyBullet was given.
         where: The robot's own URDF, for the message.
     """
-    found = list(differences(engine, body, text))
+    found = list(differences(client, body, text))
     if found:
         more = f"; and {len(found) - DIFFERENCES_SHOWN_COUNT} more" if len(found) > DIFFERENCES_SHOWN_COUNT else ""
         logger.warning(
@@ -38,24 +38,24 @@ def warn_of_differences(engine: Engine, body: int, text: str, where: str) -> Non
         )
 
 
-def differences(engine: Engine, body: int, text: str) -> Iterator[str]:
+def differences(client: BulletClient, body: int, text: str) -> Iterator[str]:
     """Yield what differs between a body and the URDF that PyBullet was given, one link or joint each."""
-    bullet = engine.bullet
-    client = engine.client
+    bullet = client.bullet
+    number = client.number
     robot = ElementTree.fromstring(text)
-    infos = [bullet.getJointInfo(body, index, client) for index in range(bullet.getNumJoints(body, client))]
-    numbers = {bullet.getBodyInfo(body, client)[0].decode(): -1} | {info[12].decode(): info[0] for info in infos}
+    infos = [bullet.getJointInfo(body, index, number) for index in range(bullet.getNumJoints(body, number))]
+    numbers = {bullet.getBodyInfo(body, number)[0].decode(): -1} | {info[12].decode(): info[0] for info in infos}
     for link in robot.findall("link"):
         name = link.get("name", "")
         if name not in numbers:
             yield f"link '{name}' is not there"
             continue
         mass = float(link.find("inertial/mass").get("value"))  # type: ignore[union-attr, arg-type]
-        has = bullet.getDynamicsInfo(body, numbers[name], client)[0]
+        has = bullet.getDynamicsInfo(body, numbers[name], number)[0]
         # a fixed base weighs nothing for PyBullet
         if not _equal(mass, has) and not (numbers[name] == -1 and has == 0.0):
             yield f"link '{name}': mass {has:g} instead of {mass:g} kg"
-        yield from _shapes(name, link, bullet.getCollisionShapeData(body, numbers[name], client))
+        yield from _shapes(name, link, bullet.getCollisionShapeData(body, numbers[name], number))
     by_name = {info[1].decode(): info for info in infos}
     for joint in robot.findall("joint"):
         yield from _joint(joint, by_name)

@@ -8,9 +8,8 @@ import pytest
 from support.processes import BOUND, process
 from support.unit.writers import KIND, WIDTH, die_in_mid_write, flood
 
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import SLOT_STATE, Slot
-from solfer.transport import MessageStatus
+from solfer.segments.segment import Segment
+from solfer.segments.slot import SLOT_STATE, Slot
 
 NEWS = 20_000
 
@@ -23,13 +22,13 @@ def pair():
 
 def test_nothing_then_new_then_old(pair):
     writer, reader = pair
-    assert reader.read() is MessageStatus.NONE
+    assert not reader.read()
     writer.values[:] = 1.0, np.nan, -np.inf
     writer.write(123456789)
-    assert reader.read() is MessageStatus.NEW
+    assert reader.read()
     np.testing.assert_array_equal(reader.values, [1.0, np.nan, -np.inf])
     assert (reader.sequence, reader.stamp) == (1, 123456789)
-    assert reader.read() is MessageStatus.OLD
+    assert not reader.read()
 
 
 def test_of_several_records_the_newest_is_read(pair):
@@ -37,7 +36,7 @@ def test_of_several_records_the_newest_is_read(pair):
     for number in range(1, 8):
         writer.values[:] = number
         writer.write(number)
-    assert reader.read() is MessageStatus.NEW
+    assert reader.read()
     assert reader.values.tolist() == [7.0, 7.0, 7.0]
     assert reader.sequence == 7
 
@@ -46,11 +45,11 @@ def test_an_unfinished_record_is_not_read(pair):
     writer, reader = pair
     writer.values[:] = 1.0
     writer.write(1)
-    assert reader.read() is MessageStatus.NEW
+    assert reader.read()
     writer.values[:] = 2.0
     writer.write(2)
     writer.words[writer._places[0] + SLOT_STATE] = 5  # the slot of record 2 is being written again
-    assert reader.read() is MessageStatus.OLD
+    assert not reader.read()
     assert reader.values.tolist() == [1.0, 1.0, 1.0]
     assert (reader.sequence, reader.stamp, reader.given_up) == (1, 1, 1)
 
@@ -72,7 +71,7 @@ def test_a_fast_writer_tears_no_read(tmp_path):
         slot = Slot(Segment.attach(tmp_path / "pipe", KIND).data, WIDTH)
         newest = new = 0
         while new < NEWS:
-            if slot.read() is not MessageStatus.NEW:
+            if not slot.read():
                 os.sched_yield()  # on a machine with much to do the writer may have to wait for us
                 continue
             new += 1
@@ -92,7 +91,7 @@ def test_a_writer_killed_writing_leaves_its_last_record(tmp_path):
     slot = Slot(left.data, WIDTH)
     half = slot._records[4 % 2]
     assert (half[0], half[-1]) == (4.0, 2.0)  # it really died in the middle
-    assert slot.read() is MessageStatus.NEW
+    assert slot.read()
     assert (slot.values == 3.0).all()
     assert not left.owned()
     assert Segment.create(path, KIND, b"", Slot.size(WIDTH)).generation == left.generation + 1

@@ -15,8 +15,8 @@ import numpy as np
 from solfer.model.documents import parse
 from solfer.model.urdf.description import Description, JointInfo, LinkInfo
 from solfer.numerics.rotations import rotation_from_rpy
-from solfer.simulation.robot_body.inertia import Inertias
-from solfer.simulation.robot_body.meshes import Meshes
+from solfer.simulation.bullet.inertia import Inertias
+from solfer.simulation.bullet.meshes import Meshes
 
 
 @dataclass(frozen=True)

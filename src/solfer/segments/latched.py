@@ -4,7 +4,7 @@ import contextlib
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.segment import Segment
 
 
 def latched(path: Path, kind: str, layout: bytes, size: int) -> Segment:

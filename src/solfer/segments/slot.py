@@ -7,8 +7,7 @@ meanwhile. Readers and writer never wait, and a writer that dies in the middle l
 
 import numpy as np
 
-from solfer.middleware.shared_memory.memory.header import HEADER_LINE
-from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
+from solfer.segments.header import HEADER_LINE
 
 SLOT_TRIES = 8
 """Attempts of a read until it returns that there is nothing new."""
@@ -121,14 +120,17 @@ class Slot(Slots):
         """
         self.put(stamp)
 
-    def read(self) -> MessageStatus:
-        """Fetch the newest record into `values`. Does not block; keeps what it has if the writer is too fast."""
+    def read(self) -> bool:
+        """Fetch the newest record into `values`; returns False if there is none that was not read.
+
+        Does not block; keeps what it has if the writer is too fast.
+        """
         number = self.words[NEWEST]
         if number == self.sequence:
-            return OLD if number else NONE
+            return False
         for _ in range(SLOT_TRIES):
             if self._fetch(number):
-                return NEW
+                return True
             number = self.words[NEWEST]
         self.given_up += 1
-        return OLD if self.sequence else NONE
+        return False

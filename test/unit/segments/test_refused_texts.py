@@ -8,13 +8,13 @@ import pytest
 from support.unit.writers import KIND, LAYOUT
 
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.shared_memory.memory import lock, presence
-from solfer.middleware.shared_memory.memory.header import HEADER_HEADER, VERSION, Word
-from solfer.middleware.shared_memory.memory.lock import Lock
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.middleware.shared_memory.memory.presence import Presence
-from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.text import Text
+from solfer.segments import lock, presence
+from solfer.segments.header import HEADER_HEADER, VERSION, Word
+from solfer.segments.lock import Lock
+from solfer.segments.namespace import Namespace
+from solfer.segments.presence import Presence
+from solfer.segments.segment import Segment
+from solfer.segments.text import Text
 
 FOREIGN = "the file is not shared memory of solfer", "remove the file"
 ROOM = "room in /dev/shm"

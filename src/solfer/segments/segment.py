@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory import files
-from solfer.middleware.shared_memory.memory.header import (
+from solfer.segments import files
+from solfer.segments.header import (
     HEADER_HEADER,
     HEADER_KIND,
     Word,
@@ -23,7 +23,7 @@ from solfer.middleware.shared_memory.memory.header import (
     padded,
     write_header,
 )
-from solfer.middleware.shared_memory.memory.lock import Lock, locked
+from solfer.segments.lock import Lock, locked
 
 ORDERED = ("x86_64", "amd64", "i686", "i386")
 """Processors that keep the order of writes; on others a reader could see the new index before the new numbers."""

@@ -8,9 +8,9 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 
 from solfer.errors import NotFinite
 from solfer.interfaces.geometry import bare_frame
-from solfer.middleware.ros.scene.markers import pose_of
 from solfer.middleware.ros.tf import prefixed
 from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.ros_view.markers import pose_of
 from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
 from solfer.scene.live_scene import WORLD
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solfer.middleware.ros.scene.markers import FORCE_SCALE, markers_of
+from solfer.ros_view.markers import FORCE_SCALE, markers_of
 from solfer.scene import ContactForce, ScenePose, SceneState, ShownReference
 
 FRICTION = 0.5

@@ -9,13 +9,13 @@ import pytest
 
 from solfer.errors import MiddlewareError, RecordingError
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.middleware.shared_memory.memory import files
-from solfer.middleware.shared_memory.memory.lock import Lock
-from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.recording.arrays import save_arrays
 from solfer.recording.model import Recording
 from solfer.recording.writer import RecordingWriter
+from solfer.segments import files
+from solfer.segments.lock import Lock
+from solfer.segments.segment import Segment
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.statistics import RuntimeStatistics
 

@@ -4,8 +4,8 @@ import time
 from collections.abc import Sequence
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace, lost
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.namespace import Namespace, lost
+from solfer.segments.segment import Segment
 
 PRESENCE_PERIOD = 0.1
 """Time between two checks [s]."""

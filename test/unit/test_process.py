@@ -9,8 +9,8 @@ import threading
 import pytest
 
 from solfer.errors import ConfigError
+from solfer.process import SIGNALS, ProcessEnd, run_main
 from solfer.realtime.background_logs import logged_apart
-from solfer.realtime.process import SIGNALS, ProcessEnd, run_main
 
 
 @pytest.fixture(autouse=True)

@@ -10,9 +10,9 @@ from support.processes import kill, process
 from support.unit.writers import KIND, LAYOUT, hold
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory import segment as segment_module
-from solfer.middleware.shared_memory.memory.header import HEADER_HEADER, Word
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments import segment as segment_module
+from solfer.segments.header import HEADER_HEADER, Word
+from solfer.segments.segment import Segment
 
 
 @pytest.fixture

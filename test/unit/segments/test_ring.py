@@ -6,8 +6,8 @@ import pytest
 from support.processes import process
 from support.unit.writers import KIND, WIDTH, flood_ring
 
-from solfer.middleware.shared_memory.memory.ring import Ring
-from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.segments.ring import Ring
+from solfer.segments.segment import Segment
 
 COUNT = 4
 RECORDS = 20_000

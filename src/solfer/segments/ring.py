@@ -1,6 +1,6 @@
 """Every record of one writer in its order, in fixed memory."""
 
-from solfer.middleware.shared_memory.memory.slot import NEWEST, REFUSED_WORD, TAKEN, Slots
+from solfer.segments.slot import NEWEST, REFUSED_WORD, TAKEN, Slots
 
 
 class Ring(Slots):

@@ -6,8 +6,8 @@ import pytest
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.middleware.shared_memory.memory.presence import Presence
 from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.segments.presence import Presence
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_what_is_lost_is_named(namespace, act, what):
 
 def test_it_is_not_looked_at_in_each_cycle(namespace, monkeypatch):
     now = [100.0]
-    monkeypatch.setattr("solfer.middleware.shared_memory.memory.presence.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("solfer.segments.presence.time.monotonic", lambda: now[0])
     presence = Presence(namespace)
     shutil.rmtree(namespace.folder)
     assert not presence.lost()

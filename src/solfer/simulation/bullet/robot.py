@@ -1,0 +1,279 @@
+"""A robot that PyBullet has loaded."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from solfer.errors import SimulationError
+from solfer.model.urdf.description import Description
+from solfer.simulation.bullet.base import BulletBase
+from solfer.simulation.bullet.body_urdf import body_urdf
+from solfer.simulation.bullet.client import STDERR_DESCRIPTOR, STDOUT, BulletClient, decimal_points, redirected
+from solfer.simulation.bullet.differences import warn_of_differences
+from solfer.simulation.physics import (
+    STEP,
+    BaseState,
+    ClosestPoint,
+    ContactPoint,
+    JointGroup,
+    RobotInEngine,
+    SimulatedJoints,
+    Vector,
+)
+from solfer.simulation.world.records import Friction
+
+LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
+LARGEST_GEAR_EFFORT = 1e6  # [Nm]
+MOST_BRAKING = 0.25  # share of its speed that the damping of the description takes from a joint in a step
+MOST_JOINTS = 127  # of which PyBullet measures the state
+
+
+class BulletJoints(JointGroup):
+    """Joints that are driven together, by PyBullet's numbers.
+
+    Args:
+        client: The world.
+        body: Number of the body.
+        indices: PyBullet's numbers of the joints.
+    """
+
+    def __init__(self, client: BulletClient, body: int, indices: Sequence[int]):
+        self._client = client.number
+        self._set = client.bullet.setJointMotorControlArray
+        self._torque_control = client.bullet.TORQUE_CONTROL
+        self._velocity_control = client.bullet.VELOCITY_CONTROL
+        self._body = body
+        self._indices = list(indices)
+
+    def apply_torques(self, torques: np.ndarray) -> None:
+        """See `JointGroup.apply_torques`."""
+        self._set(
+            self._body,
+            self._indices,
+            self._torque_control,
+            forces=torques.tolist(),
+            physicsClientId=self._client,
+        )
+
+    def hold_speeds(self, speeds: np.ndarray, efforts: Sequence[float]) -> None:
+        """See `JointGroup.hold_speeds`."""
+        self._set(
+            self._body,
+            self._indices,
+            self._velocity_control,
+            targetVelocities=speeds.tolist(),
+            forces=efforts,
+            physicsClientId=self._client,
+        )
+
+
+class BulletRobot(RobotInEngine):
+    """A body of PyBullet. PyBullet's own order of joints and links stays inside.
+
+    Args:
+        client: The world.
+        description: The robot.
+        joints: Its moving joints, in the order in which they are read and driven.
+        friction: Friction of its links.
+        floats: Whether its base moves.
+
+    Raises:
+        SimulationError: PyBullet cannot load the robot, it has more than MOST_JOINTS joints, or `friction` names a link
+            that it does not have.
+    """
+
+    def __init__(
+        self,
+        client: BulletClient,
+        description: Description,
+        joints: Sequence[str],
+        friction: Friction,
+        *,
+        floats: bool,
+    ):
+        self._world = client
+        self._bullet = client.bullet
+        self._client = client.number
+        if len(joints) > MOST_JOINTS:
+            what = f"the robot has {len(joints)} moving joints, more than PyBullet can take"
+            raise SimulationError(what, where=description.where, expected=f"at most {MOST_JOINTS}")
+        with tempfile.TemporaryDirectory() as folder:
+            urdf = body_urdf(description, floats, Path(folder))
+            self.owner = urdf.owner
+            self.number = self._load(urdf.text, Path(folder, "robot.urdf"), description.where, floats=floats)
+        self._name_links(urdf.base, joints)
+        warn_of_differences(client, self.number, urdf.text, where=description.where)
+        self._set_dynamics(friction, urdf.owner)
+        self._base = BulletBase(client, self.number)
+
+    def joint_states(self) -> SimulatedJoints:
+        """See `RobotInEngine.joint_states`."""
+        states = self._bullet.getJointStates(self.number, self._indices, self._client)
+        position, velocity, _, effort = zip(*states, strict=True)
+        return SimulatedJoints(position, velocity, effort)
+
+    def base_state(self) -> BaseState:
+        """See `RobotInEngine.base_state`."""
+        return self._base.state()
+
+    def place_joints(self, positions: Sequence[float] | np.ndarray) -> None:
+        """See `RobotInEngine.place_joints`."""
+        self._bullet.resetJointStatesMultiDof(
+            self.number,
+            self._indices,
+            [[float(value)] for value in positions],
+            [[0.0]] * len(self._indices),
+            physicsClientId=self._client,
+        )
+
+    def place_joint(self, joint: int, position: float, velocity: float) -> None:
+        """See `RobotInEngine.place_joint`."""
+        self._bullet.resetJointState(
+            self.number, self._indices[joint], position, velocity, physicsClientId=self._client
+        )
+
+    def place_base(self, position: Sequence[float] | np.ndarray, orientation: Sequence[float] | np.ndarray) -> None:
+        """See `RobotInEngine.place_base`."""
+        self._base.place(position, orientation)
+
+    def group(self, joints: Sequence[int]) -> BulletJoints:
+        """See `RobotInEngine.group`."""
+        return BulletJoints(self._world, self.number, [self._indices[joint] for joint in joints])
+
+    def set_losses(self, damping: Sequence[float], friction: Sequence[float], inertia: np.ndarray) -> None:
+        """See `RobotInEngine.set_losses`; friction is that of motors, which hold the joints back.
+
+        PyBullet takes the speed at the begin of a step for damping, which diverges where it would turn a joint back.
+        """
+        most = MOST_BRAKING * inertia / STEP
+        for index, value, bound in zip(self._indices, damping, most.tolist(), strict=True):
+            if value:
+                self._bullet.changeDynamics(
+                    self.number, index, jointDamping=min(value, bound), physicsClientId=self._client
+                )
+        self._bullet.setJointMotorControlArray(
+            self.number,
+            self._indices,
+            self._bullet.VELOCITY_CONTROL,
+            forces=list(friction),
+            physicsClientId=self._client,
+        )
+
+    def add_gear(self, joint: int, leader: int, ratio: float) -> None:
+        """See `RobotInEngine.add_gear`."""
+        gear = self._bullet.createConstraint(
+            self.number,
+            self._indices[joint],
+            self.number,
+            self._indices[leader],
+            self._bullet.JOINT_GEAR,
+            (0.0, 1.0, 0.0),
+            (0.0, 0.0, 0.0),
+            (0.0, 0.0, 0.0),
+            physicsClientId=self._client,
+        )
+        self._bullet.changeConstraint(
+            gear, gearRatio=-ratio, maxForce=LARGEST_GEAR_EFFORT, physicsClientId=self._client
+        )
+
+    def set_friction(self, link: str, coefficient: float) -> None:
+        """See `RobotInEngine.set_friction`."""
+        self._bullet.changeDynamics(
+            self.number, self._numbers[self.owner[link]], lateralFriction=coefficient, physicsClientId=self._client
+        )
+
+    def push(self, link: str, force: Sequence[float], torque: Sequence[float], position: Sequence[float]) -> None:
+        """See `RobotInEngine.push`."""
+        bullet = self._bullet
+        index = self._numbers[self.owner[link]]
+        bullet.applyExternalForce(self.number, index, force, position, bullet.WORLD_FRAME, self._client)
+        bullet.applyExternalTorque(self.number, index, torque, bullet.WORLD_FRAME, self._client)
+
+    def contacts(self) -> list[ContactPoint]:
+        """See `RobotInEngine.contacts`."""
+        found = self._bullet.getContactPoints(self.number, physicsClientId=self._client)
+        return [ContactPoint(self.links[point[3]], point[5], _force(point)) for point in found if point[9] > 0.0]
+
+    def closest_points(self, body: int, reach: float, link: str | None = None) -> list[ClosestPoint]:
+        """See `RobotInEngine.closest_points`."""
+        only = () if link is None else (self._numbers[link],)
+        found = self._bullet.getClosestPoints(self.number, body, reach, *only, physicsClientId=self._client)
+        return [ClosestPoint(point[5], point[8]) for point in found]
+
+    def box_around(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `RobotInEngine.box_around`."""
+        boxes = np.array([self._bullet.getAABB(self.number, index, self._client) for index in self._numbers.values()])
+        return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+    def center_of_mass(self) -> np.ndarray:
+        """See `RobotInEngine.center_of_mass`."""
+        bullet = self._bullet
+        client = self._client
+        links = list(range(len(self.links) - 1))
+        states = bullet.getLinkStates(self.number, links, computeForwardKinematics=1, physicsClientId=client)
+        places = [bullet.getBasePositionAndOrientation(self.number, client)[0], *(state[0] for state in states)]
+        return np.average(places, axis=0, weights=self._masses())
+
+    def mass(self) -> float:
+        """See `RobotInEngine.mass`."""
+        return sum(self._masses())
+
+    def _masses(self) -> list[float]:
+        """Read the masses of PyBullet's links, that of the base first [kg]."""
+        return [self._bullet.getDynamicsInfo(self.number, index, self._client)[0] for index in self._numbers.values()]
+
+    def _load(self, text: str, path: Path, where: str, floats: bool) -> int:
+        bullet = self._bullet
+        flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
+        path.write_text(text, encoding="utf-8")
+        try:
+            with redirected((STDOUT,), STDERR_DESCRIPTOR), decimal_points():
+                return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags, physicsClientId=self._client)
+        except bullet.error as error:
+            raise SimulationError(
+                f"PyBullet cannot load the robot: {error}", where=where, expected="a URDF that PyBullet can load"
+            ) from error
+
+    def _name_links(self, base: str, joints: Sequence[str]) -> None:
+        count = self._bullet.getNumJoints(self.number, self._client)
+        infos = [self._bullet.getJointInfo(self.number, index, self._client) for index in range(count)]
+        by_name = {info[1].decode(): info[0] for info in infos}
+        self.links = (*(info[12].decode() for info in infos), base)  # the base is the last: -1 finds it
+        self._numbers = {link: index - 1 for index, link in enumerate((base, *self.links[:-1]))}
+        self._indices = [by_name[name] for name in joints]
+
+    def _set_dynamics(self, friction: Friction, owner: Mapping[str, str]) -> None:
+        unknown = [link for link in friction.links if link not in owner]
+        if unknown:
+            raise SimulationError(
+                f"friction of links that the robot does not have: {', '.join(unknown)}",
+                expected="links that the URDF of the robot has",
+            )
+        coefficients = {owner[link]: value for link, value in friction.links.items()}
+        change = self._bullet.changeDynamics
+        client = self._client
+        change(self.number, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+        change(self.number, -1, maxJointVelocity=LARGEST_SPEED, physicsClientId=client)
+        for link, index in self._numbers.items():  # calls of their own: some values redirect a call to the base
+            change(self.number, index, jointDamping=0.0, physicsClientId=client)
+            change(
+                self.number,
+                index,
+                lateralFriction=coefficients.get(link, friction.default),
+                rollingFriction=0.0,
+                spinningFriction=0.0,
+                restitution=0.0,
+                physicsClientId=client,
+            )
+
+
+def _force(point: tuple) -> Vector:
+    """Add PyBullet's normal force along the normal and its friction along two lateral directions."""
+    (nx, ny, nz), normal, lateral, (ax, ay, az), other, (bx, by, bz) = point[7], *point[9:14]
+    return (
+        normal * nx + lateral * ax + other * bx,
+        normal * ny + lateral * ay + other * by,
+        normal * nz + lateral * az + other * bz,
+    )

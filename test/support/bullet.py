@@ -1,0 +1,28 @@
+"""PyBullet behind a simulation, for tests whose subject or measure it is; all others ask the engine's protocol."""
+
+from typing import Any, NamedTuple
+
+from solfer.simulation import Simulation
+
+
+class RawBullet(NamedTuple):
+    """What calls of PyBullet need.
+
+    Attributes:
+        module: PyBullet.
+        client: Number of the client.
+        body: Number of the robot's body.
+        joints: PyBullet's numbers of the joints, in the model's order.
+        links: PyBullet's numbers of its links.
+    """
+
+    module: Any
+    client: int
+    body: int
+    joints: list[int]
+    links: dict[str, int]
+
+
+def raw_bullet(simulation: Simulation) -> RawBullet:
+    robot = simulation.body.robot
+    return RawBullet(robot._bullet, robot._client, robot.number, joints=robot._indices, links=robot._numbers)
