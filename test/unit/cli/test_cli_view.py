@@ -10,7 +10,7 @@ from solfer.recording.writer import RecordingWriter  # noqa: E402
 
 @pytest.fixture
 def files(tmp_path):
-    """Sources that cannot be shown, by name."""
+    """Write sources that cannot be shown."""
     (tmp_path / "junk").write_text("x")
     RecordingWriter(tmp_path / "empty", {"hands/robot.urdf": b"<robot/>"}).finish()
     return tmp_path
