@@ -163,10 +163,10 @@ def opened_page(address, origin=None):
 
 
 @contextmanager
-def started_view(*words):
-    """Start `solfer view` on any port; yields its process and its address, and ends it."""
+def started_view(*words, stderr=None):
+    """Start `solfer view` on any port; yields its process and its address, and ends it. `stderr` is a file for that."""
     program = [shutil.which("solfer"), "view", "--port", "0", *words]
-    with subprocess.Popen(program, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(program, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=stderr, text=True) as process:
         try:
             first = process.stdout.readline()
             assert ADDRESS.fullmatch(first), first

@@ -14,6 +14,9 @@ from solfer.view.server import PageServer
 FOXGLOVE = "foxglove"
 """Path of the server below the token of the page."""
 
+RELAY_PAUSE = 0.001
+"""Shortest time between two messages of a client [s]: the server behind takes them in threads that delay the page."""
+
 
 class FoxgloveRelay:
     """Passes on what clients and a server behind it send.
@@ -48,13 +51,19 @@ class FoxgloveRelay:
                 if isinstance(message, str) and self._secret in message:
                     break
                 await connection.send(message)
-            both = [asyncio.create_task(_pass_on(*each)) for each in ((connection, server), (server, connection))]
+            both = [
+                asyncio.create_task(_pass_on(connection, server, RELAY_PAUSE)),
+                asyncio.create_task(_pass_on(server, connection)),
+            ]
             await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
             for each in both:
                 each.cancel()
 
 
-async def _pass_on(source: ServerConnection | ClientConnection, sink: ServerConnection | ClientConnection) -> None:
+async def _pass_on(
+    source: ServerConnection | ClientConnection, sink: ServerConnection | ClientConnection, pause: float = 0.0
+) -> None:
     with suppress(ConnectionClosed):
         async for message in source:
             await sink.send(message)
+            await asyncio.sleep(pause)

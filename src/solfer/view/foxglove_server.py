@@ -19,7 +19,7 @@ from solfer.view.drawing import FORCE_SCALE, FORCES
 from solfer.view.foxglove_relay import FOXGLOVE, FoxgloveRelay
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
-from solfer.view.server import PageServer
+from solfer.view.server import PageServer, quiet_logger
 
 try:
     import foxglove
@@ -83,6 +83,7 @@ class FoxgloveServer(ServerListener):
         self._published: dict[str, Any] = {}
         context = Context()
         self._context = context  # channels end with it
+        quiet_logger("foxglove")
         self._joint_states = JointStatesChannel("/joint_states", context=context)
         self._tf = FrameTransformsChannel("/tf", context=context)
         self._odom = OdometryChannel("/odometry", context=context)

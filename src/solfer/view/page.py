@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from solfer.model.urdf.description import Description
@@ -92,22 +93,26 @@ class Page:
     def update(self, state: SceneState | None) -> None:
         """Show a scene; None: nothing new is known."""
         self._requests.update()
+        carry_out = self._requests.carry_out
         if self._playback is not None:
-            self._time_line.update()
+            carry_out("the time line", self._time_line.update)
             now = self._playback.time - self._playback.begin
         else:
             reports = dict(self._middleware.reports())
-            self._parameters.update(reports)
-            self._tabs.update(reports)
-            self._columns.update(state, reports)
+            carry_out("the list of parameters", partial(self._parameters.update, reports))
+            carry_out("the tabs", partial(self._tabs.update, reports))
+            carry_out("what is plotted", partial(self._columns.update, state, reports))
             now = self._middleware.now()
             if self.foxglove is not None:
-                self.foxglove.update(state)
+                carry_out("the server for Foxglove", partial(self.foxglove.update, state))
         if self._control is not None:
-            self._control.update(state)
+            carry_out("the control", partial(self._control.update, state))
         if state is None:
             return
-        self._plots.update(now)
+        carry_out("the plot", partial(self._plots.update, now))
+        carry_out("the drawing", partial(self._draw, state))
+
+    def _draw(self, state: SceneState) -> None:
         with self._viser.atomic():
             self._drawing.update(state)
         self._freshness.beat()

@@ -7,7 +7,16 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from viser import GuiApi, GuiCheckboxHandle, GuiEvent, GuiHtmlHandle, GuiSliderHandle, GuiTabHandle, GuiTextHandle
+from viser import (
+    GuiApi,
+    GuiCheckboxHandle,
+    GuiEvent,
+    GuiFolderHandle,
+    GuiHtmlHandle,
+    GuiSliderHandle,
+    GuiTabHandle,
+    GuiTextHandle,
+)
 
 from solfer.interfaces.declaration import Accepted
 from solfer.transport.health import Health
@@ -55,7 +64,7 @@ class PluginTabs:
                 self._tabs[name] = _PluginTab(
                     self._gui, tab, name, requests=self._requests, parameters=self._parameters, control=self._control
                 )
-            self._tabs[name].show(report)
+            self._requests.carry_out(f"the tab of {name}", partial(self._tabs[name].show, report))
 
 
 class _PluginTab:
@@ -79,6 +88,7 @@ class _PluginTab:
         self._control = control
         self._report: HealthReport | None = None
         self._reply: ParametersReply | None = None
+        self._folder: GuiFolderHandle | None = None
         self._controls: dict[str, Control] = {}
         with tab:
             self._text: GuiHtmlHandle = gui.add_html("")
@@ -91,26 +101,30 @@ class _PluginTab:
         reply = self._parameters.known.get(self._name)
         if reply is None or reply is self._reply:
             return
-        if self._reply is None:
-            self._add_controls(reply)
+        self._reply = reply  # first: one that cannot be shown fails once
+        if self._folder is None:
+            self._folder = self._add_folder()
+        with self._folder:
+            for index, name in enumerate(reply.names):
+                if name not in self._controls:
+                    self._controls[name] = self._make_control(name, reply, index)
         for name, value in zip(reply.names, reply.values, strict=True):
             control = self._controls[name]
             known = value if isinstance(control, GuiTextHandle) else json.loads(value)
             control.value = known  # type: ignore[misc]  # viser's own
-        self._reply = reply
 
-    def _add_controls(self, reply: ParametersReply) -> None:
+    def _add_folder(self) -> GuiFolderHandle:
         """Add what only plugins have: they know their parameters."""
         with self._tab:
             buttons = self._gui.add_button_group("life", ("start", "stop", "abort"), disabled=self._control is None)
-            with self._gui.add_folder("parameters", expand_by_default=False):
-                for index, name in enumerate(reply.names):
-                    self._controls[name] = self._make_control(name, reply, index)
+            folder = self._gui.add_folder("parameters", expand_by_default=False)
 
         @buttons.on_click
         async def _(event: GuiEvent[Any]) -> None:
             key = (self._name, event.client_id)
             self._requests.submit(key, partial(self._switch, event.client_id, buttons.value))
+
+        return folder
 
     def _switch(self, client: int | None, verb: str) -> None:
         if self._control is None or not self._control.may_command(client):

@@ -57,14 +57,21 @@ class PageRequests:
             pending = self._pending
             self._pending = {}
         for work in pending.values():
-            self._carry_out(work)
+            self.carry_out("a request of a page", work)
         waiting = self._answers
         self._answers = []
         for answer, service, done in waiting:
             if answer.done():
-                self._carry_out(partial(self._finish, answer, service, done))
+                self.carry_out("a request of a page", partial(self._finish, answer, service, done))
             else:
                 self._answers.append((answer, service, done))
+
+    def carry_out(self, name: str, work: Callable[[], None]) -> None:
+        """Do some work of the loop; if it fails, that is logged, once a second for each name."""
+        try:
+            work()
+        except Exception as error:  # it must not end the emergency stop of all pages
+            self._throttle.warning(name, "%s failed: %s", name, described(error))
 
     def show(self, text: str) -> None:
         """Show what has failed on all pages, once a second."""
@@ -72,12 +79,6 @@ class PageRequests:
             return
         for client in self._viser.get_clients().values():
             client.add_notification("solfer", text, color="red", auto_close_seconds=10.0)
-
-    def _carry_out(self, work: Callable[[], None]) -> None:
-        try:
-            work()
-        except Exception as error:  # it must not end the emergency stop of all pages
-            self._throttle.warning("request", "a request of a page failed: %s", described(error))
 
     def _finish(self, answer: Future[Any], service: str, done: Callable[[Any], None]) -> None:
         try:

@@ -17,7 +17,9 @@ from viser import _messages
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import Frame, Opcode
 from websockets.http11 import Request, Response
+from websockets.protocol import Event
 from websockets.typing import Subprotocol
 
 from solfer.errors import MiddlewareError, described
@@ -30,6 +32,12 @@ HOST_NAMES = ("localhost", HOST)
 """Names of this machine in addresses of the page."""
 
 FIRST_PORT = 8080
+
+LARGEST_READ = 16384
+"""Bytes of a connection that are decoded at once: 256 KiB of empty messages would keep others waiting for 0.4 s."""
+
+MOST_UNREAD_PINGS = 1000
+"""Pings of a connection in a row, while earlier answers wait to be read, after which it ends."""
 
 LIFE = "life"
 """Path of the websockets by which pages show that they live."""
@@ -50,22 +58,26 @@ throttle = Throttle(logger)
 
 
 class _OneLine(logging.Handler):
-    """Logs in one line, once a second, what the server logs with a traceback for each connection."""
+    """Logs in one line, once a second, what a library logs for each connection or message, also with a traceback."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """See `logging.Handler.emit`."""
         error = record.exc_info[1] if record.exc_info else None
-        _log(record.getMessage(), error)
+        _log(record.name, record.getMessage(), error)
 
 
-def _log(text: str, error: BaseException | None) -> None:
-    throttle.warning(text, "%s%s", text, "" if error is None else f": {described(error)}")
+def _log(key: str, text: str, error: BaseException | None) -> None:
+    throttle.warning(key, "%s%s", text.partition("\n")[0], "" if error is None else f": {described(error)}")
 
 
-quiet = logging.getLogger(f"{__name__}.websockets")
-quiet.propagate = False
-quiet.setLevel(logging.WARNING)
-quiet.addHandler(_OneLine())
+def quiet_logger(name: str) -> logging.Logger:
+    """Return the logger of a library of which one line a second is logged."""
+    made = logging.getLogger(name)
+    made.propagate = False
+    made.setLevel(logging.WARNING)
+    made.handlers = [_OneLine()]
+    return made
+
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
 Process = Callable[[ServerConnection, Request], Response | None | Awaitable[Response | None]]
@@ -151,11 +163,18 @@ class PageServer:
                         if key not in self.lives:
                             return
                         self.lives[key]()
+                        await asyncio.sleep(0.0)  # as for other messages: a flood leaves their turn to others
 
             asyncio.get_running_loop().set_exception_handler(
-                lambda _, context: _log(context["message"].partition("\n")[0], context.get("exception"))
+                lambda _, context: _log("loop", context["message"], context.get("exception"))
             )
-            options |= {"max_size": LARGEST_MESSAGE, "logger": quiet, "select_subprotocol": _subprotocol}
+            quiet_logger("asyncio")  # it warns of each message to a connection that has ended
+            options |= {
+                "max_size": LARGEST_MESSAGE,
+                "logger": quiet_logger(f"{__name__}.websockets"),
+                "select_subprotocol": _subprotocol,
+                "create_connection": _PageConnection,
+            }
             return serve(handle, *arguments, process_request=process, **options)
 
         return guarded
@@ -175,6 +194,25 @@ class PageServer:
             and ("Upgrade" not in headers or "Origin" in headers or is_routed)
         )
         return None if own else Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), b"")
+
+
+class _PageConnection(ServerConnection):
+    """Ends when pings come while their answers are not read: nothing else bounds those."""
+
+    _unread = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """See `ServerConnection.connection_made`."""
+        transport.max_size = LARGEST_READ  # type: ignore[attr-defined]  # of asyncio
+        super().connection_made(transport)
+
+    def process_event(self, event: Event) -> None:
+        """See `ServerConnection.process_event`."""
+        if isinstance(event, Frame) and event.opcode is Opcode.PING:
+            self._unread = self._unread + 1 if self.transport.get_write_buffer_size() else 0
+            if self._unread > MOST_UNREAD_PINGS:
+                self.transport.abort()
+        super().process_event(event)
 
 
 def _subprotocol(_: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:

@@ -9,10 +9,11 @@ from scipy.spatial.transform import Rotation
 
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
-from support.page import opened_page  # noqa: E402
+from support.page import opened_page, view  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
+from solfer.recording.model import JOINTS_KIND, Channel  # noqa: E402
 from solfer.recording.reader import read  # noqa: E402
 from solfer.recording.writer import RecordingWriter  # noqa: E402
 from solfer.robot.shipped import robot_of  # noqa: E402
@@ -104,3 +105,40 @@ def test_each_link_is_where_the_file_has_it(repository, tmp_path):
                     np.testing.assert_allclose(turn, pose.rotation, atol=2.0 * NEAR, err_msg=name)
                 places.append(client.positions["/measured/pelvis"])
     assert np.ptp(places, axis=0).max() > 0.05, "it does not drive"
+
+
+SHAPES = (
+    '<mesh filename="absent.stl"/>',
+    '<mesh filename="package://absent/a.dae" scale="1e308 1 1"/>',
+    '<mesh filename="{junk}"/>',
+    "<mesh/>",
+    '<sphere radius="1e308"/>',
+    '<cylinder radius="1e-320" length="1"/>',
+    '<capsule radius="0.1" length="0.1"/>',
+)
+
+
+@pytest.mark.parametrize("geometry", SHAPES)
+def test_a_shape_that_cannot_be_read_ends_nothing(tmp_path, geometry):
+    """`solfer view FILE` shows the links of a recording without it."""
+    junk = tmp_path / "junk.stl"
+    junk.write_bytes(b"solid " + 200 * b"\xff")
+    links = "".join(
+        f'<link name="{name}"><visual><geometry>{shape}</geometry></visual></link>'
+        for name, shape in (("base", '<box size="1 1 1"/>'), ("arm", geometry.format(junk=junk)))
+    )
+    joint = (
+        '<joint name="elbow" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    )
+    writer = RecordingWriter(
+        tmp_path / "run.mcap", {"hands/robot.urdf": f'<robot name="r">{links}{joint}</robot>'.encode()}
+    )
+    times = np.arange(10.0)
+    channel = Channel(
+        "hands/measured/position", JOINTS_KIND, ("elbow",), ("rad",), times=times, values=0.1 * times[:, None]
+    )
+    writer.write(writer.block([channel]), np.arange(1, 11), (1e9 * times).astype(int), channel.values)
+    writer.finish()
+    with view(str(writer.path)) as address, opened_page(address) as page:
+        page.until(lambda: "/measured/base" in page.positions and "time [s]" in page.labels, "the robot")

@@ -130,9 +130,16 @@ def test_only_programs_with_the_token_are_served(repository):
     with served(repository, True) as (bench, _):
         address = bench.page.foxglove.address
         token = address.split("/")[-2]
-        for wrong, origin in ((address.replace(token, token[:-1]), None), (address, "https://evil.example")):
+        own = bench.server.address.split("/")[2]
+        wrong = (token[:-1], token.swapcase(), f"{token}x", "", f"?{token}", f"%{ord(token[0]):02x}{token[1:]}")
+        tried = [(address.replace(token, each), None) for each in wrong]
+        origins = ("https://evil.example", "null", "", f"https://{own}", "http://app.foxglove.dev", "file://x")
+        tried += [(address, each) for each in origins]
+        tried += [(address.replace("localhost", "127.0.0.1").replace("127", "0x7f", 1), None)]
+        for place, origin in tried:
             with pytest.raises(InvalidStatus):
-                connect(wrong, subprotocols=[PROTOCOL], origin=origin)
+                headers = {} if origin is None else {"Origin": origin}
+                connect(place, subprotocols=[PROTOCOL], additional_headers=headers)
         connect(address, subprotocols=[PROTOCOL], origin="https://app.foxglove.dev").close()
         with connect(bench.page.foxglove._relay.behind, subprotocols=[PROTOCOL]) as connection:
             client = Client(connection)

@@ -1,5 +1,8 @@
 """The page of a robot on a bus, by a page without a browser."""
 
+from contextlib import closing
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,8 +16,9 @@ from support.unit.upper_body import upper_body  # noqa: E402
 from viser import _messages  # noqa: E402
 
 from solfer import Robot  # noqa: E402
+from solfer.transport.health import Health  # noqa: E402
 from solfer.transport.middleware import NoFields  # noqa: E402
-from solfer.transport.parameters import SetParameters  # noqa: E402
+from solfer.transport.parameters import GetParameters, ParametersReply, SetParameters  # noqa: E402
 
 pytestmark = pytest.mark.slow
 
@@ -281,3 +285,46 @@ def test_a_request_that_fails_is_one_line_and_ends_nothing(bench, caplog):
     bench.until(lambda: has(bench, "stop the robot now"))
     bench.clients[0].click("stop the robot now")
     bench.until(lambda: bench.asked)
+
+
+ODD_REPLIES = {
+    "fewer values": {"values": ()},
+    "more names": {"names": ("gain", "other")},
+    "another name": {"names": ("other",)},
+    "no number": {"values": ("[",)},
+    "not a number": {"values": ("nan",)},
+    "null": {"values": ("null",)},
+    "text": {"values": ('"a"',)},
+    "map": {"values": ('{"a": null}',)},
+    "huge": {"values": ("1e308",), "minimums": ("-1e308",), "maximums": ("1e308",)},
+    "infinite": {"values": ("1e999",)},
+    "beyond": {"values": ("1e9",)},
+    "least above most": {"minimums": ("9",), "maximums": ("1",)},
+    "markup": {"names": ("<script>alert(1)</script>",), "descriptions": ("<img src=x onerror=alert(1)>",)},
+}
+
+
+@pytest.mark.parametrize("kind", ODD_REPLIES)
+def test_a_plugin_with_odd_parameters_ends_nothing(repository, caplog, kind):
+    """First, and in place of good ones: others have their tabs, it moves on, and the stop works."""
+    bench = PageBench(upper_body(repository), control=True, foxglove=True)
+    good = bench.parameters
+    odd = replace(good, **ODD_REPLIES[kind])
+    bench.offer("odd/get_parameters", GetParameters, ParametersReply, lambda _: good if bench.is_good else odd)
+    bench.is_good = False
+    bench.node.report("odd", Health.GOOD, "<script>", {"<b>": float("nan"), "text": "</table>"})
+    with closing(bench.server), opened_page(bench.server.address) as client:
+        bench.clients = [client]
+        for bench.is_good in (False, True, False):
+            bench.page._parameters.forget("odd")
+            bench.run(4)
+        before = bench.beat
+        bench.run(3)
+        assert bench.beat > before and {"hands", "odd"} <= set(client.tabs)
+        assert "gain [1/s]" in client.labels and "<script>" not in client.content
+        assert sum(props.get("label") == "life" for props in client.gui.values()) == 2
+        client.click("EMERGENCY STOP")
+        bench.until(lambda: has(bench, "stop the robot now"))
+        client.click("stop the robot now")
+        bench.until(lambda: bench.asked)
+    assert len(caplog.records) < 20 and "\n" not in "".join(each.getMessage() for each in caplog.records)

@@ -39,19 +39,123 @@ def test_the_address_serves_the_page(server):
     assert server.address.startswith("http://localhost:") and len(path) > 30
 
 
-@pytest.mark.parametrize("path", ["/", "/index.html", "/wrong/", "//", "/?token"])
+def token(server):
+    return server.address.split("/")[3]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/",
+        "/index.html",
+        "/wrong/",
+        "/?{token}",
+        "/?token={token}",
+        "/index.html?/{token}/",
+        "//{token}/",
+        "/./{token}/",
+        "/%2f{token}/",
+        "/{encoded}/",
+        "/{upper}/",
+        "/{short}/",
+        "/{token}x/",
+        "/{token}%00/",
+        "http://localhost/{token}/",
+    ],
+)
 def test_without_the_token_there_is_nothing(server, path):
-    assert status(server, path)[0] == 403
-    token = server.address.split("/")[3]
-    assert status(server, f"/{token[:-1]}/")[0] == 403
-    assert status(server, f"/{token}x/")[0] == 403
+    own = token(server)
+    encoded = f"%{ord(own[0]):02x}{own[1:]}"
+    assert status(server, path.format(token=own, encoded=encoded, upper=own.swapcase(), short=own[:-1]))[0] == 403
 
 
-def test_another_host_or_origin_gets_nothing(server):
-    path = "/" + server.address.split("/", 3)[3]
-    assert status(server, path, Host="evil.example")[0] == 403
-    assert status(server, path, Origin="http://evil.example")[0] == 403
-    assert status(server, path, Upgrade="WebSocket")[0] == 403  # no origin at all
+@pytest.mark.parametrize(
+    "path",
+    [
+        "../../../../etc/passwd",
+        "..%2f..%2f..%2fetc/passwd",
+        "%2e%2e/%2e%2e/etc/passwd",
+        "..\\..\\etc\\passwd",
+        "..%5c..%5cetc%5cpasswd",
+        "/etc/passwd",
+        "//etc/passwd",
+        "%2fetc%2fpasswd",
+        "./../index.html",
+        "assets/../../viser/__init__.py",
+        "index.html%00",
+        "%00",
+        "%ff%fe",
+        "%",
+        "file:///etc/passwd",
+        "C:/",
+        300 * "a",
+        3000 * "a",
+        1500 * "a/",
+        2000 * "../",
+    ],
+    ids=lambda path: path[:40],
+)
+def test_no_path_leaves_the_page(server, path):
+    """It is not found, also where no file can have such a name."""
+    assert status(server, f"/{token(server)}/{path}")[0] == 404
+
+
+def test_a_request_that_is_too_long_ends_its_connection_alone(server):
+    with pytest.raises((http.client.HTTPException, OSError)):
+        status(server, f"/{token(server)}/{20000 * 'a'}")
+    assert status(server, f"/{token(server)}/")[0] == 200
+
+
+HOSTS = (
+    "evil.example",
+    "evil.example:{port}",
+    "localhost",
+    "localhost:1",
+    "localhost:{port}.evil.example",
+    "localhost.evil.example:{port}",
+    "127.0.0.2:{port}",
+    "0.0.0.0:{port}",
+    "[::1]:{port}",
+    "localhost:{port}, evil.example",
+    "",
+)
+ORIGINS = (
+    "null",
+    "https://localhost:{port}",
+    "http://localhost",
+    "http://localhost:1",
+    "http://evil.example",
+    "http://localhost:{port}.evil.example",
+    "file://",
+    "https://app.foxglove.dev",
+    "",
+)
+
+
+@pytest.mark.parametrize(
+    ("header", "value"), [*(("Host", each) for each in HOSTS), *(("Origin", each) for each in ORIGINS)]
+)
+def test_another_host_or_origin_gets_nothing(server, header, value):
+    wrong = {header: value.format(port=server.viser.get_port())}
+    assert status(server, f"/{token(server)}/", **wrong)[0] == 403
+    assert status(server, f"/{token(server)}/", **{"Origin": "http://evil.example", **wrong})[0] == 403
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        "Host: localhost:{port}\r\nHost: evil.example\r\n",
+        "Host: localhost:{port}\r\nHost: localhost:{port}\r\n",
+        "X: y\r\n",
+        "Host: localhost:{port}\r\nOrigin: http://localhost:{port}\r\nOrigin: http://evil.example\r\n",
+        "Host: localhost:{port}\r\nUpgrade: WebSocket\r\n",  # no origin at all
+    ],
+)
+def test_headers_that_leave_a_doubt_get_nothing(server, headers):
+    port = server.viser.get_port()
+    with socket.create_connection(("127.0.0.1", port), timeout=5.0) as connection:
+        connection.sendall(f"GET /{token(server)}/ HTTP/1.1\r\n{headers.format(port=port)}\r\n".encode())
+        assert connection.recv(65536).startswith(b"HTTP/1.1 403 ")
 
 
 def test_pages_connect_with_token_and_origin_alone(server):
@@ -77,13 +181,6 @@ def test_no_page_opens_a_way_from_other_machines(server):
         page.send(_messages.ShareUrlRequest())
         page.receive(0.3)
     assert server.viser._share_tunnel is None
-
-
-@pytest.mark.parametrize("length", [300, 3000])
-def test_a_path_that_no_file_can_have_is_not_found(server, length):
-    path = "/" + server.address.split("/", 3)[3]
-    assert status(server, path + length * "a")[0] == 404
-    assert status(server, path + "a/" * (length // 2))[0] == 404
 
 
 JUNK = {

@@ -41,24 +41,23 @@ class ShownSource:
 
 def show(options: argparse.Namespace) -> int:
     """Show the page until the source or the user ends it."""
-    with closing(PageServer(int(options.port))) as server:
-        print(server.address, flush=True)
-        with suppress(KeyboardInterrupt), _opened(options) as source:
-            scene = LiveScene(source.robot, source.middleware)
-            page = Page(
-                server,
-                source.robot.description,
-                source.middleware,
-                stop=source.stop,
-                control=options.control,
-                playback=source.playback,
-                foxglove=options.foxglove,
-            )
-            if page.foxglove is not None:
-                print(page.foxglove.address, flush=True)
-            FixedRateLoop(source.middleware, PAGE_RATE).run(
-                lambda *_: page.update(scene.update()), source.middleware.running
-            )
+    with suppress(KeyboardInterrupt), _opened(options) as source, closing(PageServer(int(options.port))) as server:
+        scene = LiveScene(source.robot, source.middleware)
+        page = Page(
+            server,
+            source.robot.description,
+            source.middleware,
+            stop=source.stop,
+            control=options.control,
+            playback=source.playback,
+            foxglove=options.foxglove,
+        )
+        print(server.address, flush=True)  # after errors of the source
+        if page.foxglove is not None:
+            print(page.foxglove.address, flush=True)
+        FixedRateLoop(source.middleware, PAGE_RATE).run(
+            lambda *_: page.update(scene.update()), source.middleware.running
+        )
     return 0
 
 
