@@ -308,9 +308,10 @@ GRAVITY, CHECK_UNEVENNESS, CHECK_TURN_LIMIT = 9.81, 1.0, 0.5
 """Specific force at rest, how far it may be from that [m/s^2], and how fast its sensor may turn [rad/s]: beyond that
 it is not gravity that is measured, as in a fall."""
 
-NO_GRAVITY = 3.0
-"""Difference of the mean specific force of 1.5 s from gravity that no motion explains [m/s^2]: it is in other units, or
-without gravity."""
+WEAKEST_FORCE = 6.8
+STRONGEST_FORCE = 15.8
+"""Sizes of the mean specific force of 1.5 s beyond which it is in other units, or without gravity [m/s^2]: a push that
+topples a robot within a second makes it 13."""
 
 
 @part
@@ -393,7 +394,7 @@ def _find_fault(values, own_axes, force, arrival, stamp, before):
         return 3, askew
     if not is_next or rate == 0.0:  # many senders leave them zero
         return 0, 0.0
-    fault = 5 if abs(before[23] - GRAVITY) > NO_GRAVITY else 0
+    fault = 0 if WEAKEST_FORCE < before[23] < STRONGEST_FORCE else 5
     keep = SUMMED / (SUMMED + passed)
     # the turn since then: in the axes of the link, or in those of the world
     side = 1.0 if own_axes else -1.0
