@@ -53,7 +53,7 @@ class Kinematics:
         turns: Turn after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
 
     Raises:
-        ModelError: Pinocchio cannot read the robot, or it has no DoF, or more than LARGEST.
+        ModelError: Pinocchio cannot read the robot, or it has no DoF, or more than MAX_DOFS.
     """
 
     def __init__(self, description: Description, floating_base: bool | None = None):
@@ -295,7 +295,7 @@ class Kinematics:
 
 
 def _check_size(description: Description) -> None:
-    """Check that the tree is no larger and no deeper than LARGEST."""
+    """Check that the tree is no larger and no deeper than MAX_DOFS."""
     depth = {description.root: 0}
     for link in description.subtree(description.root):
         depth |= dict.fromkeys(

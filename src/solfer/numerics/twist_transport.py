@@ -16,10 +16,21 @@ from solfer.numerics import base_chart as chart
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.compilation import cached, part
 
-FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, GO_ON = 1, 2, 4, 8, 16
-"""Options, as a sum. POSE: the base from a pose; TWIST: its rates from a twist; OWN_AXES: the twist is in the axes of
-the sensor, not of the world; ORIENTED: an orientation is given, by which such a twist is turned; GO_ON: angles continue
-without jumps by 2 pi."""
+# options, as a sum
+FROM_POSE = 1
+"""The base follows from a pose."""
+
+FROM_TWIST = 2
+"""Its rates follow from a twist."""
+
+OWN_AXES = 4
+"""The twist is in the axes of the sensor, not of the world."""
+
+WITH_ORIENTATION = 8
+"""An orientation is given, by which such a twist is turned."""
+
+GO_ON = 16
+"""Angles continue without jumps by 2 pi."""
 
 FULL_TURN = 2.0 * math.pi
 """[rad]."""
@@ -53,7 +64,7 @@ class Carried:
         """Compute `rates`, and `base` where a pose is given; without a pose, `base` is used as it is.
 
         Args:
-            options: Sum of POSE, TWIST, OWN_AXES, ORIENTED, GO_ON.
+            options: Sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, GO_ON.
         """
         _update(self._values, self._mount, self.world, self._chart, self.base, self.rates, options)
 

@@ -30,7 +30,7 @@ class CommandPipe(abc.ABC):
 
     @property
     def quantity(self) -> str:
-        """Quantity of the Robot Points that it carries, one of `config.kinds.point.QUANTITIES`; empty: none."""
+        """Quantity of the Robot Points that it carries, one of `solfer.config.kinds.point.QUANTITIES`; empty: none."""
         return ""
 
     @abc.abstractmethod

@@ -75,7 +75,7 @@ class Logger:
             columns: Name of each number, in the order of the memory; none: those of the kind, or their indices.
             unit: Unit of all numbers, or of each, such as 'rad'; without `columns`, those of the kind by default.
             frame: Frame of the axes.
-            kind: Message that carries it, one of `solfer.recording.kinds.KINDS`.
+            kind: Message that carries it, one of `solfer.recording.kinds.CHANNEL_KINDS`.
             child: Frame that moves in `frame`.
             factor: See `LogSource`.
 

@@ -26,7 +26,7 @@ class Channel:
 
     Attributes:
         name: `<plugin>/<what>`, such as `arm/command/direct/position`.
-        kind: Message that carries it in a file, one of `solfer.recording.kinds.KINDS`.
+        kind: Message that carries it in a file, one of `solfer.recording.kinds.CHANNEL_KINDS`.
         columns: Names of the columns.
         units: Unit of each column, such as 'rad' or 'm/s'; empty: none.
         frame: Frame of the axes; empty: none.

@@ -4,28 +4,28 @@ import numpy as np
 
 from solfer.lower_level.gains.ramp import ALL_JOINTS
 
-CATCH_UP_JUMP = 0.01
+JUMP_DISTANCE = 0.01
 """Distance from where its stream was heading at which a commanded position has jumped [rad, m]."""
 
 LONGEST_PAUSE = 0.1
 """Longest time between two commands of one stream [s]; a later one is expected where the stream would be by then."""
 
-CATCH_UP_PERIOD = 0.005
-"""Time between commands below which JUMP shrinks in proportion: an emptied queue is not a fast stream [s]."""
+SHORTEST_PERIOD = 0.005
+"""Time between commands below which JUMP_DISTANCE shrinks in proportion: an emptied queue is not a fast stream [s]."""
 
-CATCH_UP_ACCELERATION = 50.0
+STREAM_ACCELERATION = 50.0
 """Largest change of a stream's estimated speed at a jump [rad/s2, m/s2]."""
 
-FREQUENCY = 10.0
+FADING_FREQUENCY = 10.0
 """Frequency of the critically damped system in which a distance fades out [rad/s]: 1 % is left after 0.66 s."""
 
-CATCH_UP_SPEED_SHARE = 0.2
-"""Part of its speed limit that a joint uses, at most, to catch up."""
+FADING_SPEED_RATIO = 0.2
+"""Ratio of its speed limit that a joint uses, at most, to catch up."""
 
-WHOLE = 0.8
-"""Part of its speed limit that a stream and catching up use together, at most: links on springs swing beyond that."""
+TOTAL_SPEED_RATIO = 0.8
+"""Ratio of its speed limit that a stream and catching up use together, at most: links on springs swing beyond that."""
 
-CATCH_UP_CLOSENESS = 1e-6
+CAUGHT_UP_BELOW = 1e-6
 """Distance and speed below which a joint has caught up [rad, rad/s]."""
 
 
@@ -44,11 +44,11 @@ class _Buffers:
 class CatchUp:
     """Distances between springs' targets and commanded positions, which fade out where those jump.
 
-    A stream of commands is followed as it is. A position that is further than JUMP from where the newest two commands
+    A stream of commands is followed as it is. A position that is further than JUMP_DISTANCE from where the newest two commands
     were heading has jumped: the sender or the robot was stopped, or another sender begins elsewhere. Then the distance
-    o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FREQUENCY and |o'| of at most SHARE of the
-    joint's speed limit, or of what the stream leaves of WHOLE of it. The target stays continuous in position and speed,
-    and never overshoots the command by it.
+    o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FADING_FREQUENCY and |o'| of at most
+    FADING_SPEED_RATIO of the joint's speed limit, or of what the stream leaves of TOTAL_SPEED_RATIO of it. The target
+    stays continuous in position and speed, and never overshoots the command by it.
 
     Args:
         speed_limit: Speed limit of each joint, shape (n,) [rad/s, m/s].
@@ -60,8 +60,8 @@ class CatchUp:
 
     def __init__(self, speed_limit: np.ndarray):
         size = len(speed_limit)
-        self._fastest = CATCH_UP_SPEED_SHARE * speed_limit
-        self._whole = WHOLE * speed_limit
+        self._fastest = FADING_SPEED_RATIO * speed_limit
+        self._whole = TOTAL_SPEED_RATIO * speed_limit
         self.distance = np.zeros(size)
         self._rate = np.zeros(size)
         self._last = np.zeros(size)
@@ -109,7 +109,7 @@ class CatchUp:
         np.maximum(extra, np.minimum(moved, 0.0, out=buffers.bound), out=extra)
         np.subtract(moved, extra, out=extra)
         np.multiply(
-            np.minimum(time, CATCH_UP_PERIOD, out=buffers.change), CATCH_UP_JUMP / CATCH_UP_PERIOD, out=buffers.change
+            np.minimum(time, SHORTEST_PERIOD, out=buffers.change), JUMP_DISTANCE / SHORTEST_PERIOD, out=buffers.change
         )
         np.greater(np.abs(extra, out=buffers.bound), buffers.change, out=jumped)
         np.logical_and(jumped, news, out=jumped)
@@ -117,7 +117,7 @@ class CatchUp:
             np.add(self.distance, extra, out=self.distance, where=jumped)
             self.active = True
         # the stream's speed; at a jump its change is bounded by ACCELERATION
-        np.multiply(time, CATCH_UP_ACCELERATION, out=buffers.change)
+        np.multiply(time, STREAM_ACCELERATION, out=buffers.change)
         np.copyto(buffers.change, np.inf, where=np.logical_not(jumped, out=jumped))
         np.divide(moved, time, out=moved, where=news)
         np.subtract(moved, self._speed, out=moved)
@@ -137,9 +137,9 @@ class CatchUp:
         rate = self._rate
         buffers = self._buffers
         work = buffers.work
-        np.multiply(distance, -FREQUENCY * FREQUENCY * dt, out=work)
+        np.multiply(distance, -FADING_FREQUENCY * FADING_FREQUENCY * dt, out=work)
         rate += work
-        rate /= 1.0 + 2.0 * FREQUENCY * dt
+        rate /= 1.0 + 2.0 * FADING_FREQUENCY * dt
         # the target moves at the speed of its stream, if that goes on, minus the rate of the distance
         speed = buffers.moved
         bound = buffers.bound
@@ -153,7 +153,7 @@ class CatchUp:
         np.multiply(rate, dt, out=work)
         distance += work
         np.abs(distance, out=work)
-        if work.max() < CATCH_UP_CLOSENESS and np.abs(rate, out=work).max() < CATCH_UP_CLOSENESS:
+        if work.max() < CAUGHT_UP_BELOW and np.abs(rate, out=work).max() < CAUGHT_UP_BELOW:
             distance.fill(0.0)
             rate.fill(0.0)
             self.active = False

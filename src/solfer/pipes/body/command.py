@@ -43,7 +43,7 @@ class BodyCommandPipe(CommandPipe):
     Args:
         name: Name of the pipe in the configuration.
         writer: Publishes the messages.
-        message: Canonical name of the message, one of SENT.
+        message: Canonical name of the message, one of SENT_MESSAGES.
         kinematics: Kinematics for this pipe alone.
         state: State that is published.
         link: The link.

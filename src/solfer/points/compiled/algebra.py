@@ -162,7 +162,7 @@ def norm(row, program, with_jacobian):
 def fold(row, program, with_jacobian):
     """Add the columns of followers, times their ratios, to those of their leaders, and clear them.
 
-    Parameters: the ratios; a table of `FOLLOWER`.
+    Parameters: the ratios; a table of `instruction.FOLLOWER`.
     """
     if not with_jacobian:
         return

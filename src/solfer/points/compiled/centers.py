@@ -67,7 +67,7 @@ def center_of_pressure(row, program, with_jacobian):
     """Compute the mean of the contacts' positions across the normal, weighted with their normal forces.
 
     A contact with a moment t and the normal force f presses n x t / f beside its position. Parameters: the normal n
-    (3); a table of `PRESSING`. Without normal forces the value stays, and the Jacobian is zero.
+    (3); a table of `instruction.PRESSING`. Without normal forces the value stays, and the Jacobian is zero.
     """
     dofs = program.dofs
     columns = columns_of(row)

@@ -27,9 +27,9 @@ KERNELS: dict[str, Kernel] = {}
 def kernel(function: Callable[..., None]) -> Kernel:
     """Register a function as an operation that instructions may name.
 
-    It has the arguments `row`, a record `INSTRUCTION`, `program`, a record `PROGRAM`, and `with_jacobian`, whether the
-    Jacobian is written; it writes value and Jacobian in place and allocates nothing. All files of this folder are
-    compiled together, and no others.
+    It has the arguments `row`, a record `instruction.INSTRUCTION`, `program`, a record `instruction.PROGRAM`, and
+    `with_jacobian`, whether the Jacobian is written; it writes value and Jacobian in place and allocates nothing. All
+    files of this folder are compiled together, and no others.
     """
     name = function.__name__
     if name in KERNELS or not function.__module__.startswith(f"{__package__}."):
