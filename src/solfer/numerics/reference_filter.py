@@ -17,9 +17,11 @@ STREAM = 0.1
 FILTER_PATIENCE = 2.0
 """A stream goes on until no target has come for so many of its periods."""
 
-FIRST_RATIO, RATIO_RATE = 0.25, 0.1
-"""Ratio of its limits within which a reference goes to a stream that it has not met since its start, and by how much the
-ratio grows in a second [1/s], so that it meets fast ones, too."""
+FIRST_RATIO = 0.25
+"""Ratio of its limits within which a reference goes to a stream that it has not met since its start."""
+
+RATIO_GROWTH = 0.1
+"""Rate at which this ratio grows, so that the reference meets fast streams, too [1/s]."""
 
 REST_SUM = 1e-9
 """Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
@@ -287,7 +289,7 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, ratios, s
         _approach(error, stream[i, 3:], rate[i, 3:], turn_speed, ratio * limits[i, 3], period, desired)
         if ratio < 1.0:
             has_met = distance <= speed * period and _norm(error) <= turn_speed * period
-            ratios[i] = 1.0 if has_met else min(ratio + RATIO_RATE * period, 1.0)
+            ratios[i] = 1.0 if has_met else min(ratio + RATIO_GROWTH * period, 1.0)
         for k in range(3):
             value[i, k] += period * rate[i, k]
         _turn_by(value[i], rate[i], period)

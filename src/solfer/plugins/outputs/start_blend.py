@@ -34,7 +34,8 @@ class StartBlend:
     begin where the lower level has them without a command.
 
     T follows from the first commands. Where they are the positions at the start, without velocity and effort, it is
-    zero: nothing is changed. Else it is the longest time that a joint needs for its way at BLEND_SPEED_SHARE of its speed limit.
+    zero: nothing is changed. Else it is the longest time that a joint needs for its way at BLEND_SPEED_SHARE of its
+    speed limit.
 
     Args:
         owner: Name of the plugin, for messages.

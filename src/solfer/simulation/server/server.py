@@ -233,7 +233,7 @@ class SimulationServer:
         return ""
 
     def _recover(self, error: SimulationError) -> None:
-        """Put the robot into its start, as a reset does; raises `error` if that was done less than SIMULATION_REPEAT_PERIOD ago."""
+        """Put the robot into its start, as a reset does; raise `error` if that was done a moment ago."""
         time = self.simulation.time
         if time - self._diverged < SIMULATION_REPEAT_PERIOD:
             raise error
