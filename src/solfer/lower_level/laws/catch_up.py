@@ -46,9 +46,9 @@ class CatchUp:
 
     A stream of commands is followed as it is. A position that is further than JUMP_DISTANCE from where the newest two
     commands were heading has jumped: the sender or the robot was stopped, or another sender begins elsewhere. Then the
-    distance o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FADING_FREQUENCY and |o'| of at most
-    FADING_SPEED_RATIO of the joint's speed limit, or of what the stream leaves of TOTAL_SPEED_RATIO of it. The target
-    stays continuous in position and speed, and never overshoots the command by it.
+    distance o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FADING_FREQUENCY and |o'| of at
+    most FADING_SPEED_RATIO of the joint's speed limit, or of what the stream leaves of TOTAL_SPEED_RATIO of it. The
+    target stays continuous in position and speed, and never overshoots the command by it.
 
     Args:
         speed_limit: Speed limit of each joint, shape (n,) [rad/s, m/s].
