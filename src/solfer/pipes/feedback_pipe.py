@@ -11,7 +11,7 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError, SolferError, UnknownName, Unrelated
 from solfer.model import History, State
 from solfer.numerics.filters import LowPass
-from solfer.pipes.complaints import PipeComplaints
+from solfer.pipes.pipe_warnings import PipeWarnings
 from solfer.pipes.precedence import Precedence, Watch
 from solfer.pipes.state_field import StateField
 from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, MessageStatus, Publisher, Reader
@@ -48,7 +48,7 @@ class Reception:
 class FeedbackPipe(abc.ABC):
     """A pipe that a plugin receives.
 
-    A message that does not fit is refused whole: nothing of it is used, see `PipeComplaints`. One that has nothing of
+    A message that does not fit is refused whole: nothing of it is used, see `PipeWarnings`. One that has nothing of
     what the pipe receives is no fault as soon as another one fits.
     Where a topic has several publishers, the newest message counts, and their names are logged; for measured States
     the first publisher counts, see `StateFeedbackPipe`.
@@ -67,7 +67,7 @@ class FeedbackPipe(abc.ABC):
             first. For measured States see `SenderClock`.
         handovers: How often another publisher replaced one that had timed out.
         changed: Arrival of the newest message that changed any number of the State [s]; infinity: that is not known.
-        complaints: What is wrong with its messages.
+        warnings: What is wrong with its messages.
     """
 
     _watch: Watch | None = None
@@ -84,12 +84,12 @@ class FeedbackPipe(abc.ABC):
         self.arrival = math.inf
         self.stamp = 0.0
         self._stamp = 0.0  # of the message that was read last
-        self.complaints = PipeComplaints(logger, name, reader)
+        self.warnings = PipeWarnings(logger, name, reader)
 
     @property
     def refused(self) -> int:
         """Number of messages that did not fit."""
-        return self.complaints.refused + self.reader.refused
+        return self.warnings.refused + self.reader.refused
 
     @property
     def measures(self) -> bool:
@@ -109,7 +109,7 @@ class FeedbackPipe(abc.ABC):
     @property
     def lacks(self) -> str:
         """Description of the values that have not been received yet, and why messages with them are refused."""
-        refusal = self.complaints.lasting
+        refusal = self.warnings.lasting
         return f"{self.place}, which refuses messages of {refusal}" if refusal else self.place
 
     @property
@@ -142,15 +142,15 @@ class FeedbackPipe(abc.ABC):
             self._name_publishers()
         return NEW if self._accept() else OLD
 
-    def rivalry(self, now: float) -> str:
+    def conflict(self, now: float) -> str:
         """Return the publishers of the same DoFs at the time `now` [s]: either may be right; empty: there are none."""
         return ""
 
-    def doubt(self, now: float) -> str:
+    def unsettled(self, now: float) -> str:
         """Return why no plugin may start with the values at the time `now` [s]; empty: it may. Can block briefly."""
         return ""
 
-    def be_patient(self, timeout: float, strikes: int) -> None:  # noqa: B027 most have no precedence
+    def set_timeout(self, timeout: float, strikes: int) -> None:  # noqa: B027 most have no precedence
         """Set the timeout after which another publisher of the same may replace one; see `Precedence`."""
 
     def check_start(self) -> None:  # noqa: B027 most accept every start
@@ -176,7 +176,7 @@ class FeedbackPipe(abc.ABC):
         """Begin again: discard what was received so far. Written values stay."""
         self.received = False
         self.arrival = math.inf
-        self.complaints.restart()
+        self.warnings.restart()
 
     def repeat(self, arrival: float) -> None:
         """Count numbers that were written where messages are decoded to as all of a message of `arrival` [s]."""
@@ -191,22 +191,22 @@ class FeedbackPipe(abc.ABC):
     def _accept(self) -> bool:
         """Decode the message that was read last; return whether it fits."""
         reader = self.reader
-        complaints = self.complaints
-        if complaints.doubt is not None:
-            complaints.look()
+        warnings = self.warnings
+        if warnings.pending is not None:
+            warnings.log_pending()
         message = reader.message
         if message is not None:
             clock = self._clock
             self._stamp = message.stamp if clock is None else clock.time(message.stamp, reader.arrival)
             if clock is not None and clock.is_distrusted:
-                complaints.mention("clock", f"{message.sender} sends {clock.fault}; arrivals count instead")
+                warnings.warn("clock", f"{message.sender} sends {clock.fault}; arrivals count instead")
         try:
             self._decode(message)
         except UNFIT as error:
             self._refuse(error)
             return False
-        if complaints.is_open:
-            complaints.close()
+        if warnings.is_open:
+            warnings.close()
         self.accepted += 1
         self.arrival = reader.arrival
         self.stamp = self._stamp
@@ -219,15 +219,15 @@ class FeedbackPipe(abc.ABC):
         if unrelated and self.arrival < math.inf:
             return  # another publisher has what the pipe receives
         if unrelated and self.measures:
-            self.complaints.note(error)  # a plugin that waits for the pipe logs it
+            self.warnings.note(error)  # a plugin that waits for the pipe logs it
         else:
-            self.complaints.refuse(error)
+            self.warnings.refuse(error)
 
     def _name_publishers(self) -> None:
         reader = self.reader
         recent_senders = reader.recent_senders(reader.arrival - RIVALRY)
         if len(recent_senders) > 1:
-            self.complaints.throttle.warning(
+            self.warnings.throttle.warning(
                 "publishers",
                 "feedback '%s': %s publish on %s at the same time; the newest message counts, now that of %s",
                 self.name,
@@ -412,25 +412,25 @@ class StateFeedbackPipe(FeedbackPipe):
         if self.history is not None:
             self.history.clear()
 
-    def rivalry(self, now: float) -> str:
-        """See `FeedbackPipe.rivalry`."""
+    def conflict(self, now: float) -> str:
+        """See `FeedbackPipe.conflict`."""
         rivals = [] if self._precedence is None else self._precedence.rivals(now - RIVALRY)
         if not rivals:
             return ""
         return f"{self.place}, where {' and '.join(rivals)} publish the same DoFs: end one of them"
 
-    def doubt(self, now: float) -> str:
-        """See `FeedbackPipe.doubt`."""
-        rivalry = self.rivalry(now)
-        if rivalry or self._precedence is None:
-            return rivalry
+    def unsettled(self, now: float) -> str:
+        """See `FeedbackPipe.unsettled`."""
+        conflict = self.conflict(now)
+        if conflict or self._precedence is None:
+            return conflict
         awaited = self.reader.awaited()
         if not awaited:
             return ""
         return f"{self.place}, where {' and '.join(awaited)} may publish, too"
 
-    def be_patient(self, timeout: float, strikes: int) -> None:
-        """See `FeedbackPipe.be_patient`."""
+    def set_timeout(self, timeout: float, strikes: int) -> None:
+        """See `FeedbackPipe.set_timeout`."""
         if self._precedence is not None:
             self._precedence.timeout = timeout
             self._precedence.strikes = strikes
@@ -501,10 +501,10 @@ class StateFeedbackPipe(FeedbackPipe):
                 "feedback %s: %s counts from now on, since the one before timed out", self.place, publisher.name
             )
         if not counts:
-            self.complaints.throttle.warning(
+            self.warnings.throttle.warning(
                 publisher.name,
                 "feedback %s; %d messages of %s were ignored",
-                self.rivalry(reader.arrival) or self.place,
+                self.conflict(reader.arrival) or self.place,
                 precedence.ignored,
                 publisher.name,
             )

@@ -88,7 +88,7 @@ class Precedence:
         self._size = size
         self._watches: list[Watch] = []
         self._owners: dict[tuple[str, int], Owner] = {}  # by name and identity of the part
-        self._rivalries: dict[str, tuple[float, tuple[Owner, ...]]] = {}
+        self._conflicts: dict[str, tuple[float, tuple[Owner, ...]]] = {}
 
     def watch(self, watch: Watch) -> None:
         """Keep the publishers of a watch up to date."""
@@ -109,9 +109,9 @@ class Precedence:
             self.handovers += 1
             return True
         self.ignored += 1
-        if name not in self._rivalries:
+        if name not in self._conflicts:
             self._forget(arrival - RIVALRY)
-        self._rivalries[name] = arrival, rivals
+        self._conflicts[name] = arrival, rivals
         return False
 
     def note(self, name: str, part: np.ndarray | None, arrival: float) -> None:
@@ -129,7 +129,7 @@ class Precedence:
         """List the publishers of the same DoFs since a time [s], sorted; empty: there are none."""
         self._forget(since)
         names = set()
-        for name, (_, owners) in self._rivalries.items():
+        for name, (_, owners) in self._conflicts.items():
             present = {owner.name for owner in owners if owner.arrival >= since}
             if present:
                 names |= {name, *present}
@@ -170,6 +170,6 @@ class Precedence:
 
     def _forget(self, since: float) -> None:
         """Drop rivals without an ignored message since a time [s]."""
-        for name, (arrival, _) in list(self._rivalries.items()):
+        for name, (arrival, _) in list(self._conflicts.items()):
             if arrival < since:
-                del self._rivalries[name]
+                del self._conflicts[name]

@@ -1,5 +1,6 @@
 """Feedbacks of a plugin, and what it does when one times out."""
 
+import enum
 import logging
 import math
 from collections.abc import Iterator, Sequence
@@ -43,6 +44,48 @@ TIMEOUT_ACTIONS = {
 SEVERITY = tuple(TIMEOUT_ACTIONS)
 
 
+class FeedbackState(enum.Enum):
+    """What a feedback is at present; `next_state` has the transitions.
+
+    WAITING: no message has come in time since the start. LIVE: the newest one came in time. SILENT: none has come for
+    too long. FROZEN: messages come, but no number of them changes, though joints are commanded to move. DISPUTED:
+    messages come, but contradict others. REPLACED: another publisher counts since this cycle.
+    """
+
+    WAITING = enum.auto()
+    LIVE = enum.auto()
+    SILENT = enum.auto()
+    FROZEN = enum.auto()
+    DISPUTED = enum.auto()
+    REPLACED = enum.auto()
+
+
+# module globals: the lookup in the control cycle is several times as fast as on the class
+WAITING, LIVE, SILENT, FROZEN, DISPUTED, REPLACED = FeedbackState
+
+TIMED_OUT = (SILENT, FROZEN, DISPUTED)
+
+
+def next_state(state: FeedbackState, observed: FeedbackState | None) -> FeedbackState:
+    """Return the state after a cycle.
+
+    | observed in the cycle                                    | from REPLACED | from any other   |
+    |----------------------------------------------------------|---------------|------------------|
+    | nothing new, and not for too long                        | WAITING       | stays            |
+    | a message in time                                        | LIVE          | LIVE             |
+    | `strikes` cycles in a row: silence, numbers that stay,   | SILENT,       | SILENT, FROZEN,  |
+    | or a contradiction                                       | FROZEN, ...   | DISPUTED         |
+    | another publisher                                        | REPLACED      | REPLACED         |
+
+    Args:
+        state: The state before.
+        observed: The state that the newest message alone would be in; None: there was nothing new.
+    """
+    if observed is not None:
+        return observed
+    return WAITING if state is REPLACED else state
+
+
 class NewestChange:
     """The newest change of a feedback's numbers.
 
@@ -73,28 +116,25 @@ class FeedbackTimeout:
         where: Where the configuration names its topic.
 
     Attributes:
+        state: What the feedback is at present.
         timeout: See above.
-        timed_out: Whether no message has come for too long.
         timeouts: How often it timed out.
-        doubt: Why no plugin may start with the received messages; empty: it may, or this was not checked yet.
+        unsettled: Why no plugin may start with the received messages; empty: it may, or this was not checked yet.
     """
 
     def __init__(self, feedback: FeedbackPipe, timeout: float, strikes: int, action: str, where: str = ""):
         self.feedback = feedback
-        self._action = action
         self.where = where
-        self.timed_out = False
-        self.timeouts = 0
-        self.doubt = ""
+        self.state = WAITING
         self.timeout = timeout
+        self.timeouts = 0
+        self.unsettled = ""
+        self._action = action
         self._strikes = strikes
         self._count = 0
         self._change = NewestChange()
-        self._is_wrong = False
-        self._young = False  # whether a message came in time since the start
         self._handovers = feedback.handovers
-        self._handed_over = False
-        feedback.be_patient(timeout, strikes)
+        feedback.set_timeout(timeout, strikes)
 
     @classmethod
     def from_record(cls, feedback: FeedbackPipe, record: FeedbackRecord, rate: float) -> "FeedbackTimeout":
@@ -106,6 +146,16 @@ class FeedbackTimeout:
             action=record.timeout_action,
             where=record.where("source"),
         )
+
+    @property
+    def timed_out(self) -> bool:
+        """Whether no message that counts has come for too long."""
+        return self.state in TIMED_OUT
+
+    @property
+    def action(self) -> str:
+        """What the plugin does at a timeout: one of TIMEOUT_ACTIONS."""
+        return "hold" if self.state is DISPUTED and self._action == "keep" else self._action
 
     def read(self, now: float, distance: float = 0.0) -> bool:
         """Read the newest message at the time `now` [s]; return whether nothing is missing or late.
@@ -119,37 +169,41 @@ class FeedbackTimeout:
         feedback = self.feedback
         status = feedback.run()
         age = now - feedback.arrival
-        self._is_wrong = age > CONTRADICTION_PATIENCE and feedback.complaints.contradicts
-        late = age > self.timeout or self._is_wrong
         change = self._change
         if feedback.changed != change.arrival:
             change.arrival = feedback.changed
             change.stamp = feedback.stamp
             change.distance = distance
-        # in a simulation that pauses the stamps stay, too
-        stays = change.arrival < math.inf and feedback.stamp - change.stamp > FEEDBACK_FREEZE_TIME
-        frozen = stays and distance - change.distance > ENCODER_STEPS and feedback.measures
-        late = late or frozen
-        self._handed_over = handed_over = feedback.handovers != self._handovers
-        if handed_over:  # another publisher measures another start
+        observed = None
+        if feedback.handovers != self._handovers:  # another publisher measures another start
             self._handovers = feedback.handovers
             self.restart()
-            return False
-        if status is NEW and not late:
+            observed = REPLACED
+        elif age > CONTRADICTION_PATIENCE and feedback.warnings.contradicts:
+            observed = DISPUTED
+        elif age > self.timeout:
+            observed = SILENT
+        elif (
+            change.arrival < math.inf
+            and feedback.stamp - change.stamp > FEEDBACK_FREEZE_TIME  # while a simulation pauses, the stamps stay, too
+            and distance - change.distance > ENCODER_STEPS
+            and feedback.measures
+        ):
+            observed = FROZEN
+        elif status is NEW:
+            observed = LIVE
             self._count = 0
-            self._young = True
-            if self.timed_out:
-                self._recover()
-        elif late:
+        if observed in TIMED_OUT:
             self._count += 1
-            if self._count == self._strikes:
-                self._time_out(now, frozen)
-        return not self.timed_out and ((feedback.received and self._young) or not feedback.required)
-
-    @property
-    def action(self) -> str:
-        """What the plugin does at a timeout: one of TIMEOUT_ACTIONS."""
-        return "hold" if self._is_wrong and self._action == "keep" else self._action
+            if self._count < self._strikes:
+                observed = None
+        state = self.state
+        if observed is not state and (observed is not None or state is REPLACED):
+            self.state = next_state(state, observed)
+            self._log_change(state, now)
+        if self.state is LIVE:
+            return feedback.received or not feedback.required
+        return self.state is WAITING and not feedback.required
 
     def missed(self, running: bool) -> bool:
         """Whether a timeout keeps a plugin that is `running` or not from its work.
@@ -160,18 +214,17 @@ class FeedbackTimeout:
 
     def serves(self, running: bool) -> bool:
         """Return whether a plugin that is `running` or not can work with what was read."""
-        feedback = self.feedback
-        if self._handed_over or self.missed(running):
+        if self.state is REPLACED or self.missed(running):
             return False
-        received = feedback.received and (self._young or self.action == "keep")  # nothing starts with an old message
-        return received or not feedback.required
+        feedback = self.feedback
+        # nothing starts with an old message
+        return not feedback.required or (feedback.received and (self.state is LIVE or self.action == "keep"))
 
     def restart(self) -> None:
         """Begin again: discard all that was received so far."""
         self.feedback.restart()
+        self.state = WAITING
         self._count = 0
-        self.timed_out = False
-        self._young = False
 
     @property
     def lacks(self) -> str:
@@ -183,10 +236,10 @@ class FeedbackTimeout:
     def refusal(self, now: float) -> str:
         """Return why messages were refused, or odd, lately, before the time `now` [s]; empty: none was."""
         place = self.feedback.place
-        complaints = self.feedback.complaints
-        if complaints.refusal and now - complaints.refused_at < RECENT:
-            return f"{place} refuses messages of {complaints.refusal}"
-        return f"{place}: {complaints.remark}" if now - complaints.remarked_at < RECENT else ""
+        warnings = self.feedback.warnings
+        if warnings.refusal and now - warnings.refused_at < RECENT:
+            return f"{place} refuses messages of {warnings.refusal}"
+        return f"{place}: {warnings.remark}" if now - warnings.remarked_at < RECENT else ""
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
@@ -209,22 +262,29 @@ class FeedbackTimeout:
     def report(self, now: float) -> HealthReport:
         """Return the health of the pipe at the time `now` [s]; it only reads, for threads beside the loop."""
         feedback = self.feedback
-        complaint = self.refusal(now) or self.doubt
+        warning = self.refusal(now) or self.unsettled
         if self.timed_out:
             level = Health.WARNING if self.action == "keep" else Health.ERROR
             summary = f"nothing new on {feedback.reader.topic}: {TIMEOUT_ACTIONS[self.action]}"
         elif feedback.required and not feedback.received:
             level = Health.WARNING
-            summary = complaint or f"nothing received on {feedback.reader.topic} yet"
+            summary = warning or f"nothing received on {feedback.reader.topic} yet"
         else:
-            level = Health.WARNING if complaint else Health.GOOD
-            summary = complaint or ("received" if feedback.received else "not received yet")
+            level = Health.WARNING if warning else Health.GOOD
+            summary = warning or ("received" if feedback.received else "not received yet")
         return HealthReport(level, summary, self.figures(now))
 
-    def _time_out(self, now: float, frozen: bool) -> None:
-        self.timed_out = True
-        self.timeouts = self.timeouts + 1
+    def _log_change(self, before: FeedbackState, now: float) -> None:
+        """Log that the feedback has timed out, or is back."""
         feedback = self.feedback
+        if before in TIMED_OUT:
+            if self.state is LIVE:
+                logger.info("feedback '%s' (%s) is back", feedback.name, feedback.reader.topic)
+            return
+        if self.state not in TIMED_OUT:
+            return
+        self.timeouts += 1
+        frozen = self.state is FROZEN
         silent = f" of {feedback.silent}" if feedback.silent else ""
         logger.warning(
             "feedback '%s' (%s): %s for %.3f s: %s",
@@ -235,38 +295,34 @@ class FeedbackTimeout:
             TIMEOUT_ACTIONS[self.action],
         )
 
-    def _recover(self) -> None:
-        self.timed_out = False
-        logger.info("feedback '%s' (%s) is back", self.feedback.name, self.feedback.reader.topic)
-
 
 class FeedbackTimeouts:
     """All feedbacks of a plugin, in the order of the configuration.
 
     Args:
-        watches: One for each feedback.
+        timeouts: One for each feedback.
 
     Attributes:
         feedbacks: The feedbacks.
         complete: Whether nothing was missing or late when they were read last.
     """
 
-    def __init__(self, watches: Sequence[FeedbackTimeout]):
-        self._feedback_timeouts = tuple(watches)
-        self.feedbacks = tuple(watch.feedback for watch in watches)
+    def __init__(self, timeouts: Sequence[FeedbackTimeout]):
+        self._timeouts = tuple(timeouts)
+        self.feedbacks = tuple(each.feedback for each in timeouts)
         self.complete = False
 
     def read(self, now: float, distance: float = 0.0) -> None:
         """Read the newest messages, each pipe into its State or the component's input; see `FeedbackTimeout.read`."""
         complete = True
-        for watch in self._feedback_timeouts:
-            if not watch.read(now, distance):
+        for each in self._timeouts:
+            if not each.read(now, distance):
                 complete = False
         self.complete = complete
 
     def serve(self, running: bool) -> bool:
         """Return whether a plugin that is `running` or not can work with what was read, and has been received."""
-        return self.complete or all(watch.serves(running) for watch in self._feedback_timeouts)
+        return self.complete or all(each.serves(running) for each in self._timeouts)
 
     def begins(self, now: float) -> bool:
         """Return whether a plugin may start at the time `now` [s] with what was read.
@@ -275,57 +331,53 @@ class FeedbackTimeouts:
             OutOfLimits: It would start with a joint outside of its limits.
         """
         ready = self.serve(False)
-        for watch in self._feedback_timeouts:
-            watch.doubt = watch.feedback.doubt(now) if ready else ""
-        if not ready or any(watch.doubt for watch in self._feedback_timeouts):
+        for each in self._timeouts:
+            each.unsettled = each.feedback.unsettled(now) if ready else ""
+        if not ready or any(each.unsettled for each in self._timeouts):
             return False
-        for watch in self._feedback_timeouts:
-            watch.feedback.check_start()
+        for each in self._timeouts:
+            each.feedback.check_start()
         return True
 
     @property
-    def patience(self) -> float:
+    def shortest_timeout(self) -> float:
         """Shortest timeout of a feedback [s]."""
-        return min((watch.timeout for watch in self._feedback_timeouts), default=math.inf)
+        return min((each.timeout for each in self._timeouts), default=math.inf)
 
     def restart(self) -> None:
         """Begin again: discard all that was received so far."""
-        for watch in self._feedback_timeouts:
-            watch.restart()
+        for each in self._timeouts:
+            each.restart()
 
     def lacks(self, running: bool) -> str:
         """Return the feedbacks that a plugin, which is `running` or not, waits for; empty: there is none."""
         return ", ".join(
-            watch.doubt or watch.lacks
-            for watch in self._feedback_timeouts
-            if watch.doubt or watch.missed(running) or (watch.feedback.required and not watch.feedback.received)
+            each.unsettled or each.lacks
+            for each in self._timeouts
+            if each.unsettled or each.missed(running) or (each.feedback.required and not each.feedback.received)
         )
 
     def action(self) -> str:
         """Return the gravest action of the feedbacks that have timed out; `keep` if there is none."""
-        return max(
-            (watch.action for watch in self._feedback_timeouts if watch.timed_out), key=SEVERITY.index, default="keep"
-        )
+        return max((each.action for each in self._timeouts if each.timed_out), key=SEVERITY.index, default="keep")
 
-    def rivalries(self, now: float) -> str:
+    def conflicts(self, now: float) -> str:
         """Return feedbacks with several publishers at the time `now` [s], and their names; empty: there is none."""
-        return ", ".join(filter(None, (watch.feedback.rivalry(now) for watch in self._feedback_timeouts)))
+        return ", ".join(filter(None, (each.feedback.conflict(now) for each in self._timeouts)))
 
     def refusals(self, now: float) -> str:
         """Return feedbacks that refused messages lately, before the time `now` [s], and why; empty: there is none."""
-        return ", ".join(filter(None, [watch.refusal(now) for watch in self._feedback_timeouts]))
+        return ", ".join(filter(None, [each.refusal(now) for each in self._timeouts]))
 
     def kept(self) -> str:
         """Return feedbacks that have timed out, but keep their last message; empty: there is none."""
-        return ", ".join(
-            watch.feedback.lacks for watch in self._feedback_timeouts if watch.timed_out and watch.action == "keep"
-        )
+        return ", ".join(each.feedback.lacks for each in self._timeouts if each.timed_out and each.action == "keep")
 
     def reports(self, now: float) -> Iterator[tuple[str, HealthReport]]:
         """Yield the name and the health of each feedback at the time `now` [s]."""
-        for watch in self._feedback_timeouts:
-            yield watch.feedback.name, watch.report(now)
+        for each in self._timeouts:
+            yield each.feedback.name, each.report(now)
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
-        return {key: value for watch in self._feedback_timeouts for key, value in watch.figures(now).items()}
+        return {key: value for each in self._timeouts for key, value in each.figures(now).items()}

@@ -72,7 +72,7 @@ class JointClaim:
         self.is_taken = False
         self.refused = 0
         self.note: Callable[[str, str], None] = lambda kind, text: None
-        self._complaint = ""
+        self._warning = ""
         self._throttle = Throttle(logger)
 
     def granted(self) -> bool:
@@ -106,7 +106,7 @@ class JointClaim:
     def lost(self) -> bool:
         """Return whether the lower level refuses our commands because the claim has ended; see `reason`.
 
-        A command that is refused because it is wrong is logged, and returned by `complaint`.
+        A command that is refused because it is wrong is logged, and returned by `warning`.
         """
         if self._refusals.waits:
             before = self.reason
@@ -125,11 +125,11 @@ class JointClaim:
                     self.restarted = True
         return self.restarted
 
-    def complaint(self) -> str:
+    def warning(self) -> str:
         """Return what was wrong with commands since the last call; empty: nothing."""
-        complaint = self._complaint
-        self._complaint = ""
-        return complaint
+        warning = self._warning
+        self._warning = ""
+        return warning
 
     @property
     def released(self) -> bool:
@@ -170,8 +170,8 @@ class JointClaim:
                 self.reason = self.reason if self.restarted else reason
                 self.is_taken = True
             else:
-                self._complaint = f"the lower level refuses a command: {reason}"
-                self._throttle.warning("complaint", "%s: %s", self._requests.plugin, self._complaint)
+                self._warning = f"the lower level refuses a command: {reason}"
+                self._throttle.warning("command", "%s: %s", self._requests.plugin, self._warning)
 
 
 def _bare(topic: str) -> str:

@@ -17,10 +17,9 @@ from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.overload import Overload
 from solfer.plugins.peers import Peers
-from solfer.plugins.readiness import Readiness
+from solfer.plugins.readiness import FORGET, HOLD, WORK, CycleVerdict, Readiness
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.robot_time import RobotTime
-from solfer.plugins.start_conditions import FORGET, HOLD, WORK, CycleVerdict
 from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET
@@ -56,7 +55,7 @@ class PluginParts:
         middleware: The clock of the pipes.
         claim: Its claim on the joints that it commands; None: it commands none.
         peers: Supervises the other ends of its pipes; None: they are not supervised.
-        stall: Lateness of its own loop at which it begins again [s]; see `StartConditions`.
+        stall: Lateness of its own loop at which it begins again [s]; see `Readiness`.
         limits: When its loop is overloaded; None: the defaults.
         jumps: Finds jumps of the base; None: its component has no references in the world.
         guard: Keeps what the component does to its Robot, if it fails, away from others; None: it is not shared.
@@ -185,7 +184,7 @@ class Plugin:
         if life is STOPPED or life is CLOSED:
             return
         self._readiness.feedbacks.read(now, self.outputs.joints.distance)
-        verdict = self._readiness.judge(now, life is RUNNING)
+        verdict = self._readiness.decide(now, life is RUNNING)
         times[READ] = -mark + (mark := clock())
         if verdict is not WORK:
             self._obey(verdict, now)

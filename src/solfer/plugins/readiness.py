@@ -1,80 +1,137 @@
 """Whether a plugin has what it needs to work: its feedbacks, its joints, and a loop that goes on."""
 
+import enum
 import logging
+import math
 from collections.abc import Callable, Iterator, Sequence
 
+from solfer.errors import MiddlewareError, ReceiveTimeout
 from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
-from solfer.plugins.start_conditions import WORK, CycleVerdict, StartConditions
 from solfer.transport import Middleware
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
+FIRST_MESSAGES_PATIENCE = 60.0
+"""Longest wait for the first messages of all required feedbacks [s]."""
+
+RESTART_SETTLING_TIME = 0.1
+"""Time after a simulation began again until received messages are certain to be new [s]."""
+
+STALL = 0.2
+"""Default of the lateness of a plugin's own loop at which it starts again [s]. After less a component goes on, by the
+time that has passed; meanwhile the lower level carries out its last commands, for its lease on the joints is longer."""
+
+STALL_PERIODS = 5
+"""The same in periods of the plugin; the longer one counts."""
+
+
+class CycleVerdict(enum.Enum):
+    """What a plugin has to do in this cycle.
+
+    WORK: run the component. HOLD: bring the joints to rest, give them back, then wait. WAIT: do nothing. FORGET:
+    discard all that was received, and wait; send no last command either, since the robot is in another state than a
+    moment ago.
+    """
+
+    WORK = enum.auto()
+    HOLD = enum.auto()
+    WAIT = enum.auto()
+    FORGET = enum.auto()
+
+
+# module globals: the lookup in the control cycle is several times as fast as on the class
+WORK, HOLD, WAIT, FORGET = CycleVerdict
+
 
 class Readiness:
-    """Feedbacks and joints of a plugin: judges once a cycle whether it may work with them, and gives the joints back.
+    """Decides once a cycle whether a plugin may work with its feedbacks and joints, and gives the joints back.
 
     Args:
         plugin: Name of the plugin, for messages.
-        watches: Its feedbacks, each with its timeout.
+        timeouts: Its feedbacks, each with its timeout.
         claim: Its claim on the joints that it commands; None: it commands none.
         middleware: The clock of the pipes.
         period: Time of a control cycle [s].
-        stall: See `StartConditions`.
+        stall: Lateness of its loop at which it begins again [s]; None: STALL or STALL_PERIODS, whichever is longer. It
+            is capped at the shortest timeout of a feedback, after which other plugins would hold, too.
 
     Attributes:
         feedbacks: Its feedbacks with their timeouts.
         taken: Called in each cycle while others have the joints.
-        stall: See `StartConditions.stall`.
+        lacks: What the plugin waits for.
     """
 
     def __init__(
         self,
         plugin: str,
-        watches: Sequence[FeedbackTimeout],
+        timeouts: Sequence[FeedbackTimeout],
         claim: JointClaim | None,
         middleware: Middleware,
         period: float,
         *,
         stall: float | None = None,
     ):
-        self.feedbacks = FeedbackTimeouts(watches)
+        self.feedbacks = FeedbackTimeouts(timeouts)
         self.taken: Callable[[], None] = lambda: None
         self._plugin = plugin
         self._claim = claim
-        self._conditions = StartConditions(plugin, self.feedbacks, middleware, claim=claim, period=period, stall=stall)
-        self.stall = self._conditions.stall
+        self._middleware = middleware
+        self._rewinds = middleware.rewinds
+        self._longest = period + min(stall or max(STALL, STALL_PERIODS * period), self.feedbacks.shortest_timeout)
+        self._past = ""
         self._logged = ""
-
-    @property
-    def lacks(self) -> str:
-        """What the plugin waits for."""
-        return self._conditions.lacks
+        self._earliest = -math.inf
+        self._latest: float | None = None
+        self._newest = math.inf
+        self.lacks = self._missing()
+        self._level = logging.DEBUG
 
     @property
     def released(self) -> bool:
         """Whether the joints were released, and the lower level has confirmed it."""
         return self._claim is None or self._claim.released
 
-    def judge(self, now: float, running: bool) -> CycleVerdict:
-        """Judge what to do in this cycle, whose messages were read `now` [s]; claim the joints when all is there."""
-        verdict = self._conditions.judge(now, running)
+    def stall(self, now: float) -> float:
+        """Measure how long the loop stood still before this cycle, which begins `now` [s]; 0: it did not [s]."""
+        gap = now - self._newest
+        self._newest = now
+        if gap <= self._longest:
+            return 0.0
+        self._past = f"after its own loop stood still for {gap:.3f} s"
+        return gap
+
+    def decide(self, now: float, running: bool) -> CycleVerdict:
+        """Decide by the messages that were read `now` [s] what a plugin that is `running` or not does in this cycle.
+
+        Claims the joints when all feedbacks are there.
+
+        Raises:
+            ReceiveTimeout: A required feedback did not arrive in time.
+            OutOfLimits: The plugin would start with a joint outside of its limits.
+            MiddlewareError: A feedback with `on_timeout: stop` timed out.
+            ClaimRefused: Another plugin commands a joint of this one.
+        """
+        verdict = self._decide_by_feedbacks(now, running)
         claim = self._claim
-        if claim is not None and not running and claim.restarts():
-            return self._conditions.judge_claim(claim, running)
-        if verdict is not WORK or claim is None:
+        if claim is None:
+            return verdict
+        if not running and claim.restarts():
+            return self._wait_for_joints(claim, running)
+        if verdict is not WORK:
             return verdict
         ours = not claim.lost() if running else claim.granted()
         if claim.is_taken:
             self.taken()
-        return verdict if ours else self._conditions.judge_claim(claim, running)
+        return verdict if ours else self._wait_for_joints(claim, running)
 
     def start(self) -> None:
-        """Mark the plugin as running."""
+        """Mark the plugin as running: later waits are unlimited, and the duration of its start is not a stall."""
         self._logged = ""
-        self._conditions.started()
+        self._latest = math.inf
+        self._newest = self._middleware.now()
 
     def give_back(self) -> None:
         """Release or lapse the claim, or damp, after the joints were brought to rest."""
@@ -94,34 +151,99 @@ class Readiness:
             self._claim.release()
 
     def forget(self, now: float) -> None:
-        """Discard all that was received before `now` [s], and the claim."""
+        """Discard all that was received before `now` [s], and the claim: what comes soon may be old, too."""
         self.feedbacks.restart()
         if self._claim is not None:
             self._claim.lapse()
-        self._conditions.forgotten(now)
+        self._earliest = now + RESTART_SETTLING_TIME
+        self.lacks = f"{self._missing()}, {self._past}"
+        self._level = logging.WARNING
 
     def restart(self) -> None:
         """Begin again, as before the first cycle."""
         self.feedbacks.restart()
-        self._conditions.restart()
+        self._latest = None
+        self._newest = math.inf
+        self.lacks = self._missing()
+        self._level = logging.DEBUG
 
     def log_wait(self) -> bool:
         """Log what the plugin waits for, if that has changed; return whether it has."""
-        lacks = self._conditions.lacks
-        if lacks == self._logged:
+        if self.lacks == self._logged:
             return False
-        self._logged = lacks
-        logger.log(self._conditions.level, "%s holds and waits %s", self._plugin, lacks)
+        self._logged = self.lacks
+        logger.log(self._level, "%s holds and waits %s", self._plugin, self.lacks)
         return True
 
     def health(self, running: bool) -> tuple[Health, str]:
-        """See `StartConditions.health`."""
-        return self._conditions.health(running)
+        """Return the health since the last call, and one sentence; empty if good."""
+        claim = self._claim
+        if not running:
+            refused = claim is not None and claim.reason
+            return Health.ERROR if refused else Health.WARNING, f"holds and waits {self.lacks}"
+        warning = claim.warning() if claim is not None else ""
+        kept = self.feedbacks.kept()
+        if kept and not warning:
+            warning = f"goes on with the last message of feedback {kept}"
+        now = self._middleware.now()
+        suspect = self.feedbacks.conflicts(now) or self.feedbacks.refusals(now)
+        if suspect and not warning:
+            warning = f"feedback {suspect}"
+        return (Health.WARNING, warning) if warning else (Health.GOOD, "")
 
     def figures(self) -> dict[str, float | str]:
-        """See `StartConditions.figures`."""
-        return self._conditions.figures()
+        """Return figures for health reports."""
+        refused = {} if self._claim is None else {"refused by the lower level": self._claim.refused}
+        return {**self.feedbacks.figures(self._middleware.now()), **refused}
 
     def reports(self) -> Iterator[tuple[str, HealthReport]]:
-        """See `StartConditions.reports`."""
-        return self._conditions.reports()
+        """Yield the name and the health of each feedback."""
+        return self.feedbacks.reports(self._middleware.now())
+
+    def _decide_by_feedbacks(self, now: float, running: bool) -> CycleVerdict:
+        # after the messages: a simulator publishes that the time went back before it publishes the new state
+        if self._middleware.rewinds != self._rewinds:
+            self._rewinds = self._middleware.rewinds
+            self._past = "after the simulated time went back"
+            return FORGET
+        feedbacks = self.feedbacks
+        if now < self._earliest:
+            feedbacks.restart()  # what is compared with an old measurement would be refused
+            return WAIT
+        ready = (feedbacks.complete or feedbacks.serve(True)) if running else feedbacks.begins(now)
+        return WORK if ready else self._miss(now, running)
+
+    def _wait_for_joints(self, claim: JointClaim, running: bool) -> CycleVerdict:
+        """Decide what a plugin does whose joints are not its own at present."""
+        if claim.restarted:
+            self._past = f"after {claim.reason}"
+            return FORGET
+        self.lacks = f"for its joints: {claim.reason or 'not answered yet'}"
+        self._level = logging.ERROR if claim.reason else logging.DEBUG
+        return HOLD if running else WAIT
+
+    def _miss(self, now: float, running: bool) -> CycleVerdict:
+        """Decide what a plugin does that misses a feedback."""
+        feedbacks = self.feedbacks
+        conflicts = feedbacks.conflicts(now)
+        self.lacks = self._missing(running)
+        self._level = logging.WARNING if running or conflicts else logging.INFO
+        if running:
+            if feedbacks.action() == "stop":
+                raise MiddlewareError(
+                    f"nothing new {self.lacks}, and its 'on_timeout' is 'stop'",
+                    expected="a publisher that goes on, or `on_timeout: hold`",
+                )
+            return HOLD
+        if self._latest is None:
+            self._latest = now + FIRST_MESSAGES_PATIENCE
+        elif now > self._latest and not conflicts:
+            raise ReceiveTimeout(
+                f"plugin '{self._plugin}' has waited {FIRST_MESSAGES_PATIENCE:g} s {self.lacks}",
+                expected="a publisher; `initialize: false`, or `open_loop: true` of joints that are not measured",
+            )
+        return WAIT
+
+    def _missing(self, running: bool = False) -> str:
+        lacks = self.feedbacks.lacks(running)
+        return f"for feedback {lacks}" if lacks else "for its first cycle"

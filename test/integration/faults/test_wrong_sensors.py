@@ -11,7 +11,7 @@ from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
 
 from solfer.middleware.memory import Bus
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
-from solfer.pipes.complaints import NAMING_DELAY
+from solfer.pipes.pipe_warnings import NAMING_DELAY
 from solfer.transport.messages import ImuMessage, copied
 
 NAMED = {

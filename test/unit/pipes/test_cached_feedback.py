@@ -25,10 +25,10 @@ def make_pipe(robot, **changes):
 
 def test_patience_is_that_of_the_source(monkeypatch):
     told, pipe = [], make_pipe(make_robot())
-    monkeypatch.setattr(pipe, "be_patient", lambda *patience: told.append(patience))
+    monkeypatch.setattr(pipe, "set_timeout", lambda *patience: told.append(patience))
     source = CachedFeedback(pipe, CycleCount())
     for patience in ((0.7, 9), (0.5, 10)):  # the most patient plugin counts
-        source.share(record()).be_patient(*patience)
+        source.share(record()).set_timeout(*patience)
     assert told == [(0.7, 9), (0.7, 10)]
 
 

@@ -11,8 +11,8 @@ from solfer.config.records.pipes import DofsRecord
 from solfer.errors import ConfigError, PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.pipes.complaints import NAMING_DELAY
 from solfer.pipes.dofs import select
+from solfer.pipes.pipe_warnings import NAMING_DELAY
 from solfer.transport import JointMessage, MessageStatus
 
 

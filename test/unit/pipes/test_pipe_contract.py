@@ -250,7 +250,7 @@ def test_the_first_of_two_measurements_counts(wire, case, logged):
         wire.say("second", topic, case.kind, case.message(numbers(case, seed)))
         wire.until(lambda ignored=ignored: end.pipe.run() is not MessageStatus.NEW and end.pipe.ignored > ignored)
         assert_allclose(end.numbers, first, atol=1e-12)
-    published = end.pipe.rivalry(wire.middleware.now())
+    published = end.pipe.conflict(wire.middleware.now())
     assert all(part in published for part in ("'pipe'", topic, "second", "first", "end one of them")), published
     assert any("second were ignored" in line for line in logged), logged
     wire.say("first", topic, case.kind, case.message(numbers(case, 20)))
@@ -271,7 +271,7 @@ def test_of_two_measurements_the_firsts_newest_is_kept(wire, case):
 @pytest.mark.parametrize("case", MEASURED.values(), ids=MEASURED)
 def test_the_second_takes_over_after_a_timeout(wire, case):
     topic, end, _ = start(wire, case)
-    end.pipe.be_patient(0.2, 3)
+    end.pipe.set_timeout(0.2, 3)
     wire.kill("first")
 
     def goes_over():

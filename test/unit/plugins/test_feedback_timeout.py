@@ -319,7 +319,7 @@ class Frozen:
     def run(self):
         return MessageStatus.NEW
 
-    def be_patient(self, timeout, strikes):
+    def set_timeout(self, timeout, strikes):
         pass
 
 

@@ -191,7 +191,7 @@ def test_a_wrong_command_is_a_complaint(caplog):
     refusals.write(RefusalMessage(("cart",), (False,), ("beyond its limit",)))
     assert not claim.lost() and claim.refused == 1
     complaint = "the lower level refuses a command: beyond its limit"
-    assert claim.complaint() == complaint and claim.complaint() == ""
+    assert claim.warning() == complaint and claim.warning() == ""
     assert caplog.messages == [f"cart: {complaint}"]
 
 

@@ -126,7 +126,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
                 reading.values, reading.own_axes, self.reader.arrival, self._stamp, force=reading.force
             )
             if oddity:
-                self.complaints.mention("force", oddity)
+                self.warnings.warn("force", oddity)
         self._mount.update()
         if reading.own_axes:
             options |= self._own_axes
@@ -155,7 +155,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
 
     def _warn(self, tilt: float) -> None:
         if abs(tilt) > STEEP:
-            self.complaints.throttle.warning(
+            self.warnings.throttle.warning(
                 "steep",
                 "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
                 "are not unique, and its rates are not to be trusted",

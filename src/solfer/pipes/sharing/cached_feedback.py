@@ -62,11 +62,11 @@ class CachedFeedback:
         if not any(share.received and share.turn >= recent for share in self._shares):
             self.pipe.restart()
 
-    def be_patient(self, timeout: float, strikes: int) -> None:
-        """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
+    def set_timeout(self, timeout: float, strikes: int) -> None:
+        """See `FeedbackPipe.set_timeout`; the most patient plugin counts."""
         self._timeout = max(self._timeout, timeout)
         self._strikes = max(self._strikes, strikes)
-        self.pipe.be_patient(self._timeout, self._strikes)
+        self.pipe.set_timeout(self._timeout, self._strikes)
 
 
 class CachedFeedbackPipe(FeedbackPipe):
@@ -88,7 +88,7 @@ class CachedFeedbackPipe(FeedbackPipe):
         self.source = source
         self.turn = -1
         self._pipe = pipe
-        self.complaints = pipe.complaints
+        self.warnings = pipe.warnings
         self._seen = 0
         self._turns = source.turns
         self._not_received: np.ndarray | None = None
@@ -100,17 +100,17 @@ class CachedFeedbackPipe(FeedbackPipe):
     dropped = property(attrgetter("_pipe.dropped"))
     lacks = property(attrgetter("_pipe.lacks"))
 
-    def rivalry(self, now: float) -> str:
-        """See `FeedbackPipe.rivalry`."""
-        return self._pipe.rivalry(now)
+    def conflict(self, now: float) -> str:
+        """See `FeedbackPipe.conflict`."""
+        return self._pipe.conflict(now)
 
-    def doubt(self, now: float) -> str:
-        """See `FeedbackPipe.doubt`."""
-        return self._pipe.doubt(now)
+    def unsettled(self, now: float) -> str:
+        """See `FeedbackPipe.unsettled`."""
+        return self._pipe.unsettled(now)
 
-    def be_patient(self, timeout: float, strikes: int) -> None:
-        """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
-        self.source.be_patient(timeout, strikes)
+    def set_timeout(self, timeout: float, strikes: int) -> None:
+        """See `FeedbackPipe.set_timeout`; the most patient plugin counts."""
+        self.source.set_timeout(timeout, strikes)
 
     def watched(self, dofs: np.ndarray, watch: Watch | None) -> Watch | None:
         """See `FeedbackPipe.watched`."""

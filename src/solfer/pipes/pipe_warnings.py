@@ -12,7 +12,7 @@ NAMING_DELAY = 0.2
 their velocities again after an impact: a contradiction that is still there then is one of a sensor [s]."""
 
 
-class PipeComplaints:
+class PipeWarnings:
     """Counts refused messages and logs why, once a second for each sender.
 
     What contradicts earlier measurements is logged `NAMING_DELAY` later, unless the pipe restarts meanwhile, or it was
@@ -30,7 +30,7 @@ class PipeComplaints:
         refused_at: When the newest message was refused, in the pipe's own clock [s].
         is_open: Whether no message was accepted since.
         contradicts: Whether the newest message was refused since it contradicts other measurements.
-        doubt: Sender, error and arrival of a contradiction that is not logged yet; None: there is none.
+        pending: Sender, error and arrival of a contradiction that is not logged yet; None: there is none.
         remark: What was odd with a message that counts; empty: nothing yet.
         remarked_at: When that message arrived, in the pipe's own clock [s].
     """
@@ -44,12 +44,12 @@ class PipeComplaints:
         self.remark = ""
         self.refused_at = self.remarked_at = -math.inf
         self.is_open = self.contradicts = self._is_named = False
-        self.doubt: tuple[str, Contradiction, float] | None = None
+        self.pending: tuple[str, Contradiction, float] | None = None
 
     @property
     def lasting(self) -> str:
         """Return why messages are refused at present; empty: they are not, or for a moment."""
-        return self.refusal if self.is_open and self.doubt is None else ""
+        return self.refusal if self.is_open and self.pending is None else ""
 
     def note(self, error: SolferError) -> str:
         """Note why the message that was read last is refused; return its sender."""
@@ -67,29 +67,29 @@ class PipeComplaints:
         self.contradicts = isinstance(error, Contradiction)
         if not isinstance(error, Contradiction) or self._is_named:
             self._log(sender, error)
-        elif self.doubt is None:
-            self.doubt = sender, error, self.refused_at
+        elif self.pending is None:
+            self.pending = sender, error, self.refused_at
 
-    def look(self) -> None:
+    def log_pending(self) -> None:
         """Log a contradiction that is still there."""
-        if self.doubt is not None and self._reader.arrival >= self.doubt[2] + NAMING_DELAY:
-            self._log(*self.doubt[:2])
-            self.doubt = None
+        if self.pending is not None and self._reader.arrival >= self.pending[2] + NAMING_DELAY:
+            self._log(*self.pending[:2])
+            self.pending = None
             self.is_open = self._is_named = True
 
     def close(self) -> None:
         """Note that a message was accepted."""
         self.is_open = self.contradicts = self._is_named = False
-        if self.doubt is not None and self.doubt[1].fleeting:
-            self.doubt = None
+        if self.pending is not None and self.pending[1].fleeting:
+            self.pending = None
 
     def restart(self) -> None:
         """Forget a contradiction that is not logged yet."""
-        if self.doubt is not None:
-            self.doubt = None
+        if self.pending is not None:
+            self.pending = None
             self.is_open = False
 
-    def mention(self, key: str, remark: str) -> None:
+    def warn(self, key: str, remark: str) -> None:
         """Note what is odd with the message that was read last; it is logged once a second for each `key`."""
         self.remark = remark
         self.remarked_at = self._reader.arrival
