@@ -104,7 +104,7 @@ def circles_in_the_model() -> Iterator[Figure]:
     center, errors, shifts = robot.kinematics.center_of_mass.copy(), [], []
     for cycle in range(round(TURN / PERIOD)):
         for name, start in starts.items():
-            port = component.targets[name].port
+            port = component.references.targets[name].port
             port.value[:], port.fresh = circle(start, cycle * PERIOD), True
         component.update()
         component.send()
@@ -136,12 +136,12 @@ def circles_in_simulation(wrong: int | None = None) -> Iterator[Figure]:
         bus.every(PERIOD, plugin.cycle)
         bus.run_until(3.0)
         robot, component = plugin.robot, plugin.component
-        starts = {hand: component.targets[hand].task.point.value.copy() for hand in HANDS}
+        starts = {hand: component.references.targets[hand].task.point.value.copy() for hand in HANDS}
         robot.kinematics.update(robot.state.position)
         center, errors, shifts = robot.kinematics.center_of_mass.copy(), [], []
         for cycle in range(round(TURN / PERIOD)):
             for hand, start in starts.items():
-                component.targets[hand].want(circle(start, cycle * PERIOD), stream=True)
+                component.references.targets[hand].request(circle(start, cycle * PERIOD), stream=True)
             bus.run_until(bus.time + PERIOD)
             robot.kinematics.update(robot.state.position)
             for hand, link in HANDS.items():
@@ -170,7 +170,7 @@ def out_of_reach(seed: int, directions: int) -> Iterator[Figure]:
         for hand in hands:
             way, shoulder = rng.normal(size=3), HANDS[hand].replace("7", "2")
             center = robot.kinematics.position(shoulder) - robot.kinematics.position("pelvis")
-            component.targets[hand].want(center + (1.0 + 0.8) * way / np.linalg.norm(way))
+            component.references.targets[hand].request(center + (1.0 + 0.8) * way / np.linalg.norm(way))
         last, places = robot.command.position.copy(), []
         for cycle in range(round(4.0 / PERIOD)):
             component.update()
@@ -203,7 +203,7 @@ def anywhere(seed: int, targets: int) -> Iterator[Figure]:
         if target % 20 == 0:
             print(f"target {target}", file=sys.stderr, flush=True)
         for name, side in (("left", 0.2), ("right", -0.2)):
-            component.targets[name].want((0.3, side, 0.2) + rng.uniform(-1.0, 1.0, 3))
+            component.references.targets[name].request((0.3, side, 0.2) + rng.uniform(-1.0, 1.0, 3))
         for _ in range(round(3.0 / PERIOD)):
             component.update()
             component.send()
@@ -240,14 +240,14 @@ def cycle_of_the_component(calls: int) -> Iterator[Figure]:
     """Measure a whole cycle of the component with centre of mass and two hands, in u; no goal is set for it."""
     robot = standing(Robot.load(URDF, SRDF, contacts=CONTACTS))
     component, time = component_of(robot, "inverse_kinematics"), 0.0
-    starts = {name: component.targets[name].task.point.value.copy() for name in HANDS}
+    starts = {name: component.references.targets[name].task.point.value.copy() for name in HANDS}
 
     def move() -> None:
         nonlocal time
         time += PERIOD
         robot.state.position[:] = robot.command.position
         for name, start in starts.items():
-            port = component.targets[name].port
+            port = component.references.targets[name].port
             port.value[:], port.fresh = circle(start, time), True
 
     def cycle() -> None:

@@ -197,7 +197,7 @@ def lift(world):
 
 def stretch(world):
     """Let the centre of mass rise higher than the legs reach."""
-    world.squatting.component.set_reference(SetReference("com", (0.0, 0.0, 0.3), relative=True))
+    world.squatting.component.references.interface.set_reference(SetReference("com", (0.0, 0.0, 0.3), relative=True))
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,12 @@ def numbers_of(component):
             tasks = [np.delete(task.numbers, 3, axis=1) for level in component._stack.levels for task in level]
             tasks += [damping for level in component._levels for _, damping, _ in level._dampings]
             deflection = component._deflection
-            yield from (*tasks, component._bounds.speed, component._filter.limits, component._tolerances)
+            yield from (
+                *tasks,
+                component._bounds.speed,
+                component.references._filter.limits,
+                component.references._tolerances,
+            )
             yield [deflection.time, deflection.most] if deflection else []
         case InverseDynamics():
             yield from (task.numbers for task in component.tasks.values())
@@ -122,7 +127,7 @@ def numbers_of(component):
             yield from (limits, problem._constraints.most[: len(limits)])
             yield [problem.bounds.braking, component.ground.fade, demand.settle, component._motion.follow]
             yield from (numbers for _, _, numbers in component._gains)
-            yield from (component._filter.limits, component._tolerances)
+            yield from (component.references._filter.limits, component.references._tolerances)
         case WheeledMotion():
             law, record = component._steering.law, component.tasks.numbers.record
             yield from (

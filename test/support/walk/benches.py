@@ -143,7 +143,7 @@ class Others:
                 self.bus.call(f"{plugin.name}/trajectory", joints=("shoulder",), positions=(0.3,))
                 self.bus.call(f"{plugin.name}/trajectory", joints=("roll",), velocities=(1.0,))
             if k == CYCLES // 2 and f"{plugin.name}/reference" in self.bus._services:
-                task = next(iter(plugin.component.targets))
+                task = next(iter(plugin.component.references.targets))
                 self.bus.call(f"{plugin.name}/reference", task=task, values=(0.05, 0.0, 0.1), relative=True)
             if k == CYCLES // 2 and f"{plugin.name}/lift" in self.bus._services:
                 self.bus.call(f"{plugin.name}/lift", contacts=("tip",), lifted=True)

@@ -98,7 +98,7 @@ def test_a_hand_draws_a_circle(request, make, name, link, relative):
     """Within 3 mm of the formula of a circle from half a second on; nothing steps at the beginning."""
     robot = request.getfixturevalue(name)
     component = make(robot, HANDS if name == "upper" else ARM)
-    start = np.array(component.targets["left" if name == "upper" else "hand"].desired[:3])
+    start = np.array(component.references.targets["left" if name == "upper" else "hand"].desired[:3])
     places = run(component, 5.0, link, relative)
     times = PERIOD * (1.0 + np.arange(len(places)))
     moving = times > 0.5
@@ -112,9 +112,9 @@ def test_a_hand_draws_a_circle(request, make, name, link, relative):
 def test_a_reference_from_outside_takes_over_from_where_it_is(upper, make):
     component = make(upper, HANDS)
     run(component, 0.8)
-    left = component.targets["left"]
-    before = np.array(component.get_reference(GetReference("left")).values)
-    component.set_reference(SetReference("left", (0.0, 0.0, 0.0), relative=True))
+    left = component.references.targets["left"]
+    before = np.array(component.references.interface.get_reference(GetReference("left")).values)
+    component.references.interface.set_reference(SetReference("left", (0.0, 0.0, 0.0), relative=True))
     values = [np.array(left.reference)]
     for _ in range(100):
         run(component, PERIOD)
@@ -122,14 +122,14 @@ def test_a_reference_from_outside_takes_over_from_where_it_is(upper, make):
     steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
     assert steps.max() < 1.1 * 2.0 * np.pi * RADIUS / TURN * PERIOD
     assert_allclose(values[-1], before, atol=1e-9)
-    assert component.get_reference(GetReference("left")).values == tuple(before)
+    assert component.references.interface.get_reference(GetReference("left")).values == tuple(before)
 
 
 @pytest.mark.parametrize("way", ["port", "halt"])
 def test_ports_and_cancels_end_it_too(upper, make, way):
     component = make(upper, HANDS)
     run(component, 0.5)
-    left = component.targets["left"]
+    left = component.references.targets["left"]
     if way == "halt":
         left.halt()
         rest = left.desired
@@ -145,7 +145,7 @@ def test_ports_and_cancels_end_it_too(upper, make, way):
 def test_it_ends_at_its_last_value_and_begins_again(upper, make):
     line = "{line: {to: [0.0, 0.03, 0.02], duration: 0.3}}"
     component = make(upper, HANDS.replace(CIRCLE, line))
-    left = component.targets["left"]
+    left = component.references.targets["left"]
     start = np.array(left.desired)
     run(component, 0.6)
     assert_allclose(left.desired, start + (0.0, 0.03, 0.02), atol=1e-12)
@@ -189,7 +189,7 @@ def test_centre_of_mass_orientation_and_pose_follow_theirs(upper, make, tmp_path
 
 def test_it_slows_down_with_the_pace(upper, make):
     component = make(upper, HANDS.replace(CIRCLE, "{line: {to: [0.0, 0.03, 0.02], duration: 0.4}}"))
-    left = component.targets["left"]
+    left = component.references.targets["left"]
     start = np.array(left.desired)
     component.pace = 0.5
     run(component, 0.4)
@@ -204,13 +204,13 @@ def test_it_moves_in_the_world_with_a_base_that_jumps(panda, make):
     for each in (component, other):
         run(each, 0.4)
     move = PlanarMove(np.zeros(3), np.array((0.3, -0.1, 0.0)), 0.5)
-    component.targets["hand"].displace(move)
+    component.references.targets["hand"].displace(move)
     for each in (component, other):
         run(each, 0.2)
-    expected = np.array(other.targets["hand"].desired)
+    expected = np.array(other.references.targets["hand"].desired)
     move.move(expected[:3])
     move.turn_orientation(expected[3:])
-    assert_allclose(component.targets["hand"].desired, expected, atol=1e-12)
+    assert_allclose(component.references.targets["hand"].desired, expected, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -234,7 +234,7 @@ def test_a_posture_goes_through_its_way_points(upper, make):
         make(upper, HANDS.replace("gain: 0.5, weight: 0.0001", f"reference: {way}")),
         upper.dof("torso_yaw"),
     )
-    (posture,) = component._postures
+    (posture,) = component.references._postures
     start, yaw = posture._reference.value[joint], []
     for _ in range(round(1.0 * RATE)):
         run(component, PERIOD)
@@ -262,7 +262,7 @@ def test_what_cannot_be_followed_is_one_error_with_its_place(upper, make, wrong,
 
 def test_a_place_that_is_too_far_for_its_time_is_refused_at_the_start(upper, make):
     near = "{waypoints: [{time: 1.0, position: [0.9, 0.3, 0.2]}], absolute: true}"
-    left = make(upper, HANDS.replace(CIRCLE, near)).targets["left"]
+    left = make(upper, HANDS.replace(CIRCLE, near)).references.targets["left"]
     assert left.desired[0] < 0.8
     with pytest.raises(ComponentError, match=r"tasks.yaml:5:\d+.*waypoints: a speed of"):
         make(upper, HANDS.replace(CIRCLE, near.replace("1.0", "0.2")))

@@ -447,14 +447,16 @@ def ideal(component, duration):
 
 def test_references_of_services_and_pipes_are_followed():
     component = started()
-    com, start = component.targets["com"], component.tasks["com"].point.value.copy()
-    component.set_reference(SetReference("com", (0.0, 0.02, -0.03), relative=True))
+    com, start = component.references.targets["com"], component.tasks["com"].point.value.copy()
+    component.references.interface.set_reference(SetReference("com", (0.0, 0.02, -0.03), relative=True))
     ideal(component, 1.0)
     assert component.tasks["com"].point.value == pytest.approx(start + (0.0, 0.02, -0.03), abs=1e-4)
     component.inputs["com"].value[:], component.inputs["com"].fresh = start, True
     ideal(component, 1.0)
     assert component.tasks["com"].point.value == pytest.approx(start, abs=1e-4) and not component.is_holding
-    assert component.get_reference(GetReference("com")).values == com.desired == pytest.approx(start)
+    assert (
+        component.references.interface.get_reference(GetReference("com")).values == com.desired == pytest.approx(start)
+    )
 
 
 def test_goals_end_with_what_keeps_tasks_away():
@@ -477,10 +479,10 @@ def test_goals_end_with_what_keeps_tasks_away():
 )
 def test_wrong_references_change_nothing(task, values, error):
     component = started()
-    before = component.targets["com"].desired
+    before = component.references.targets["com"].desired
     with pytest.raises(SolferError, match=error):
-        component.set_reference(SetReference(task, values))
-    assert component.targets["com"].desired == before
+        component.references.interface.set_reference(SetReference(task, values))
+    assert component.references.targets["com"].desired == before
 
 
 def test_generated_references_are_followed_with_their_acceleration():
@@ -490,7 +492,7 @@ def test_generated_references_are_followed_with_their_acceleration():
     com, start = component.tasks["com"], component.tasks["com"].point.value.copy()
     ideal(component, 1.0)
     places = ideal(component, 1.0)
-    assert component.targets["com"].is_generated
+    assert component.references.targets["com"].is_generated
     center = places.mean(axis=0)
     assert np.linalg.norm(places - center, axis=1) == pytest.approx(0.05, abs=2e-3)
     assert np.linalg.norm(center - start) == pytest.approx(0.05, abs=2e-3)

@@ -100,7 +100,7 @@ def test_the_originals_hands_move_as_there(upper, make, repository):
     upper.update()
     component = make(upper, "upper_body_ik")
     for number in (0, 1):
-        component.move_point(MovePoint(0.0, -0.05, 0.1, number))
+        component.references.interface.move_point(MovePoint(0.0, -0.05, 0.1, number))
     positions, velocities = [], []
     for _ in range(golden["cycles"][-1] + 1):
         upper.update()
@@ -120,7 +120,7 @@ def test_the_originals_hands_move_as_there(upper, make, repository):
 def test_hands_follow_circles_and_the_robot_stands(robot, make):
     """A millimetre bounds both the hands' errors on their circles and the shift of the centre of mass."""
     component, rest = make(robot, "inverse_kinematics"), robot.state.position.copy()
-    hands = [component.targets[name] for name in ("left", "right")]
+    hands = [component.references.targets[name] for name in ("left", "right")]
     center = robot.kinematics.center_of_mass.copy()
     starts = [robot.kinematics.position(link).copy() for link in ("arm1_7", "arm2_7")]
     errors, shifts = [], []
@@ -150,9 +150,9 @@ def giving_way(robot, tmp_path):
 
 
 def test_what_gives_way_is_made_up_for(giving_way, robot):
-    pose, model, sag, errors = giving_way.targets["pose"], robot.twin(), np.zeros(robot.size), []
+    pose, model, sag, errors = giving_way.references.targets["pose"], robot.twin(), np.zeros(robot.size), []
     sag[robot.actuated] = np.random.default_rng(3).uniform(-0.01, 0.01, len(robot.actuated))
-    pose.want((0.05, 0.02, -0.05, 0.0, 0.0, 0.0, 1.0), relative=True)
+    pose.request((0.05, 0.02, -0.05, 0.0, 0.0, 0.0, 1.0), relative=True)
     for _ in range(round(2.0 * RATE)):
         run(giving_way, PERIOD)
         robot.state.position[:] = robot.command.position + sag
@@ -165,9 +165,11 @@ def test_what_gives_way_is_made_up_for(giving_way, robot):
 
 
 def test_a_held_joint_is_pushed_no_farther(giving_way, robot):
-    giving_way.set_reference(SetReference("pose", (0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True))
+    giving_way.references.interface.set_reference(
+        SetReference("pose", (0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True)
+    )
     commanded = run(giving_way, 3.0)[-1]  # and nothing moves
-    model = giving_way.targets["pose"].task.point.robot.state.position
+    model = giving_way.references.targets["pose"].task.point.robot.state.position
     assert np.abs(commanded - robot.state.position).max() > 0.1
     assert np.abs(model - commanded).max() == pytest.approx(0.02, abs=1e-4)
 
@@ -182,8 +184,8 @@ def circle(time):
 def test_what_is_out_of_reach_is_approached_calmly(upper, make, caplog, way):
     """The hand stops at the nearest place, without chatter or too much speed, and one warning has the residual."""
     component = make(upper, "manipulation")
-    left = component.targets["left"]
-    component.set_reference(SetReference("left", way, relative=True))
+    left = component.references.targets["left"]
+    component.references.interface.set_reference(SetReference("left", way, relative=True))
     positions = run(component, 4.0)
     speeds = np.abs(np.diff(positions, axis=0)) / PERIOD
     assert (speeds <= upper.kinematics.velocity_limit + 1e-9).all()
@@ -209,9 +211,9 @@ def test_what_is_out_of_reach_is_approached_calmly(upper, make, caplog, way):
 def test_what_cannot_be_reached_has_its_reason(upper, make, caplog, way, limited, text):
     """The joints that the reason names, and no others, are at the end of a range that the URDF has."""
     component = make(upper, "manipulation")
-    component.set_reference(SetReference("left", way, relative=True))
+    component.references.interface.set_reference(SetReference("left", way, relative=True))
     run(component, 4.0)
-    reply = component.get_reference(GetReference("left"))
+    reply = component.references.interface.get_reference(GetReference("left"))
     (said,) = [message for message in caplog.messages if "task 'left'" in message]
     assert reply.success and said.endswith(reply.message) and text in reply.message and "; try " in reply.message
     named = [name for name in upper.dofs if f"{name} is at its" in reply.message]
@@ -219,8 +221,8 @@ def test_what_cannot_be_reached_has_its_reason(upper, make, caplog, way, limited
     for name in named:
         joint, position = upper.description.joints[name], upper.command.position[upper.dof(name)]
         assert min(abs(position - joint.lower), abs(position - joint.upper)) < 6e-3
-    component.set_reference(SetReference("left", tuple(-np.array(way)), relative=True))
-    assert component.get_reference(GetReference("left")).message == ""
+    component.references.interface.set_reference(SetReference("left", tuple(-np.array(way)), relative=True))
+    assert component.references.interface.get_reference(GetReference("left")).message == ""
 
 
 SIDES = ("left", "arm1_7"), ("right", "arm2_7")
@@ -251,27 +253,27 @@ def test_arms_that_swing_round_rest_in_time(upper, make, yaw, left, right, wante
     upper.update()
     component, model, places = make(upper, "manipulation"), upper.twin(), []
     for name, place in wanted.items():
-        component.targets[name].want(place)
+        component.references.targets[name].request(place)
     for position in run(component, 3.5)[round(3.0 * RATE) :]:
         model.state.position[:] = position
         model.update()
         places.append([model.kinematics.position(link).copy() for name, link in SIDES if name in wanted])
     assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() < 1e-4 * PERIOD
-    assert all(component.targets[name].is_unreachable for name in wanted)
+    assert all(component.references.targets[name].is_unreachable for name in wanted)
 
 
 def test_a_hand_that_gave_up_goes_on(upper, make):
     component = make(upper, "manipulation")
-    left, right = (component.targets[name] for name in ("left", "right"))
+    left, right = (component.references.targets[name] for name in ("left", "right"))
     start = left.task.point.value.copy()
-    left.want((0.0, 0.0, 1.5), relative=True)
+    left.request((0.0, 0.0, 1.5), relative=True)
     run(component, 3.0)
     assert left.is_unreachable and left.residual[0] > 0.5
     assert np.ptp(run(component, 0.2), axis=0).max() < 5e-3  # the posture goes on
-    right.want((0.0, 0.05, 0.0), relative=True)
+    right.request((0.0, 0.05, 0.0), relative=True)
     run(component, 0.2)
     assert not left.is_unreachable and left.remaining()[0] == pytest.approx(left.residual[0], abs=0.01)
-    left.want(start)
+    left.request(start)
     run(component, 3.0)
     # an elbow that bends to the other side ends at its limit
     assert left.remaining()[0] < 1e-3 and upper.command.position[upper.dof("j_arm1_4")] < -1.5
@@ -280,11 +282,11 @@ def test_a_hand_that_gave_up_goes_on(upper, make):
 @pytest.mark.parametrize("seed", [0, 4])
 def test_both_hands_rest_far_from_references(upper, make, caplog, seed):
     component, rng = make(upper, "manipulation"), np.random.default_rng(seed)
-    for target in component.targets.values():
+    for target in component.references.targets.values():
         way = rng.normal(size=3)
-        target.want(1.6 * way / np.linalg.norm(way), relative=True)
+        target.request(1.6 * way / np.linalg.norm(way), relative=True)
     run(component, 2.95)
-    assert all(target.is_held for target in component.targets.values())
+    assert all(target.is_held for target in component.references.targets.values())
     model, places = upper.twin(), []
     for position in run(component, 0.3):
         model.state.position[:] = position
@@ -303,7 +305,7 @@ def test_no_limit_is_left_on_the_way(upper, make, seed):
     last, nearest = upper.command.position.copy(), np.inf
     for _ in range(4):
         for name, side in (("left", 0.2), ("right", -0.2)):
-            component.targets[name].want((0.3, side, 0.2) + rng.uniform(-0.8, 0.8, 3))
+            component.references.targets[name].request((0.3, side, 0.2) + rng.uniform(-0.8, 0.8, 3))
         for position in run(component, 1.0):
             assert ((limits.lower_position <= position) & (position <= limits.upper_position)).all()
             assert (np.abs(position - last) <= limits.velocity_limit * PERIOD * (1.0 + 1e-9)).all()
@@ -317,7 +319,7 @@ def test_no_limit_is_left_on_the_way(upper, make, seed):
 
 
 def test_a_pose_is_reached_with_feedback(arm):
-    action, pose = arm.actions()[0], arm.targets["pose"]
+    action, pose = arm.actions()[0], arm.references.targets["pose"]
     start = pose.task.point.value.copy()
     turn = (*start[3:],)
     goal = ReachGoal(("pose",), (Pose(Vector(*(start[:3] + (0.0, 0.05, 0.05))), Turn(*turn)),))
@@ -339,7 +341,7 @@ def test_a_measurement_that_jumps_moves_no_hand_faster_than_its_reference(robot,
         POSES.replace("chain:", "closed_on: measurement\n  motion: {speed: 0.1, turn_speed: 0.2}\n  chain:")
     )
     arm = started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "arm"))
-    task = arm.targets["pose"].task
+    task = arm.references.targets["pose"].task
     robot.state.position[robot.selectors["left_arm"].indices] += 0.3
     for _ in range(20):
         robot.update()
@@ -352,18 +354,18 @@ def test_a_measurement_that_jumps_moves_no_hand_faster_than_its_reference(robot,
 
 
 def test_a_cancelled_goal_comes_to_rest(arm):
-    action, start = arm.actions()[0], arm.targets["pose"].task.point.value.copy()
+    action, start = arm.actions()[0], arm.references.targets["pose"].task.point.value.copy()
     action.begin(ReachGoal(("pose",), (Pose(Vector(*(start[:3] + 0.1)), Turn(*start[3:])),)))
     run(arm, 0.1)
     action.cancel()
     position = run(arm, 1.5)[-1]
-    moved = arm.targets["pose"].task.point.value[:3] - start[:3]
+    moved = arm.references.targets["pose"].task.point.value[:3] - start[:3]
     assert 0.001 < np.linalg.norm(moved) < 0.15
     assert_allclose(run(arm, 0.2)[-1], position, rtol=0.0, atol=1e-5)
 
 
 def test_joints_outside_of_the_chain_stay(arm, robot):
-    arm.set_reference(SetReference("pose", (0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True))
+    arm.references.interface.set_reference(SetReference("pose", (0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True))
     moved = np.ptp(run(arm, 1.0), axis=0) > 1e-6
     assert set(np.flatnonzero(moved)) <= set(robot.selectors["left_arm"].indices) and moved.any()
 
@@ -378,9 +380,9 @@ def test_a_jump_of_the_base_moves_no_joint(centauro, tmp_path, asked):
         files = (centauro / f"centauro.{kind}" for kind in ("urdf", "srdf"))
         robot = standing(Robot.load(*files, contacts=centauro / "contacts.yaml"))
         hand = started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "arm"))
-        hand.set_reference(SetReference("pose", (*way, 0.0, 0.0, 0.3, 0.95393920), relative=True))
+        hand.references.interface.set_reference(SetReference("pose", (*way, 0.0, 0.0, 0.3, 0.95393920), relative=True))
         run(hand, 0.2 if asked == "left" else 6.0)
-        assert hand.targets["pose"].is_held == (asked == "held")
+        assert hand.references.targets["pose"].is_held == (asked == "held")
         if jumps:
             before = robot.state.position[:3].copy()
             robot.state.position[:3] += (4.0, -2.0, 0.1)
@@ -405,13 +407,13 @@ def test_a_jump_of_the_base_moves_no_joint(centauro, tmp_path, asked):
 )
 def test_wrong_requests_change_nothing(arm, request_, error, text):
     with pytest.raises(error) as caught:
-        arm.set_reference(request_)
+        arm.references.interface.set_reference(request_)
     assert text in f"{caught.value}\n{caught.value.expected}"
     assert np.ptp(run(arm, 0.1), axis=0).max() < 1e-6
 
 
 def test_wrong_numbers_of_a_pipe_are_held(arm, caplog):
-    port = arm.targets["pose"].port
+    port = arm.references.targets["pose"].port
     for wrong in (np.nan, 0.0, (1e20, *(0.0,) * 5, 1.0)):
         port.value[:], port.fresh = wrong, True
         positions = run(arm, 0.05)
@@ -421,7 +423,7 @@ def test_wrong_numbers_of_a_pipe_are_held(arm, caplog):
 
 def test_messages_of_other_frames_are_refused(arm):
     topic = next(topic for topic in arm.topics() if topic.name == "pose/reference")
-    start = arm.targets["pose"].task.point.value
+    start = arm.references.targets["pose"].task.point.value
     pose = Pose(Vector(*start[:3]), Turn(*start[3:]))
     header = type(topic.message().header)
     topic.handler(topic.message(header(2.0, "torso_2"), pose))

@@ -48,7 +48,7 @@ def test_the_stack_of_the_page_is_made(repository, beside, example):
     robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf")
     robot.update()
     component = InverseKinematics(robot, read(file, InverseKinematics.Tags, ("hands",)), "hands")
-    assert list(component.targets) == ["left", "right", "com"] and len(component._postures) == 1
+    assert list(component.references.targets) == ["left", "right", "com"] and len(component.references._postures) == 1
 
 
 def test_the_references_of_the_page_are_made(beside, example):

@@ -80,7 +80,7 @@ def play(bus, tmp_path):
 
 
 def desired(hands, task="left"):
-    return np.array(hands.component.targets[task].desired)
+    return np.array(hands.component.references.targets[task].desired)
 
 
 @pytest.mark.slow
@@ -98,7 +98,7 @@ def test_references_go_to_their_ends(bus, hands, play):
     assert {message["name"] for message in messages if not message["waits"]} >= {"left, right", "right"}
     lefts = [message["left"] for message in messages if not message["waits"]]
     assert np.all(np.diff(lefts) <= 1e-9)
-    assert all(target.is_still for target in hands.component.targets.values())
+    assert all(target.is_still for target in hands.component.references.targets.values())
 
 
 @pytest.mark.slow
@@ -144,8 +144,8 @@ def test_silence_leaves_the_target_at_its_last_reference(bus, hands, play, way):
         hands.cycle()
     assert len(last) > 50 and np.linalg.norm(last[-1] - last[0]) > 0.01
     assert_allclose(desired(hands), last[-1], atol=1e-12)
-    assert_allclose(hands.component.targets["left"].reference, last[-1], atol=1e-6)
-    assert hands.component.targets["left"].is_still
+    assert_allclose(hands.component.references.targets["left"].reference, last[-1], atol=1e-6)
+    assert hands.component.references.targets["left"].is_still
 
 
 @pytest.mark.slow
@@ -193,9 +193,10 @@ def test_joints_of_a_killed_navigation_rest_at_its_last_message(bus, upper, play
 
 def test_a_target_that_has_not_started_is_waited_for(bus, hands, play):
     course = play(positions={"left": LINE})._course
-    targets, seen = hands.component.targets, []
-    for known in ({}, targets):
-        hands.component.targets = known
+    interface = hands.component.references.interface
+    seen = []
+    for known in ({}, interface._targets):
+        interface._targets = known
         for _ in range(4):
             seen.append(course.awaits())
             bus.run_until(bus.time + 0.02)

@@ -96,7 +96,7 @@ class TaskProgress:
         self._last = distance
         self.stays = self._looks >= CHECKS
 
-    def judge(self, is_beyond: bool) -> bool:
+    def come_to_rest(self, is_beyond: bool) -> bool:
         """Note whether the task has come to rest beyond its tolerances; return whether to report it, once."""
         self.is_unreachable = is_beyond
         is_new = is_beyond and not self._is_reported

@@ -7,12 +7,15 @@ from typing import Any, cast
 
 import numpy as np
 
+from solfer.components.base import Component
 from solfer.components.diagnostics import Entry, Status, Statuses
-from solfer.components.following.follower import ReferenceFollower, record_of
+from solfer.components.following.reference_interface import record_of
+from solfer.components.following.reference_set import ReferenceSet, take_numbers
 from solfer.components.gains import GAINS, configured_gains, live_gains
 from solfer.components.inverse_dynamics.demand import DemandedAccelerations, FedReference
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
+from solfer.components.inverse_dynamics.holding import Holding
 from solfer.components.inverse_dynamics.output import CommandedMotion, CommandedTorques
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
 from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
@@ -21,7 +24,7 @@ from solfer.components.inverse_dynamics.watch import DynamicsWatch
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
 from solfer.errors import ComponentError, ModelError, UnknownName
-from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
+from solfer.interfaces.declaration import Action, LiveParameter, Service, TopicIn, TopicOut
 from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.numerics.acceleration_bounds import AccelerationBounds
 from solfer.numerics.planar_move import PlanarMove
@@ -44,7 +47,7 @@ REPORTED = 1.0
 """Reports a second."""
 
 
-class InverseDynamics(ReferenceFollower):
+class InverseDynamics(Component):
     """Lets tasks follow their references by torques of the joints, with contacts that carry the robot.
 
     Each cycle solves one QP for the accelerations of the joints and the forces of contacts; see `WholeBodyProblem`.
@@ -61,6 +64,7 @@ class InverseDynamics(ReferenceFollower):
     Attributes:
         problem: The QP.
         ground: The contacts.
+        references: References of its tasks.
 
     Raises:
         SolferError: The tags name something that the robot does not have, or do not fit it.
@@ -80,7 +84,15 @@ class InverseDynamics(ReferenceFollower):
         self._gains = configured_gains(robot, tags.gains)
         self.ground = Ground(robot, tags)
         self._configured, stack = self._make_stack(robot)
-        self._follow(tags.stack, self._configured, tags.stack.limits.speed_scale * robot.upper_limits.velocity)
+        self.references = ReferenceSet(
+            name,
+            tags,
+            tags.stack,
+            stack=self._configured,
+            speeds=tags.stack.limits.speed_scale * robot.upper_limits.velocity,
+            obstacles=self._obstacles,
+        )
+        self.inputs.update(self.references.inputs)
         self._demand = self._make_demand(robot, stack)
         robot.dynamics.subscribe((BIAS, INERTIA))
         passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
@@ -90,8 +102,7 @@ class InverseDynamics(ReferenceFollower):
         self._torques = CommandedTorques(CarryingTorques(robot.dynamics, passive), speeds, robot.size)
         self._standing: list[tuple[np.ndarray, np.ndarray]] = []
         self._watch = DynamicsWatch(robot, self.ground, self.efforts)
-        self._reason = ""
-        self._fault = ""
+        self._holding = Holding(name)
 
     @property
     def tasks(self) -> dict[str, Task]:
@@ -101,7 +112,7 @@ class InverseDynamics(ReferenceFollower):
     @property
     def is_holding(self) -> bool:
         """Whether the last QP had no solution."""
-        return bool(self._reason)
+        return bool(self._holding.reason)
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`.
@@ -126,10 +137,14 @@ class InverseDynamics(ReferenceFollower):
         bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
         self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=self._torque_limits(self.tags))
         self._between = max(2, round(rate / REPORTED))
-        self._connect()
+        self.references.connect(self.period)
+
+    def actions(self) -> tuple[Action, ...]:
+        """See `ReferenceInterface.actions`."""
+        return self.references.interface.actions()
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
-        """Offer gains, limits, friction and times beside what `ReferenceFollower` offers."""
+        """Offer gains, limits, friction and times beside what `ReferenceSet` offers."""
         limits = ("stack", "limits")
         tags = self.tags
         ground = self.ground
@@ -139,8 +154,8 @@ class InverseDynamics(ReferenceFollower):
             else [LiveParameter((*limits, "speed_scale"))]
         )
         return (
-            *super().live_parameters(),
-            *self._task_parameters(self._configured, ("weight", "correction")),
+            *self.references.live_parameters(),
+            *self.references.task_parameters(self._configured, ("weight", "correction"), self._take_number),
             *(
                 LiveParameter(("stack", "tasks", name, key), write, partial(self._gains_of, name))
                 for name, task in tags.stack.tasks.items()
@@ -166,13 +181,12 @@ class InverseDynamics(ReferenceFollower):
         self._motion.start(self.start_position)
         self._demand.stack.update()
         self._configured.start()
-        self._start_references()
+        self.references.start()
         self.ground.start()
         if absent := self.ground.leave_out(~touching(self.model, self.ground)):
             log.info("%s: contacts that touch nothing do not count: %s", self.name, ", ".join(absent))
         self._watch.start()
-        self._fault = ""
-        self._reason = ""
+        self._holding.reason = ""
         self._torques.start()
         self._cycles = 0
         self._demand.start()
@@ -181,8 +195,7 @@ class InverseDynamics(ReferenceFollower):
         """Compute one cycle."""
         step = self.time_step
         self._cycles += 1
-        self._advance(step)
-        self._prepare()
+        self.references.update(step, self.pace)
         demand = self._demand
         state = self.model.state
         demand.feed(step)
@@ -190,8 +203,8 @@ class InverseDynamics(ReferenceFollower):
         self.ground.update(step)
         demand.update(state, self.ground)
         if not self.is_holding:
-            self._fault = self._watch.update(step, self.problem.force, demand.slip)
-        is_solved = not self._fault and self.problem.solve(demand.stack.jacobian, demand.tasks, demand.contacts)
+            self._watch.update(step, self.problem.force, demand.slip)
+        is_solved = not self._watch.fault and self.problem.solve(demand.stack.jacobian, demand.tasks, demand.contacts)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
         if is_solved:
@@ -200,13 +213,13 @@ class InverseDynamics(ReferenceFollower):
         else:
             self._torques.hold(self.ground.jacobian)
         self._torques.blend(step)
-        for target in self._list:
+        for target in self.references.list:
             target.measure()
-        self._judge()
+        self.references.report()
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`."""
-        super().move_world(move)
+        self.references.move_world(move)
         self._demand.is_smooth = False
 
     def send(self) -> None:
@@ -222,6 +235,10 @@ class InverseDynamics(ReferenceFollower):
             for values, dofs, numbers in self._gains:
                 values[dofs] = numbers
 
+    def reset(self) -> None:
+        """Forget what was requested."""
+        self.references.reset()
+
     def stop(self) -> None:
         """Hold the joints where they are commanded."""
         self._motion.velocity[:] = 0.0
@@ -229,7 +246,7 @@ class InverseDynamics(ReferenceFollower):
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/lift` beside those of references."""
         return (
-            *super().services(),
+            *self.references.interface.services(),
             Service("lift", "solfer/LiftContacts", LiftContacts, reply=LiftReply, handler=self.lift),
         )
 
@@ -238,7 +255,7 @@ class InverseDynamics(ReferenceFollower):
         diagnostics = TopicOut(
             "/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._report_now_and_then
         )
-        return (*super().topics(), diagnostics)
+        return (*self.references.interface.topics(), diagnostics)
 
     def lift(self, request: LiftContacts) -> LiftReply:
         """Lift contacts, or put them down again; nothing changes if one of them is not tracked.
@@ -262,7 +279,7 @@ class InverseDynamics(ReferenceFollower):
         forces = [
             f"{name}.{row}" for index, name in enumerate(ground.names) for row in range(np.diff(ground.starts)[index])
         ]
-        self.log_references(logger)
+        self.references.log_references(logger)
         logger.add("acceleration", problem.acceleration, dofs)
         logger.add("torque", self._torques.value, dofs, "Nm")
         logger.add("forces", problem.force, forces, "N")
@@ -289,7 +306,7 @@ class InverseDynamics(ReferenceFollower):
             if isinstance(self.tasks[name].point, LookAt)
         ]
         fed = [
-            FedReference(task.name, task.velocity, self.targets.get(task.name))
+            FedReference(task.name, task.velocity, self.references.targets.get(task.name))
             for task in stack.tasks
             if isinstance(record_of(tags.stack, task.name).reference, ReferenceRecord)
         ]
@@ -303,11 +320,11 @@ class InverseDynamics(ReferenceFollower):
         return demand
 
     def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
-        """See `ReferenceFollower._take_number`; a second level weighs less."""
+        """Write the numbers of a task; a second level weighs less."""
         if key == "weight":
             numbers = numbers * (1.0 if task in self._configured.levels[0] else SECOND_LEVEL)
             self._demand.roots[self._demand.rows[task.name]] = np.sqrt(numbers)
-        super()._take_number(task, key, numbers)
+        self.references.take_number(task, key, numbers)
 
     def _gains_of(self, name: str, tags: InverseDynamicsTags) -> np.ndarray:
         """Return the gains of a record's tasks, and those of their velocity, which may follow them; shape (2, rows)."""
@@ -320,7 +337,7 @@ class InverseDynamics(ReferenceFollower):
 
     def _take_gains(self, name: str, numbers: np.ndarray) -> None:
         """Write what `_gains_of` has returned."""
-        self._take_numbers(self._configured, name, "gain", numbers=numbers[0])
+        take_numbers(self._configured, name, self._take_number, key="gain", numbers=numbers[0])
         first = 0
         for task in self._configured.members(name):
             self._demand.velocity_gains[self._demand.rows[task.name]] = numbers[1, first : first + task.rows]
@@ -361,8 +378,12 @@ class InverseDynamics(ReferenceFollower):
         self._motion.follow = tags.follow
 
     def _obstacles(self, _task: Task) -> str:
-        """See `ReferenceFollower._obstacles`."""
-        return f"it holds: {self._reason}" if self.is_holding else f"active constraints: {self._active() or 'none'}"
+        """Return what keeps a task away from its reference."""
+        return (
+            f"it holds: {self._holding.reason}"
+            if self.is_holding
+            else f"active constraints: {self._active() or 'none'}"
+        )
 
     def _active(self) -> str:
         """Return the names of active constraints."""
@@ -382,14 +403,12 @@ class InverseDynamics(ReferenceFollower):
         state = self.model.state
         self._torques.change(self._torques.value if self._cycles > 1 else state.torque)
         self._motion.start(state.position)
-        if self._fault:
-            self._reason = self._fault
-            log.error("%s: %s; it holds until it is started again", self.name, self._reason)
+        if self._watch.fault:
+            self._holding.fail(self._watch.fault)
         elif is_holding:
-            self._reason = f"the QP has no solution: {self.problem.violated}"
-            self._throttle.warning(self._reason, "%s: %s; it holds", self.name, self._reason)
+            self._holding.wait(self.problem.violated)
         else:
-            self._reason = ""
+            self._holding.reason = ""
             self._watch.start()
 
     def _report_now_and_then(self) -> Statuses | None:
@@ -402,7 +421,7 @@ class InverseDynamics(ReferenceFollower):
             for name, force in zip(ground.names, ground.normals @ problem.force, strict=True)
         ]
         entries.append(Entry("active constraints", self._active()))
-        summary = f"it holds: {self._reason}" if self.is_holding else "tasks are followed"
+        summary = f"it holds: {self._holding.reason}" if self.is_holding else "tasks are followed"
         return Statuses(
             status=(
                 Status(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solfer.components.following.target import Target
+from solfer.components.following.task_reference import TaskReference
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.model.state import State
@@ -23,7 +23,7 @@ class FedReference(NamedTuple):
 
     task: str
     velocity: np.ndarray
-    target: Target | None
+    target: TaskReference | None
 
 
 class DemandedAccelerations:

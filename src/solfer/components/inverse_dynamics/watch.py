@@ -37,6 +37,9 @@ class DynamicsWatch:
         robot: The Robot.
         ground: Its contacts.
         efforts: DoFs that are moved by efforts, shape (m,).
+
+    Attributes:
+        fault: What was found wrong; empty: nothing.
     """
 
     def __init__(self, robot: Robot, ground: Ground, efforts: np.ndarray):
@@ -52,12 +55,14 @@ class DynamicsWatch:
         self._missing = np.zeros(count)
         self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()], dtype=bool)
         self._time = 0.0
+        self.fault = ""
 
     def start(self) -> None:
         """Begin with a robot of which nothing is known."""
         for numbers in (self._sent, self._difference, self._moved, self._missing):
             numbers[:] = 0.0
         self._time = 0.0
+        self.fault = ""
         state = self._robot.state
         command = self._robot.command
         self._gains = [
@@ -69,8 +74,8 @@ class DynamicsWatch:
             if gain in command
         ]
 
-    def update(self, step: float, force: np.ndarray, slip: np.ndarray) -> str:
-        """Return what is wrong, empty if nothing is; the Robot's command is that of the last cycle.
+    def update(self, step: float, force: np.ndarray, slip: np.ndarray) -> None:
+        """Find what is wrong; the Robot's command is that of the last cycle.
 
         Args:
             step: Time since the last cycle [s].
@@ -103,7 +108,8 @@ class DynamicsWatch:
             self._is_point,
             self._moved,
         )
-        return "" if found < 0 else self._text(found, ground.normals @ force)
+        if found >= 0:
+            self.fault = self._text(found, ground.normals @ force)
 
     def _add_springs(self) -> None:
         """Write the torques of the last command's springs and dampers at the measured state."""

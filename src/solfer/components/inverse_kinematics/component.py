@@ -4,30 +4,34 @@ from typing import Any
 
 import numpy as np
 
-from solfer.components.following.follower import ReferenceFollower
+from solfer.components.base import Component
+from solfer.components.following.reference_set import ReferenceSet
 from solfer.components.inverse_kinematics.deflection import Deflection
 from solfer.components.inverse_kinematics.obstacles import obstacles
 from solfer.components.inverse_kinematics.soft_level import SoftLevel
 from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseKinematicsTags
 from solfer.components.live_tunings import live_tunings
 from solfer.errors import ComponentError, UnknownName
-from solfer.interfaces.declaration import LiveParameter
+from solfer.interfaces.declaration import Action, LiveParameter, Service, TopicIn, TopicOut
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
 from solfer.tasks import ReferenceIntegrator, Task
 from solfer.tasks.building.build import build_stack
 
 
-class InverseKinematics(ReferenceFollower):
+class InverseKinematics(Component):
     """Lets points of the robot follow references: hands, centre of mass, posture, in the order of priority.
 
     A stack of tasks gives joint velocities, whose integral is commanded, within the limits of the joints.
-    References are those of others, or generated: see `ReferenceFollower`.
+    References are those of others, or generated: see `ReferenceSet`.
 
     Args:
         robot: The Robot.
         tags: Tags of the configuration.
         name: Name of the configuration.
+
+    Attributes:
+        references: References of its tasks.
 
     Raises:
         SolferError: The stack names something that the robot does not have, or does not fit it.
@@ -49,8 +53,17 @@ class InverseKinematics(ReferenceFollower):
         self._set_out()
         self._stack = build_stack(record, self._inner)
         self._stack.confine(self._moved)
-        self._follow(record, self._stack, record.limits.speed_scale * robot.upper_limits.velocity)
         self._length = tags.characteristic_length
+        self.references = ReferenceSet(
+            name,
+            tags,
+            record,
+            stack=self._stack,
+            speeds=record.limits.speed_scale * robot.upper_limits.velocity,
+            obstacles=self._obstacles,
+            holds=bool(self._length),
+        )
+        self.inputs.update(self.references.inputs)
         self._has_torques = record.limits.torques is not None and not self._is_measured
 
     def set_rate(self, rate: float) -> None:
@@ -66,19 +79,32 @@ class InverseKinematics(ReferenceFollower):
         lead = np.inf if tags.lead is None else tags.lead
         self._bounds = self._stack.bounds(self.period)
         self._integrator = ReferenceIntegrator(inner, self.period, self._bounds, lead)
-        self._connect()
+        self.references.connect(self.period)
         self._deflection = None if tags.deflection is None else self._make_deflection(tags.deflection)
         self._levels = tuple(
-            SoftLevel(level, [target for target in self._list if target.task in level], self._length)
+            SoftLevel(level, [target for target in self.references.list if target.task in level], self._length)
             for level in self._stack.levels
         )
+
+    def services(self) -> tuple[Service, ...]:
+        """See `ReferenceInterface.services`."""
+        return self.references.interface.services()
+
+    def topics(self) -> tuple[TopicIn | TopicOut, ...]:
+        """See `ReferenceInterface.topics`."""
+        return self.references.interface.topics()
+
+    def actions(self) -> tuple[Action, ...]:
+        """See `ReferenceInterface.actions`."""
+        return self.references.interface.actions()
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
         """Offer the numbers of tasks, the joints' speeds, distances of links, and the deflection, beside references."""
         tags = self.tags
-        found = [*super().live_parameters()]
+        found = [*self.references.live_parameters()]
         if tags.stack is not None:
-            found += self._task_parameters(self._stack, ("gain", "weight", "damping", "correction"))
+            keys = ("gain", "weight", "damping", "correction")
+            found += self.references.task_parameters(self._stack, keys, self._take_number)
             limits = ("stack", "limits")
             found.append(LiveParameter((*limits, "speed_scale"), self._stack.scale_speeds, _speed_scale))
             if tags.stack.limits.collisions is not None:
@@ -110,26 +136,24 @@ class InverseKinematics(ReferenceFollower):
         self._solver.stack.update()
         self._stack.start()
         self._solver.stack.update()
-        self._start_references()
+        self.references.start()
 
     def update(self) -> None:
         """Compute one cycle."""
         step = self.time_step
         self._integrator.set_period(step)
-        self._advance(step)
-        self._hold_what_stays_away()
-        self._prepare()
+        self.references.update(step, self.pace)
         if not self._is_measured:
             self._follow_model()
         self._integrator.update(self._solver.update())
         for level in self._levels:
             level.update()
-        self._judge()
+        self.references.report()
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`. A model that moves its base itself does not follow the measured one."""
         if self._is_measured or 0 not in self._moved:
-            super().move_world(move)
+            self.references.move_world(move)
 
     def send(self) -> None:
         """Write positions and velocities of the joints that it moves."""
@@ -140,6 +164,10 @@ class InverseKinematics(ReferenceFollower):
         command.position[self._moved] = inner.position[self._moved]
         command.velocity[self._moved] = inner.velocity[self._moved]
 
+    def reset(self) -> None:
+        """Forget what was requested."""
+        self.references.reset()
+
     def stop(self) -> None:
         """Hold the joints where they are desired."""
         self._inner.command.velocity[:] = 0.0
@@ -147,7 +175,7 @@ class InverseKinematics(ReferenceFollower):
 
     def start_log(self, logger: Any) -> None:
         """Declare references, residuals, and the joints that are desired."""
-        self.log_references(logger)
+        self.references.log_references(logger)
         add = logger.add
         add("velocity", self._solver.velocity, self.model.dofs)
         if self._deflection is not None:
@@ -177,12 +205,12 @@ class InverseKinematics(ReferenceFollower):
         return Deflection(self.model.size, base, record.time_constant, most=record.most)
 
     def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
-        """See `ReferenceFollower._take_number`: levels have the damping while tasks are far from their references."""
+        """Write the numbers of a task; levels have the damping while tasks are far from their references."""
         if key == "damping":
             for level in self._levels:
                 level.take_damping(task, numbers)
         else:
-            super()._take_number(task, key, numbers)
+            self.references.take_number(task, key, numbers)
 
     def _take_tuning(self, numbers: np.ndarray) -> None:
         """Write gains and dampings of all rows, shape (2, rows)."""
@@ -201,20 +229,8 @@ class InverseKinematics(ReferenceFollower):
         self._deflection.most = tags.deflection.most
 
     def _obstacles(self, task: Task) -> str:
-        """See `ReferenceFollower._obstacles`."""
+        """Return what keeps a task away from its reference."""
         return obstacles(task, self._inner.command, self._bounds, moved=self._moved)
-
-    def _hold_what_stays_away(self) -> None:
-        """Let tasks that have come to rest away from their references stay there, until a reference moves.
-
-        What they still want would only turn arms slowly, in directions that bring them no nearer.
-        """
-        is_still = self._filter.all_still
-        for target in self._list:
-            if not is_still:
-                target.let_go()
-            elif target.is_unreachable and self._length:
-                target.hold()
 
     def _follow_model(self) -> None:
         """Bring the model to the commanded positions, and what it does not move to the measured ones."""

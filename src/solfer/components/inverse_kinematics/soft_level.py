@@ -1,11 +1,11 @@
-"""Damping of a level of tasks, as large errors want it."""
+"""Damping of a level of tasks, as large errors need it."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.following.target import Target
+from solfer.components.following.task_reference import TaskReference
 from solfer.tasks import Task
 
 NEGLIGIBLE = 1e-3
@@ -19,7 +19,7 @@ class SoftLevel:
     """A level of tasks that comes to rest where its references cannot be reached.
 
     Near a singularity a small step of the joints turns the Jacobian J of a point: by as much as the point moves, over a
-    length L of the size of the limbs. A step that wants to go the way s = K |e| T, and finds too small a singular
+    length L of the size of the limbs. A step that requests the way s = K |e| T, and finds too small a singular
     value, goes too far, comes back in the next cycle, and so on. With the damping D^2 + L s instead of D^2 it goes no
     further than J holds, and the joints settle where J^T e = 0, the nearest there is. All tasks of a level get the
     same, so that their weights stay, but for those that are held where they have come to rest: nothing moves them. A
@@ -33,7 +33,7 @@ class SoftLevel:
         length: L [m]; 0: the damping stays that of the tasks.
     """
 
-    def __init__(self, tasks: Sequence[Task], targets: Sequence[Target], length: float):
+    def __init__(self, tasks: Sequence[Task], targets: Sequence[TaskReference], length: float):
         self._targets = tuple(targets)
         self._length = length
         followed = {target.task: target for target in targets}

@@ -21,7 +21,7 @@ from solfer.tasks import Task
 WORLD = "world"
 
 
-class Target:
+class TaskReference:
     """A task, its reference, and what is requested of it.
 
     Args:
@@ -174,7 +174,7 @@ class Target:
         self._end_generated()
         return ""
 
-    def want(self, values: tuple[float, ...] | np.ndarray, relative: bool = False, stream: bool = False) -> None:
+    def request(self, values: tuple[float, ...] | np.ndarray, relative: bool = False, stream: bool = False) -> None:
         """Set the reference of the task.
 
         Args:
@@ -196,7 +196,7 @@ class Target:
         self._forget()
 
     def check(self, values: tuple[float, ...] | np.ndarray) -> None:
-        """Check a reference; see `want`."""
+        """Check a reference; see `request`."""
         self._numbers.check(values, self.where)
 
     def check_frame(self, frame: str) -> None:
@@ -251,10 +251,10 @@ class Target:
             self._reference.value[:] = self._filtered.value
 
     def hold(self) -> None:
-        """Follow the place where the point is now, until `let_go`; the distance stays what it is. See `HeldPlace`."""
+        """Follow the place where the point is now, until `follow`; the distance stays what it is. See `HeldPlace`."""
         self._held.hold()
 
-    def let_go(self) -> None:
+    def follow(self) -> None:
         """Follow the reference again."""
         if self._held.is_held:
             self._held.is_held = False
@@ -299,9 +299,9 @@ class Target:
         self._progress.look_again()
         self._held.take_again()
 
-    def judge(self) -> str:
+    def come_to_rest(self) -> str:
         """Note whether it has come to rest away from its reference; return a report of that, once."""
-        return str(self._residual) if self._progress.judge(self._residual.is_beyond()) else ""
+        return str(self._residual) if self._progress.come_to_rest(self._residual.is_beyond()) else ""
 
     def _end_generated(self) -> None:
         if self._generated is not None:
