@@ -7,8 +7,9 @@ shared plugin, and `check` reports all that is wrong with a main configuration.
 from solfer.config.loading.check import CheckReport, check
 from solfer.config.loading.configuration import Configuration, Part
 from solfer.config.loading.layers import module_names
-from solfer.config.loading.lists import SharedConfiguration, SharedPlugin, load_shared
+from solfer.config.loading.listed_plugins import SharedPlugin
 from solfer.config.loading.load import load
+from solfer.config.loading.shared import SharedConfiguration, load_shared
 from solfer.config.records.calibration import CalibrationRecord, JointCalibrationRecord
 from solfer.config.records.live import LIVE
 from solfer.config.records.modules import ModuleRecord, RobotRecord

@@ -11,7 +11,7 @@ from support.modules import forget
 from support.processes import SOURCES
 from support.realtime.executor_plugins import Layer
 
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.plugins import Registry, generate, load_checked
 
 OTHERS = ("PYTEST_ADDOPTS", "PYTEST_CURRENT_TEST")

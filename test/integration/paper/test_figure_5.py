@@ -10,7 +10,7 @@ from support.integration.bridged import BridgedWorld
 from support.integration.world import CONFIG
 
 from solfer.components.move_joints import MoveJoints
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorTelemetry

@@ -6,7 +6,7 @@ from support.plugins.plugin import configuration
 
 from solfer.components import Component, Service
 from solfer.config import load
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import MiddlewareError, SolferError, singles
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, check_file, generate, load_checked

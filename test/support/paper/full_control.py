@@ -6,7 +6,7 @@ from support.integration.world import CONFIG, World
 from support.simulation.hardware_plugin import mocked
 
 from solfer.config import load, load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.demo.waving import CIRCLE_FRAME, CIRCLE_HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics

@@ -13,7 +13,7 @@ from support.integration.bridged import BridgedWorld
 from support.integration.world import CONFIG, STEP, World
 
 from solfer.config import load, load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.demo.driving import COURSE_RATE
 from solfer.demo.waving import Waving
 from solfer.middleware.bridge.bridge import BRIDGE_PERIOD as BRIDGED

@@ -9,7 +9,7 @@ from support.shared.figure_5 import ORDER, module, write
 from solfer.components import Service
 from solfer.components.joint_states import JointStates
 from solfer.config import load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginSet, Registry, generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch

@@ -11,7 +11,8 @@ from support.walk.files import SRDF, URDF
 
 from solfer.components import Component
 from solfer.config import Configuration, load
-from solfer.config.loading.lists import load_shared, read_layer
+from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.shared import load_shared
 from solfer.interfaces.port import Port
 from solfer.lower_level import LowerLevelServer
 from solfer.middleware.bridge.routes import routes

@@ -12,7 +12,7 @@ import pytest
 import solfer
 from solfer.cli.options import Number
 from solfer.config import Record, read
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.config.records.rt_layer import ExecutorRecord
 from solfer.errors import SolferError
 from solfer.plugins import check_file

@@ -21,7 +21,7 @@ from support.unit.mutations import damaged, mutated, shipped
 
 from solfer.cli.main import main as solfer
 from solfer.config import Configuration, load, module_names, read
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import SolferError
 from solfer.middleware.memory import read_faults
 from solfer.model.actuators import ActuatorsRecord

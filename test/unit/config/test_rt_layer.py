@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import ConfigError, SolferError
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"

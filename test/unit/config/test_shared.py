@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from solfer.config import CheckReport, check, load, load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.config.yaml import files
 from solfer.errors import ConfigError, SolferError, UnknownName
 

@@ -15,7 +15,7 @@ from support.unit.cart import URDF
 
 from solfer.cli.main import main
 from solfer.config import load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Generator, PluginState, Registry, generate_shared
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from solfer.config import load, load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import ConfigError, UnknownName
 from solfer.plugins import Registry, check_file, generate
 from solfer.plugins.generation.dry_run import DryMiddleware

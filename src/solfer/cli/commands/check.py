@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     """
     from solfer.cli.findings import findings_of, summary
     from solfer.cli.robots import given_robot
-    from solfer.config.loading.lists import is_layer, read_once
+    from solfer.config.loading.rt_layer import is_layer, read_once
     from solfer.plugins.generation.check import check_file, check_layer
 
     file = read_once(options.file)

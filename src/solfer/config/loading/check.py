@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from solfer.config.loading.configuration import Configuration, Part
 from solfer.config.loading.layers import AS_CONFIGURED, Layers, ModulePlacement
 from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION, Library, named_records
-from solfer.config.loading.lists import Naming, SharedConfiguration, read_shared
+from solfer.config.loading.listed_plugins import Naming
 from solfer.config.loading.load import NOT_CONFIGURATIONS, Reading, Used, misspelt_key
+from solfer.config.loading.shared import SharedConfiguration, read_shared
 from solfer.config.records.calibration import CalibrationRecord
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.modules import MainRecord, RobotRecord, is_shared

@@ -8,7 +8,8 @@ from typing import Any
 from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load
 from solfer.config.loading.configuration import own_tags
 from solfer.config.loading.layers import ModulePlacement
-from solfer.config.loading.lists import check_group, read_layer
+from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.shared import check_group
 from solfer.config.records.middlewares import RT
 from solfer.config.yaml.files import opened
 from solfer.config.yaml.nodes import Mark, YamlNode

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from solfer.config import CheckReport, Configuration
-from solfer.config.loading.lists import Naming, is_layer, read_layer
+from solfer.config.loading.listed_plugins import Naming
+from solfer.config.loading.rt_layer import is_layer, read_layer
 from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE
 from solfer.config.yaml.files import YamlFile
 from solfer.config.yaml.nodes import Mark

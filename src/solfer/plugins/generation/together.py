@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from solfer.config import Configuration
-from solfer.config.loading.lists import SharedPlugin
+from solfer.config.loading.listed_plugins import SharedPlugin
 from solfer.config.records.modules import SharedRecord
 from solfer.errors import SolferError, raise_all, repeats, singles
 from solfer.pipes import CommandPipe

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from solfer.config import load, load_shared
-from solfer.config.loading.lists import read_layer
+from solfer.config.loading.rt_layer import read_layer
 from solfer.plugins import Registry
 
 BETWEEN_LAYERS = {
