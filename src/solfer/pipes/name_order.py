@@ -13,12 +13,6 @@ logger = logging.getLogger(__name__)
 ORDER_MEMORY = 8
 """Most orders that are cached; senders that change their names in every message do not fill the memory."""
 
-ORDER_SIMILARITY = 0.75
-"""Likeness of two names from which on one of them is taken for the other one, misspelt."""
-
-WARNED_NAMES = 100
-"""Most names that are warned of."""
-
 
 @dataclass(frozen=True)
 class Order:
@@ -130,7 +124,8 @@ class NameOrder:
     def _warn(self, unknown: Sequence[str]) -> None:
         """Name those that are ignored for the first time."""
         new = [name for name in unknown if name not in self._ignored]
-        if new and len(self._ignored) < WARNED_NAMES:
+        most = 100  # most names that are warned of
+        if new and len(self._ignored) < most:
             self._ignored.update(new)
             logger.warning("the robot has no %s %s: ignored in messages", self._what, ", ".join(map(repr, new)))
 
@@ -141,7 +136,9 @@ class NameOrder:
         unknown = [] if self._known is None else [name for name in names if name not in self._known]
         missing = [name for name in self._pipe_names if name not in names]
         for name in unknown:
-            if not self._ignores or nearest(name, missing, likeness=ORDER_SIMILARITY):
+            # likeness of two names from which on one of them is taken for the other one, misspelt
+            likeness = 0.75
+            if not self._ignores or nearest(name, missing, likeness=likeness):
                 raise UnknownName(self._what, name, self._known)
         self._warn(unknown)
         place = {name: index for index, name in enumerate(names)}

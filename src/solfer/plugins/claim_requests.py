@@ -25,9 +25,6 @@ from solfer.transport.middleware import TRIGGER, NoFields
 
 logger = logging.getLogger(__name__)
 
-CLAIM_PATIENCE = 2.0
-"""Longest wait for an answer of the lower level [s]."""
-
 
 class ClaimRequests:
     """Requests that claim joints, release them, or damp the robot. Never blocks.
@@ -116,7 +113,8 @@ class ClaimRequests:
             self._request("emergency_stop", TRIGGER, NoFields(), Answer)
 
     def _request(self, service: str, interface: str, fields: object, reply: type) -> "Future[Any]":
-        return self._middleware.request(f"{LOWER_LEVEL}/{service}", interface, fields, reply, CLAIM_PATIENCE)
+        patience = 2.0  # longest wait for an answer of the lower level [s]
+        return self._middleware.request(f"{LOWER_LEVEL}/{service}", interface, fields, reply, patience)
 
     def _measured(self) -> tuple[float, ...]:
         """Return where the joints are measured, in the names and numbers of the lower level."""

@@ -23,9 +23,6 @@ class Stage(enum.IntEnum):
 STAGES = tuple(stage.name.lower() for stage in Stage)
 """Names of the stages."""
 
-PERIOD_CLOSENESS = 1e-6
-"""Share of a period by which a clock's time is rounded."""
-
 NO_TIMES = memoryview(bytes(8 * len(Stage))).cast("q")
 """Times of a cycle that has reached no stage yet."""
 
@@ -52,7 +49,8 @@ class PassedPeriods:
     def count(self, now: float) -> int:
         """Return how many periods have passed at the cycle that begins `now` [s]."""
         owed = max(0.0, self._owed + (now - self._before) * self._rate - 1.0)
-        left_out = int(owed + PERIOD_CLOSENESS)
+        rounding = 1e-6  # share of a period by which a clock's time is rounded
+        left_out = int(owed + rounding)
         self._before = now
         self._owed = max(0.0, owed - left_out)
         return 1 + left_out

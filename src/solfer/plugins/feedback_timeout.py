@@ -13,13 +13,6 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-DEFAULT_TIMEOUT = 0.2
-"""Default of the age of the newest message above which a cycle is a strike [s]. A simulator on a shared machine stalls
-for 20 ms now and then."""
-
-TIMEOUT_PERIODS = 5
-"""The same in periods of the plugin; the longer one counts."""
-
 FEEDBACK_FREEZE_TIME = 0.15
 """Time by the stamps without a change of any number after which a feedback is frozen, if joints are to move [s]."""
 
@@ -139,9 +132,13 @@ class FeedbackTimeout:
     @classmethod
     def from_record(cls, feedback: FeedbackPipe, record: FeedbackRecord, rate: float) -> "FeedbackTimeout":
         """Make the timeout that a record configures, in a plugin of a `rate` [Hz]."""
+        # default of the age of the newest message above which a cycle is a strike [s]. A simulator on a shared
+        # machine stalls for 20 ms now and then
+        shortest = 0.2
+        periods = 5  # the same in periods of the plugin; the longer one counts
         return cls(
             feedback,
-            record.timeout or max(DEFAULT_TIMEOUT, TIMEOUT_PERIODS / rate),
+            record.timeout or max(shortest, periods / rate),
             record.strikes,
             action=record.timeout_action,
             where=record.where("source"),

@@ -12,16 +12,6 @@ from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
 
-NEEDED, OPTIONAL = 1.0, 5.0
-"""Time after which a peer should be there [s]: at the ends that the plugin cannot work without, and at others, which
-may start together with it."""
-
-PEER_POLL_PERIOD = 1.0
-"""Time between two looks [s]."""
-
-PEER_REPEAT_PERIOD = 10.0
-"""Time between two warnings about the same end, while nothing changes [s]."""
-
 
 class Peer:
     """The publisher or subscriber at the other end of a pipe.
@@ -54,7 +44,7 @@ class Peer:
             self.found = True
         return not self.found and (self.needed or not self.fault)
 
-    def judge(self, topics: Topics) -> None:
+    def update(self, topics: Topics) -> None:
         """Find out what is wrong, if anything is."""
         look = topics.missing_publisher if self._receives else topics.missing_subscriber
         missing = look(self._end.topic, self._end.carries)
@@ -92,11 +82,12 @@ class Peers:
         now = self._middleware.now()
         if self._has_called or now < self._next:
             return
-        self._next = now + PEER_POLL_PERIOD
+        self._next = now + 1.0
         missing = [peer for peer in self._peers if peer.open]
         if not missing:
             self._next = math.inf
-        due = [peer for peer in missing if now >= self._begin + (NEEDED if peer.needed else OPTIONAL)]
+        # others than those that it needs may start together with it, and later [s]
+        due = [peer for peer in missing if now >= self._begin + (1.0 if peer.needed else 5.0)]
         if due:
             self._has_called = True
             self._middleware.topics().add_done_callback(lambda answer: self._receive(answer, due, now))
@@ -106,7 +97,7 @@ class Peers:
         """Whether every peer was found, or needs no further warning."""
         return self._next == math.inf
 
-    def complaint(self) -> str:
+    def warning(self) -> str:
         """Return what is wrong with the needed peers, for the plugin's health; empty: nothing is known."""
         faults = [peer.fault for peer in self._peers if peer.needed and peer.fault and peer.open]
         return "; ".join(faults) or (self._trouble if any(peer.needed and peer.open for peer in self._peers) else "")
@@ -120,14 +111,15 @@ class Peers:
         else:
             self._trouble = ""
             for peer in due:
-                self._judge(peer, topics, now)
+                self._update(peer, topics, now)
         finally:
             self._has_called = False
 
-    def _judge(self, peer: Peer, topics: Topics, now: float) -> None:
+    def _update(self, peer: Peer, topics: Topics, now: float) -> None:
         before = peer.fault
-        peer.judge(topics)
-        if peer.fault and (peer.fault != before or now >= peer.warned + PEER_REPEAT_PERIOD):
+        peer.update(topics)
+        # again after 10 s, while nothing changes
+        if peer.fault and (peer.fault != before or now >= peer.warned + 10.0):
             peer.warned = now
             logger.warning("%s: %s", self._plugin, peer.fault)
         elif before and not peer.fault:

@@ -195,7 +195,7 @@ class Plugin:
         component.pace = self.overload.advance(work.advance(now))
         following = self.outputs.following
         if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
-            if not self.peers.complaint():
+            if not self.peers.warning():
                 raise fault
             following.start()  # no node receives its commands, which the health says
         if work.jumps is not None and life is RUNNING:
@@ -228,9 +228,9 @@ class Plugin:
     def health(self) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence."""
         level, summary = self._readiness.health(self.life is not STARTING)
-        complaint = "; ".join(filter(None, (self.overload.reason, self.peers.complaint())))
-        sentence = "; ".join(filter(None, (summary or self.life.name.lower(), complaint)))
-        return max(level, Health.WARNING) if complaint else level, sentence
+        warning = "; ".join(filter(None, (self.overload.reason, self.peers.warning())))
+        sentence = "; ".join(filter(None, (summary or self.life.name.lower(), warning)))
+        return max(level, Health.WARNING) if warning else level, sentence
 
     def pipe_reports(self) -> Iterator[tuple[str, HealthReport]]:
         """Yield the name and the health of each pipe; one thread may call it, also beside the loop."""

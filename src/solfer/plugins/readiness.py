@@ -17,9 +17,6 @@ logger = logging.getLogger(__name__)
 FIRST_MESSAGES_PATIENCE = 60.0
 """Longest wait for the first messages of all required feedbacks [s]."""
 
-RESTART_SETTLING_TIME = 0.1
-"""Time after a simulation began again until received messages are certain to be new [s]."""
-
 STALL = 0.2
 """Default of the lateness of a plugin's own loop at which it starts again [s]. After less a component goes on, by the
 time that has passed; meanwhile the lower level carries out its last commands, for its lease on the joints is longer."""
@@ -155,7 +152,7 @@ class Readiness:
         self.feedbacks.restart()
         if self._claim is not None:
             self._claim.lapse()
-        self._earliest = now + RESTART_SETTLING_TIME
+        self._earliest = now + 0.1  # by then received messages are certain to be new [s]
         self.lacks = f"{self._missing()}, {self._past}"
         self._level = logging.WARNING
 

@@ -5,17 +5,14 @@ from collections.abc import Sequence
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.cycle_timing import PassedPeriods
 
-EARLY, LATENESS = 0.03, 0.06
-"""Times by which the newest stamp may be before the robot's time, or behind it: messages come early or late [s]."""
+EARLIEST = 0.03
+"""Time by which the newest stamp may be before the robot's time: messages come early [s]."""
 
-ROBOT_TIME_LOWEST_SPEED = 0.01
-"""How fast the robot's time goes at least, by the clock: never not at all, for many divide by what has passed."""
+LATEST = 0.06
+"""Time by which it may be behind it: messages come late [s]."""
 
-DRIFT_WINDOW, CLOCK_TOLERANCE = 1.0, 0.02
-"""The clock counts again where the robot was no more than so much slower or faster within such a time [s]."""
-
-SET, CLOCK_JUMP = 1.0, 0.5
-"""A stamp that jumps by this is of a clock that was set, and one that stays for so long is of none [s]."""
+JUMP = 1.0
+"""A stamp that jumps by this is of a clock that was set [s]."""
 
 
 class RobotTime:
@@ -23,7 +20,7 @@ class RobotTime:
 
     A simulation that cannot hold real time falls behind the clock of those who command it: references that follow the
     clock would run away from the robot. The stamps of the first feedback that measures it show how far it has come.
-    Messages that are only late or lost change nothing: within `EARLY` and `LATENESS` the clock counts. Beyond that the
+    Messages that are only late or lost change nothing: within `EARLIEST` and `LATEST` the clock counts. Beyond that the
     stamps do, until the robot keeps up with the clock again.
 
     Args:
@@ -51,16 +48,17 @@ class RobotTime:
         progress = self._progress(by_clock)
         self._ahead += by_clock - progress
         self.lost = 0.0
-        if self._stamp == 0.0 or self._still > CLOCK_JUMP:
+        if self._stamp == 0.0 or self._still > 0.5:  # a stamp that stays for so long [s] is of no clock
             self._ahead = 0.0
             self._follows = False
         if not self._follows:
-            self._follow(not -EARLY <= self._ahead <= LATENESS)
+            self._follow(not -EARLIEST <= self._ahead <= LATEST)
             return by_clock
         self._looked += by_clock
-        if self._looked > DRIFT_WINDOW:
-            self._follow(abs(self._ahead) > CLOCK_TOLERANCE)
-        passed = max(progress, ROBOT_TIME_LOWEST_SPEED * by_clock)
+        # the clock counts again where the robot was no more than 0.02 s slower or faster within a second
+        if self._looked > 1.0:
+            self._follow(abs(self._ahead) > 0.02)
+        passed = max(progress, 0.01 * by_clock)  # never nothing, for many divide by it
         self.lost = by_clock - passed
         return passed
 
@@ -74,12 +72,12 @@ class RobotTime:
         """Return by how much the newest stamp has moved on [s]; a clock that was set has moved on as it should."""
         before = self._stamp
         stamp = before if self._feedback is None else self._feedback.stamp
-        if -SET < stamp - before <= 0.0:  # nothing new, or what has been overtaken
+        if -JUMP < stamp - before <= 0.0:  # nothing new, or what has been overtaken
             self._still += by_clock
             return 0.0
         self._stamp = stamp
         self._still = 0.0
-        if before and abs(stamp - before) < SET:
+        if before and abs(stamp - before) < JUMP:
             return stamp - before
         self._ahead = 0.0
         return by_clock

@@ -31,7 +31,7 @@ class Looking(Protocol):
     def look(self) -> None:
         """Look once."""
 
-    def complaint(self) -> str:
+    def warning(self) -> str:
         """Return what is wrong, in one line; empty: nothing."""
 
 
@@ -63,14 +63,14 @@ class Lookout:
             for name, peers in self._peers.items():
                 if not peers.done:
                     peers.look()
-                    self._report(name, peers.complaint())
+                    self._report(name, peers.warning())
             for part, report in chain.from_iterable(pipes() for pipes in self._pipes):
                 self._middleware.report(part, report.level, report.summary, report.values)
                 if self._end.wait(LOOKOUT_PAUSE):
                     return
 
-    def _report(self, name: str, complaint: str) -> None:
-        if complaint != self._published[name]:
-            self._published[name] = complaint
-            level = Health.WARNING if complaint else Health.GOOD
-            self._middleware.report(f"{name} pipes", level, complaint or "running", {})
+    def _report(self, name: str, warning: str) -> None:
+        if warning != self._published[name]:
+            self._published[name] = warning
+            level = Health.WARNING if warning else Health.GOOD
+            self._middleware.report(f"{name} pipes", level, warning or "running", {})

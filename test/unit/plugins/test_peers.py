@@ -56,17 +56,17 @@ def test_a_missing_publisher_is_warned_about_again(looking, caplog):
     looking.other.writer("wrenches", "sensor_msgs/JointState")
     looking.receive("gaols")
     looking.after(0.9)
-    assert not caplog.messages and looking.peers.complaint() == ""
+    assert not caplog.messages and looking.peers.warning() == ""
     looking.after(0.3)
     line = "no publisher on gaols (feedback 'pipe', cart.yaml:7:3); did you mean goals, gaols_of_others?"
-    assert caplog.messages == [f"cart: {line}"] and looking.peers.complaint() == line
+    assert caplog.messages == [f"cart: {line}"] and looking.peers.warning() == line
     looking.after(20.0)
     assert caplog.messages == [f"cart: {line}"] * 3
     looking.other.writer("gaols", KIND)
     looking.after(1.2)
     assert caplog.messages[3:] == [f"cart: resolved: {line}"]
     looking.after(1.2)
-    assert looking.peers.complaint() == "" and looking.peers.done
+    assert looking.peers.warning() == "" and looking.peers.done
 
 
 def test_a_missing_subscriber_suggests_any_fitting_topic(looking, caplog):
@@ -83,7 +83,7 @@ def test_an_optional_peer_is_warned_about_once(looking, caplog):
     assert not caplog.messages
     looking.after(30.0)
     assert caplog.messages == ["cart: no subscriber on desired (controller 'pipe', cart.yaml:7:3)"]
-    assert looking.peers.complaint() == "" and looking.peers.done
+    assert looking.peers.warning() == "" and looking.peers.done
 
 
 def test_a_present_peer_is_looked_for_once(looking, caplog, monkeypatch):
@@ -112,7 +112,7 @@ def test_a_failed_look_blames_no_peer(looking, caplog, monkeypatch):
     monkeypatch.setattr(MemoryMiddleware, "topics", fail)
     looking.receive("gaols")
     looking.after(3.0)
-    assert not caplog.messages and looking.peers.complaint() == "the master does not answer"
+    assert not caplog.messages and looking.peers.warning() == "the master does not answer"
 
 
 def test_a_missing_joint_order_warns_after_a_second(looking, caplog):

@@ -25,7 +25,7 @@ class Peers:
     def look(self):
         self.looks = min(self.looks + 1, len(self._complaints))
 
-    def complaint(self):
+    def warning(self):
         return self._complaints[self.looks - 1]
 
 

@@ -25,8 +25,6 @@ BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
 NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
 """In place of an orientation that is not measured."""
 
-NO_QUATERNION = [0.0] * 4
-
 LACKING = {
     (True, True): frozenset[str](),
     (False, True): frozenset(("orientation",)),
@@ -148,7 +146,8 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        zeros = message.orientation.tolist() == NO_QUATERNION  # no orientation: some drivers publish them instead of -1
+        no_quaternion = [0.0] * 4
+        zeros = message.orientation.tolist() == no_quaternion  # no orientation: some drivers publish them instead of -1
         oriented = not (zeros or np.isnan(message.orientation).all())
         turning = not np.isnan(message.angular).all()
         if oriented:

@@ -21,9 +21,6 @@ from solfer.transport.messages import ANY_INTERFACE, GAINS, JOINT_FIELDS, JOINT_
 VELOCITY_FIELDS = ("velocity",)
 """Fields that a velocity controller takes."""
 
-JOINT_PATIENCE = 10.0
-"""Longest wait for the lower level's gains [s]."""
-
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
     """Make a pipe from a topic to DoFs of a State; see `factory.feedback`."""
@@ -154,7 +151,8 @@ def _published_gains(
     carried = [gain for gain in GAINS if getattr(record.interface, gain)]
     if not carried or context.idle:
         return {}
-    published = context.middleware.controller_gains(record.leads_to, JOINT_PATIENCE, record.interface.where(carried[0]))
+    patience = 10.0  # longest wait for the lower level's gains [s]
+    published = context.middleware.controller_gains(record.leads_to, patience, record.interface.where(carried[0]))
     calibration = None if record.calibration is None else context.calibrations[record.calibration]
     names = external_names(mapping)
     hardware = [name if calibration is None else calibration.hardware(name) for name in names]

@@ -28,9 +28,6 @@ from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.plausibility import check_plausibility
 from solfer.robot.shipped import RobotFiles
 
-_ASSUMED_RATE = 100.0
-"""Rate of a plugin whose own has a mistake [Hz]."""
-
 
 def check_file(  # noqa: PLR0913 for users: what replaces values of the file, by its name
     file: str | os.PathLike,
@@ -232,7 +229,8 @@ class _PluginCheck:
             check_actuators(configuration, found)
         else:
             whole = configuration.name in self._report.configurations and not found
-            outside = DryMiddleware(part.assumed(_ASSUMED_RATE), files, whole)
+            assumed_rate = 100.0  # rate of a plugin whose own has a mistake [Hz]
+            outside = DryMiddleware(part.assumed(assumed_rate), files, whole)
             generation = (generator or UnknownComponent)(outside.configuration, outside)
             self._note(generation.check(whole), part.place(), found)
         self._report.problems.absorb(found)

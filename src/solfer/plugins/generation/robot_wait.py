@@ -10,9 +10,6 @@ from solfer.transport import Middleware
 ROBOT_POLL_PERIOD, ROBOT_REPEAT_PERIOD = 0.2, 10.0
 """Time between two looks, and between two messages about the same [s]."""
 
-MISSPELT = 0.85
-"""Likeness to a name that is there from which on a missing one is a mistake, which is not waited for."""
-
 logger = logging.getLogger(__name__)
 
 
@@ -93,4 +90,6 @@ def _joints(configuration: Configuration, middleware: Middleware) -> str:
 def _is_misspelt(name: str, present: Iterable[str]) -> bool:
     """Whether another name is meant that is present; the same one in a namespace is that of another robot."""
     last = name.rpartition("/")[2]
-    return bool(nearest(name, [each for each in present if each.rpartition("/")[2] != last], likeness=MISSPELT))
+    # likeness to a name that is there from which on a missing one is a mistake, which is not waited for
+    likeness = 0.85
+    return bool(nearest(name, [each for each in present if each.rpartition("/")[2] != last], likeness=likeness))

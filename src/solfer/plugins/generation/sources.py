@@ -14,9 +14,6 @@ from solfer.robot.shipped import RobotFiles
 COMMAND_TOPIC = "/command"
 """Topic of a lower-level controller, behind its name."""
 
-TOPIC_SIMILARITY = 0.8
-"""Likeness of two topics, of 1, from which one may be the other, misspelt: `upper_body` and `lower_body` have 0.7."""
-
 
 def sinks_of(configurations: Iterable[Configuration]) -> frozenset[str]:
     """Return the topics that plugins publish, and those of pipes that no plugin uses."""
@@ -42,7 +39,10 @@ def check_topics(
         source = (record.source or "").lstrip("/")
         if not source or _spelling(source) in spellings:
             continue
-        close = nearest(source, published, likeness=TOPIC_SIMILARITY)
+        # likeness of two topics, of 1, from which one may be the other, misspelt: `upper_body` and `lower_body` have
+        # 0.7
+        likeness = 0.8
+        close = nearest(source, published, likeness=likeness)
         mark = record.place("source")
         if close and mark is not None:
             what = f"neither the simulated robot nor a plugin of this file publishes '{record.source}'"

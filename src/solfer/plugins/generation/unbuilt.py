@@ -6,9 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-SEARCHED_FOLDERS = 3
-"""How many folders above a configuration are looked at: its own, its package's, and the workspace's `src/`."""
-
 
 @contextmanager
 def importable_beside(file: str) -> Iterator[None]:
@@ -29,7 +26,8 @@ def importable_beside(file: str) -> Iterator[None]:
 
 def _folders(start: Path) -> Iterator[Path]:
     """Yield the folders that may hold a package: those of the file's own package first, then those beside it."""
-    above = (start, *start.parents)[:SEARCHED_FOLDERS]
+    # a configuration's own folder, its package's, and the workspace's `src/`
+    above = (start, *start.parents)[:3]
     for folder in above:
         yield from (folder / "src", folder)
     for folder in above:

@@ -15,9 +15,6 @@ from solfer.transport.messages import GAINS, LARGEST_GAIN
 NOT_FINITE = "not finite"
 """Key of the count of values that were NaN or infinite."""
 
-GATE_ROUNDING = 1e-6
-"""Distance beyond a limit, in parts of it, that is no news: a position at the limit that was computed."""
-
 
 class CommandGate:
     """Checks and limits the commands of one pipe to the lower level, in place.
@@ -92,7 +89,8 @@ class CommandGate:
             return
         self._counts[self.kinds.index(field)] += int(outside.sum())
         index = int(np.argmax(abs(values - held)))
-        if abs(values[index] - held[index]) > GATE_ROUNDING * (1.0 + abs(held[index])):
+        # less is no news: a position at the limit that was computed
+        if abs(values[index] - held[index]) > 1e-6 * (1.0 + abs(held[index])):
             self._throttle.warning(
                 field,
                 "%s: '%s' of joint '%s' is held at its limit %.4g instead of %.4g",

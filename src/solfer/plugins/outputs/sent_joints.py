@@ -6,11 +6,8 @@ import numpy as np
 
 from solfer.pipes import JointCommandPipe
 
-SENT_JOINTS_NEARNESS = 0.2
+LARGEST_DEFLECTION = 0.2
 """Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
-
-YIELDING = 0.05
-"""How far such a joint may yield while its plugin waits: beyond that another robot is there, or something moved it."""
 
 
 class SentJoints:
@@ -40,7 +37,7 @@ class SentJoints:
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
         ]
-        self._reach = [np.full(dofs.shape, SENT_JOINTS_NEARNESS) for dofs, _ in self._positions]
+        self._reach = [np.full(dofs.shape, LARGEST_DEFLECTION) for dofs, _ in self._positions]
         self._velocities = [values for pipe in pipes for field, values in pipe.fields if field == "velocity"]
         self._are_followed = False
         self.is_sent = False
@@ -63,7 +60,9 @@ class SentJoints:
         for values in self._velocities:
             values.fill(0.0)
         for (dofs, sent), reach in zip(self._positions, self._reach, strict=True):
-            np.minimum(np.abs(sent - position[dofs]) + YIELDING, SENT_JOINTS_NEARNESS, out=reach)
+            # it may yield a little more while its plugin waits: beyond that another robot is there, or something
+            # moved it
+            np.minimum(np.abs(sent - position[dofs]) + 0.05, LARGEST_DEFLECTION, out=reach)
 
     def forget(self) -> None:
         """Forget what joints follow: others move them now, or the robot is in another state."""

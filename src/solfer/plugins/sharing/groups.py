@@ -16,9 +16,6 @@ from solfer.robot.names import FEEDBACK_MAP, UNACTUATED
 Number = tuple[str, str, str]
 """A number of a Robot that pipes write: State, interface, and DoF; or the wrench of a contact."""
 
-ALONE = "shared"
-"""Name of the shared plugin of a process that runs no other."""
-
 _GROUP_OWN = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout", "history")
 """Tags of a feedback that concern its plugin alone."""
 
@@ -39,7 +36,8 @@ def robot_groups(
         together: Names of the shared plugins that list them, in the same order; empty: none. None: one lists all.
     """
     groups: list[tuple[str, list[Configuration]]] = []
-    for configuration, shared in zip(configurations, together or [ALONE] * len(configurations), strict=True):
+    alone = "shared"  # a process that runs no other shared plugin
+    for configuration, shared in zip(configurations, together or [alone] * len(configurations), strict=True):
         known = (found for name, found in groups if name == shared)
         group = next((found for found in known if _fit(found[0], configuration, shared)), None)
         if group is None:
