@@ -7,7 +7,7 @@ import numpy as np
 from solfer.errors import Contradiction
 
 LEAPS, CONTRADICTS, TURN_SKEW, SPIKES, UNSCALED = 1, 2, 3, 4, 5
-"""Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
+"""Results of the compiled check, see `solfer.numerics.checks.orientations.check_turn`."""
 
 UNMEASURED = np.zeros(3)
 """Specific force of a link without an accelerometer [m/s^2]."""
@@ -28,16 +28,17 @@ class TurnCheck:
 
     def __init__(self) -> None:
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import check_turn
+        from solfer.numerics.checks import orientations
 
-        self._check = check_turn
-        self._before = np.zeros(24)  # see the kernel
+        self._check = orientations.check_turn
+        self._before = np.zeros(orientations.NUMBERS)
+        self._times = self._before[orientations.ARRIVAL : orientations.STAMP + 1]
         self.forget()
 
     def forget(self) -> None:
         """Accept whatever comes next."""
         self._before[:] = 0.0
-        self._before[4:6] = -math.inf
+        self._times[:] = -math.inf
 
     def check(
         self, values: np.ndarray, has_own_axes: bool, arrival: float, stamp: float, force: np.ndarray = UNMEASURED

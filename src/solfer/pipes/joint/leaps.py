@@ -27,20 +27,23 @@ class JointLeaps:
 
     def __init__(self, robot: Robot, dofs: np.ndarray):
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import find_leap
+        from solfer.numerics.checks import joints
 
-        self._find = find_leap
+        self._find = joints.find_leap
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
-        self._turns = robot.turns[dofs]
-        self._endless = np.isinf(robot.upper_limits.position[dofs])
-        self._before = np.zeros((13, len(dofs)))  # see the kernel
+        self._limits = self._fastest, robot.turns[dofs], np.isinf(robot.upper_limits.position[dofs])
+        self._before = np.zeros((joints.ROWS, len(dofs)))
+        self._place = self._before[joints.PLACE]
+        self._arrival = self._before[joints.ARRIVAL]
+        self._strayed = self._before[joints.STRAYED]
+        self._never = [joints.ARRIVAL, joints.STAMP, joints.LAST_STAMP, joints.SHAKEN_UNTIL]
         self.forget()
 
     def forget(self) -> None:
         """Accept whatever comes next."""
         self._before.fill(0.0)
-        self._before[[1, 2, 4, 10]] = -np.inf
+        self._before[self._never] = -np.inf
 
     def check(self, position: np.ndarray, velocity: np.ndarray, part: np.ndarray, arrival: float, stamp: float) -> None:
         """Check a message, and remember it.
@@ -55,20 +58,19 @@ class JointLeaps:
         Raises:
             Contradiction: A joint cannot be there, or so fast, or its velocities contradict it.
         """
-        given = self._fastest, self._turns, self._endless
-        wrong = self._find(position, velocity, part, self._before, *given, arrival, stamp)
+        wrong = self._find(position, velocity, part, self._before, *self._limits, arrival, stamp)
         if wrong < 0:
             return
         count = len(self._names)
         name = self._names[wrong % count]
         fastest = f"{self._fastest[wrong % count]:.3g} rad/s at most"
         if wrong >= 2 * count:
-            away = abs(self._before[6, wrong % count])
+            away = abs(self._strayed[wrong % count])
             raise Stray(
                 f"'{name}' moved more than {away:.3g} rad otherwise than by its velocities", expected="one encoder"
             )
         if wrong >= count:
             raise Contradiction(f"'{name}' at {velocity[wrong - count]:.3g} rad/s", expected=fastest)
-        leap = position[wrong] - self._before[0, wrong]
-        gap = arrival - self._before[1, wrong]
+        leap = position[wrong] - self._place[wrong]
+        gap = arrival - self._arrival[wrong]
         raise Contradiction(f"'{name}' leaps by {leap:.3g} rad in {1e3 * gap:.0f} ms", expected=fastest)

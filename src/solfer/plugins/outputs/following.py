@@ -26,7 +26,7 @@ class JointFollowing:
 
     def __init__(self, owner: str, pipes: Sequence[JointCommandPipe], robot: Robot, measured: Mapping[str, np.ndarray]):
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import find_astray, find_stuck
+        from solfer.numerics.checks.commands import find_astray, find_stuck
 
         self._owner = owner
         self._names = robot.dofs

@@ -1,0 +1,1 @@
+"""Compiled checks of what sensors measure, each with what it remembers in an array of named rows."""

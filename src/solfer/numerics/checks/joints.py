@@ -1,0 +1,212 @@
+"""Measurements of joints that cannot be true."""
+
+import math
+
+from solfer.numerics.compilation import cached, part
+from solfer.numerics.kernels import wrapped
+
+PLACE_MARGIN = 0.1
+"""Margin of the place of a joint [rad, m]."""
+
+SPEED_MARGIN = 5.0
+"""Margin of its speed [rad/s, m/s]."""
+
+LONGEST_INTERVAL = 1.0
+"""Longest time between two stamps that counts [s]: another clock may be anywhere."""
+
+WINDOW = 1.0
+"""Time constant of sums of motions that two sensors measure [s]."""
+
+GAP = 0.1
+"""Longest time between messages that are summed [s]."""
+
+KNOWN_INTERVAL = 0.025
+"""Time between two messages from which on the velocities at both do not show the way between them [s]."""
+
+STRAY_DISTANCE = 0.08
+"""Way of a joint that contradicts its velocities [rad, m]."""
+
+STRAY_RATIO = 0.2
+"""The same, as a ratio of its way by the velocities: they may be filtered."""
+
+STEP = 0.02
+"""Way between two messages that contradicts the velocities [rad, m]: encoders have steps of a few mrad, and velocities
+that are filtered for 20 ms lag behind accelerations of 100 rad/s2."""
+
+STAMP_ERROR = 0.005
+"""Time by which stamps may be wrong [s]."""
+
+HIDDEN_ACCELERATION = 400.0
+"""Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a link which swings at 30 Hz and
+8 rad/s."""
+
+RETURN_DISTANCE = 0.02
+"""Distance from where a joint was accepted last at which it is right again [rad, m]: less than a contradiction. A joint
+without ends may be anywhere."""
+
+RETURN_TIME = 0.5
+"""Time for which it has to move by its velocities until then [s]."""
+
+SHAKING_TIME = 0.5
+"""Time after the robot has struck something for which velocities do not show the ways of joints [s]."""
+
+# rows of what is remembered of each joint
+PLACE = 0
+"""Position of the last measurement that was possible."""
+
+ARRIVAL = 1
+"""Its arrival."""
+
+STAMP = 2
+"""Its stamp."""
+
+LAST_VELOCITY = 3
+"""Velocity of the last measurement, whether possible or not."""
+
+LAST_STAMP = 4
+"""Its stamp."""
+
+LAST_POSITION = 5
+"""Its position."""
+
+STRAYED = 6
+"""Sum of how far it moved otherwise than by its velocities."""
+
+ALLOWED = 7
+"""Sum of how far it may have."""
+
+FROZEN_TIME = 8
+"""For how long it was frozen in motion: what comes after that is compared with nothing."""
+
+LIMIT = 9
+"""How far `STRAYED` may be for position and velocities to agree again; 0 while they do."""
+
+SHAKEN_UNTIL = 10
+"""Until when its velocities do not show its ways."""
+
+AGREES_SINCE = 11
+"""Since when they agree again."""
+
+AGREED = 12
+"""Sum of the differences since then."""
+
+ROWS = 13
+
+
+@part
+def _is_struck(velocity, part, before, stamp):
+    """Whether so many joints change their velocities at once that the robot strikes something.
+
+    These are five that change them by 2 rad/s, m/s between two messages; a wrong encoder does not.
+    """
+    count = 0
+    for k in part:
+        if 0.0 < stamp - before[LAST_STAMP, k] < GAP and abs(velocity[k] - before[LAST_VELOCITY, k]) > 2.0:
+            count += 1
+    return count >= 5
+
+
+@part
+def _is_right_again(before, k, step, allowed, stamp, is_near):
+    """Whether a joint that contradicted its velocities has moved by them for long, and was near its place meanwhile."""
+    before[AGREED, k] += step
+    if not is_near or abs(step) > allowed or abs(before[AGREED, k]) > STEP:
+        before[AGREES_SINCE, k] = stamp
+        before[AGREED, k] = 0.0
+    return stamp - before[AGREES_SINCE, k] > RETURN_TIME
+
+
+@part
+def _forgive(before, k):
+    """Forget the differences between the ways of a joint."""
+    before[STRAYED, k] = before[ALLOWED, k] = before[LIMIT, k] = 0.0
+
+
+def _find_leap(position, velocity, part, before, fastest, turns, endless, arrival, stamp):
+    """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
+
+    Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
+    joint may have moved faster or slower than both by as much.
+
+    With the position q, the velocity v and the time T between two messages, a step strays by
+    q - q' - T (v + v') / 2. The sum of such steps, S <- S / (1 + T / WINDOW) + s, may be STRAY_DISTANCE and the sum of
+    T (STRAY_RATIO max(|v|, |v'|) + |v - v'|).
+
+    Args:
+        position: Measured positions.
+        velocity: Measured velocities; empty: there are none.
+        part: Indices of the joints that were measured.
+        before: What is remembered of each joint, shape (ROWS, n).
+        fastest: Largest speed of each joint; infinity: none is known.
+        turns: What positions may jump by; 0: nothing.
+        endless: Whether each joint has no ends.
+        arrival: Arrival of the measurement.
+        stamp: Its stamp.
+
+    Returns:
+        Index of the joint; plus the number of joints where it is too fast, plus twice that where it does not move by
+        its velocities. -1: there is none.
+    """
+    wrong = -1
+    if len(velocity) and _is_struck(velocity, part, before, stamp):
+        for k in part:
+            before[SHAKEN_UNTIL, k] = stamp + SHAKING_TIME
+    for k in part:
+        away = wrapped(position[k] - before[PLACE, k], turns[k])
+        elapsed = max(arrival - before[ARRIVAL, k], min(stamp - before[STAMP, k], LONGEST_INTERVAL))
+        if wrong < 0 and abs(away) > PLACE_MARGIN + 2.0 * fastest[k] * elapsed:
+            wrong = k
+        if len(velocity) and fastest[k] < math.inf:
+            fast = velocity[k]
+            slow = before[LAST_VELOCITY, k]
+            passed = stamp - before[LAST_STAMP, k]
+            if wrong < 0 and abs(fast) > SPEED_MARGIN + 3.0 * fastest[k]:
+                wrong = k + len(position)
+            is_frozen = fast == slow and fast != 0.0 and position[k] == before[LAST_POSITION, k]
+            step = wrapped(position[k] - before[LAST_POSITION, k], turns[k]) - 0.5 * passed * (fast + slow)
+            is_shaken = before[SHAKEN_UNTIL, k] - SHAKING_TIME <= stamp < before[SHAKEN_UNTIL, k]
+            was_frozen = before[FROZEN_TIME, k] > GAP and not is_frozen
+            if is_shaken or passed >= GAP or passed < -LONGEST_INTERVAL or was_frozen:
+                _forgive(before, k)
+            elif passed > 0.0 and before[LIMIT, k] > 0.0:  # all counts until they agree, and nothing excuses it
+                before[STRAYED, k] += step
+                allowed = STEP + STAMP_ERROR * max(abs(fast), abs(slow))
+                is_near = endless[k] or abs(away) < RETURN_DISTANCE
+                if abs(before[STRAYED, k]) <= before[LIMIT, k]:
+                    before[LIMIT, k] = 0.0
+                elif _is_right_again(before, k, step, allowed, stamp, is_near):
+                    _forgive(before, k)
+            elif 0.0 < passed < KNOWN_INTERVAL and (fast != 0.0 or slow != 0.0 or before[ALLOWED, k] > 0.0):
+                keep = WINDOW / (WINDOW + passed)
+                speed = max(abs(fast), abs(slow))
+                allowed = passed * (STRAY_RATIO * speed + abs(fast - slow))
+                before[STRAYED, k] = keep * before[STRAYED, k] + step
+                before[ALLOWED, k] = keep * before[ALLOWED, k] + allowed
+                if abs(before[STRAYED, k]) > STRAY_DISTANCE + before[ALLOWED, k]:
+                    before[LIMIT, k] = STRAY_DISTANCE + before[ALLOWED, k]
+                allowed += STEP + STAMP_ERROR * speed + HIDDEN_ACCELERATION * passed * passed
+                if abs(step) > allowed:
+                    before[STRAYED, k] = step
+                    before[LIMIT, k] = allowed
+                before[AGREES_SINCE, k] = stamp
+                before[AGREED, k] = 0.0
+            if wrong < 0 and before[LIMIT, k] > 0.0:
+                wrong = k + 2 * len(position)
+            if passed != 0.0:
+                before[LAST_VELOCITY, k] = fast
+                before[LAST_STAMP, k] = stamp
+                before[LAST_POSITION, k] = position[k]
+                before[FROZEN_TIME, k] = before[FROZEN_TIME, k] + passed if is_frozen else 0.0
+    if wrong < 0:
+        for k in part:
+            before[PLACE, k] = position[k]
+            before[ARRIVAL, k] = arrival
+            before[STAMP, k] = stamp
+    return wrong
+
+
+find_leap = cached(
+    "int64(float64[::1], float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], boolean[::1],"
+    " float64, float64)",
+    _find_leap,
+)
