@@ -118,7 +118,7 @@ def _is_right_again(before, k, step, allowed, stamp, is_near):
 
 @part
 def _forgive(before, k):
-    """Forget the differences between the ways of a joint."""
+    """Forget how far a joint has strayed."""
     before[STRAYED, k] = before[ALLOWED, k] = before[LIMIT, k] = 0.0
 
 
