@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from support.unit.golden import golden, lower_body, rolling_legs
 
 from solfer.components.odometry import Odometry
-from solfer.components.odometry.kalman_kernel import STATE_TILT
+from solfer.components.odometry.kalman_kernel import TILT
 from solfer.components.odometry.messages import SetBase, StampedUncertainPose, UncertainPose
 from solfer.components.odometry.tags import OdometryTags
 from solfer.errors import ComponentError, NotFinite
@@ -246,7 +246,7 @@ def test_covariances_are_those_of_the_errors(robot):
     turn = Rotation.from_euler("z", law.heading).as_matrix()[:2, :2]
     made_of = np.zeros((6, len(errors)))
     made_of[[0, 1, 2, 5], range(4)] = 1.0
-    made_of[3:5, STATE_TILT : STATE_TILT + 2] = -turn
+    made_of[3:5, TILT : TILT + 2] = -turn
     np.testing.assert_allclose(pose, made_of @ errors @ made_of.T, atol=1e-16)
     assert np.abs(pose[3:5, 5]).max() > 0.0 or np.abs(pose[3:5, :2]).max() > 0.0
     np.testing.assert_allclose(twist[:3, :3] - errors[4:7, 4:7], (twist[:3, :3] - errors[4:7, 4:7]).T, atol=1e-16)

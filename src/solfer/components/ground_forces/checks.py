@@ -5,7 +5,6 @@ Together they carry the robot: M g + sum f_k = M a, and a mean acceleration a of
 """
 
 import logging
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -86,7 +85,9 @@ class ContactChecks:
         least, most = CARRIED
         if least <= ratio <= most:
             return ""
-        return f"contacts carry {ratio:.2g} of the robot's weight by the joints' efforts: it is lifted, or they are wrong"
+        return (
+            f"contacts carry {ratio:.2g} of the robot's weight by the joints' efforts: it is lifted, or they are wrong"
+        )
 
     def _judge(self, normal: float, tangential: float) -> tuple[str, str]:
         """Return what a contact does, and what is wrong with that, empty if nothing is; forces in [N]."""

@@ -11,8 +11,6 @@ from solfer.points import Handler, make_contact
 from solfer.points.contact.contacts import RollingContact
 from solfer.robot import Robot
 
-LEVEL_AXLE = 1.0 - 1e-9
-
 
 class _Ground:
     """The plane on which wheels roll.
@@ -35,7 +33,7 @@ class _Ground:
         length = math.sqrt(x * x + y * y + z * z)
         self.normal[:] = x / length, y / length, z / length
         was_level = self.is_level
-        self.is_level = bool(self.normal[2] >= LEVEL_AXLE)
+        self.is_level = bool(self.normal[2] >= 1.0 - 1e-9)
         if self.is_level and not was_level:
             self._tilt(self.normal)
 
