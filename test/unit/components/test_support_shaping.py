@@ -228,7 +228,7 @@ def test_infeasible_margins_let_it_stand(make, caplog, policy, share, words):
     cycle(component, 1500, (0.0,) * 12)
     before = component.model.command.position.copy()
     cycle(component, 400)
-    assert component.shaping.governor.share == pytest.approx(share)
+    assert component.shaping.governor.ratio == pytest.approx(share)
     assert FRONT in component.shaping.report.margins().infeasible or reserve(component, FRONT) < -0.5
     assert f"'{FRONT}' cannot be kept" in caplog.text and words in caplog.text
     assert np.abs(component.model.command.position - before)[:LOWER].max() < 2e-2

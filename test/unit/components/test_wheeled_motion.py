@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
-from solfer.components.wheeled_motion.original.resteering import RESTEERING_MAXIMUM, Resteering
+from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
@@ -74,7 +74,7 @@ def begin(component, motion):
     references, robot = component.references, component.model
     if motion["centred"]:
         references.position[:2] = robot.state.position[:2]
-    references.velocity[:2], references.turn[2] = motion["velocity"][:2], motion["velocity"][2]
+    references.velocity[:2], references.angular[2] = motion["velocity"][:2], motion["velocity"][2]
     references.vertex_velocity[:] = np.reshape(motion["vertices"], (4, 3))
 
 
@@ -114,7 +114,7 @@ def test_a_wheel_at_its_end_turns_back():
         if not joint.sides[0]:
             break
         state, steps = command, steps + 1
-    assert steps == np.ceil(RESTEERING_MAXIMUM / np.radians(5.0)) and joint.sides[0] == 0.0
+    assert steps == np.ceil(2.8 / np.radians(5.0)) and joint.sides[0] == 0.0
     assert_allclose(state, -1.997 + steps * np.radians(5.0))
 
 
@@ -374,7 +374,7 @@ def test_positions_ahead_of_a_motion_are_followed_without_a_lag(make):
     begin, vertices = references.position.copy(), references.vertices.copy()
     time, rows = 0.0, []
     for index in range(1600):
-        time += PERIOD * references.pace * component.targets.share  # of the course, which waits for the wheels
+        time += PERIOD * references.pace * component.targets.ratio  # of the course, which waits for the wheels
         speed = rate * min(1.0, time / 1.5)
         angle = rate * (0.5 * time**2 / 1.5 if time < 1.5 else time - 0.75)
         x, y = radius * np.sin(angle), radius * (1.0 - np.cos(angle))
@@ -465,7 +465,7 @@ def test_velocities_are_bounded(make):
         component._take_over(0.0)
     assert_allclose(component.references.velocity, (0.09, 0.12, 0.0))  # 0.3 m/s2 for 0.5 s
     assert_allclose(component.wheels.offsets.heading, 0.0)
-    assert_allclose(component.references.turn[2], -0.25)
+    assert_allclose(component.references.angular[2], -0.25)
     assert_allclose(
         component.references.vertex_velocity[:, 0], 0.5 / 7.0
     )  # one share of all: the path stays what it is

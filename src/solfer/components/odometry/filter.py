@@ -55,9 +55,10 @@ class ImuProgress:
 class FilteredOdometry:
     """The base's pose and its covariance by `WheelInertialFilter`.
 
-    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the rotation p of the base
-    between two measurements, a wheel that rolls measures the base's displacement m_i = -(J_i dq + p x r_i), with J and the arm r
-    as means of both, so that the error is of third order. Encoders count and not velocities: no noise adds up.
+    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the rotation p of the
+    base between two measurements, a wheel that rolls measures the displacement m_i = -(J_i dq + p x r_i) of the base,
+    with J and the arm r as means of both, so that the error is of third order. Encoders count and not velocities: no
+    noise adds up.
 
     Each measurement of the joints is one update: the IMU predicts, the wheels that are neither lifted nor slip correct,
     and the pose is integrated. Ground that rises less than `level` is level and measures the error of the IMU's tilt;
@@ -318,7 +319,8 @@ class FilteredOdometry:
 
     def _tolerance(self, speed: float) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
-        # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead; below 0.15 m/s encoders are too coarse
+        # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead; below 0.15 m/s
+        # encoders are too coarse to measure that
         sloped = 0.0 if self._ground.map.level else 1.5 * float(self._motion.spreads.max()) / max(speed, 0.15)
         noise = 5e-4  # [m/s] by encoders
         return noise * noise + (self._tags.radius_share * speed) ** 2 + sloped * sloped

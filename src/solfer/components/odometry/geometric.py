@@ -79,10 +79,10 @@ class GeometricOdometry:
 
     With the centre c_i of a wheel from the base, its axis a_i and its turn dt_i, it has gone (a_i x n) / |a_i x n| r
     dt_i along the ground with the normal n. From where each wheel was, each measures the base; what disagrees is
-    left out (`middle`). The yaw rate about n and the base's velocity solve the velocities of each pair of wheels, for which
-    the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The yaw rate is
-    integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the IMU's
-    turn keeps the axes of the IMU's world, as in the paper's own program: its poses are these.
+    left out (`middle`). The yaw rate about n and the base's velocity solve the velocities of each pair of wheels, for
+    which the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The yaw
+    rate is integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the
+    IMU's rotation keeps the axes of the IMU's world, as in the paper's own program: its poses are these.
 
     Args:
         robot: The Robot.

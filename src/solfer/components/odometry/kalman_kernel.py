@@ -261,7 +261,7 @@ def _predict(covariance, state, axes, arm, heading, angles, imu_time, keeps, var
     """Propagate up to the wheels' measurement.
 
     `angles` are those by which the axes of velocity and tilt turn [rad]; `keeps` the ratios that scrubbing and slopes
-    keep; `variances` those of velocity, scrubbing, gyroscope, tilt and slopes. The tilt itself follows in `follow_tilt`.
+    keep; `variances` those of velocity, scrubbing, gyroscope, tilt and slopes. `follow_tilt` changes the tilt itself.
     """
     scrub_keep, slope_keep = keeps
     moves = half[0]

@@ -56,8 +56,8 @@ class Streams:
     """Measurements of joints and base, each of one time, from two streams of messages.
 
     Each message of the joints is a measurement at its stamp. What the IMU measured then lies between its samples before
-    and after; joints wait for the latter, for `LONGEST_LAG` at most. A sensor that is silent is no measurement. Where the State
-    has no histories of both, what it has in each cycle is a measurement of that cycle.
+    and after; joints wait for the latter, for `LONGEST_LAG` at most. A sensor that is silent is no measurement. Where
+    the State has no histories of both, what it has in each cycle is a measurement of that cycle.
 
     Args:
         robot: The Robot. Measurements are written into its State, one after the other.

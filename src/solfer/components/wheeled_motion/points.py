@@ -58,13 +58,13 @@ class WheelAngles(CompiledPoint, abc.ABC):
 
 
 class Camber(WheelAngles):
-    """Camber of wheels [rad]: how far a wheel's plane leans against the ground's normal, -asin(axle's z)."""
+    """Camber of wheels [rad]: how far a wheel's plane is tilted against the ground's normal, -asin(axle's z)."""
 
     kernel = camber
 
 
 class Caster(WheelAngles):
-    """Caster of wheels [rad]: how far the axis of steering leans against the ground's normal, about the axle.
+    """Caster of wheels [rad]: how far the axis of steering is tilted against the ground's normal, about the axle.
 
     With the axis u of steering, z of the link that carries the wheel, the axle n and the normal z of the ground:
     atan2(z.(n x u), z.u).

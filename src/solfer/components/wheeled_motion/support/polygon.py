@@ -8,9 +8,6 @@ from solfer.components.wheeled_motion.support.kernel import EDGE_SIZE, INSIDE, N
 from solfer.numerics.pointers import address
 from solfer.points import CenterOfMass, SupportVertex
 
-POLYGON_NEARNESS = 1e-4
-"""How far a centre of mass may be from where it is carried [m]."""
-
 
 class SupportPolygon:
     """The polygon of the vertices on the ground, and the centre of mass in it.
@@ -47,10 +44,10 @@ class SupportPolygon:
         edges = self.edges[: find_edges(self.points, flags, self.order, self.edges)]
         normals = edges[:, [NORMAL_X, NORMAL_Y]]
         shift = np.zeros(2)
-        for _ in range(32):  # projections on half-planes, in turn, meet in their common part
+        for _ in range(32):  # projections on half-planes, one after the other, meet in their common part
             lacks = least - (edges[:, INSIDE] + normals @ shift)
             shortest = int(lacks.argmax())
-            if lacks[shortest] < POLYGON_NEARNESS:
+            if lacks[shortest] < 1e-4:  # [m]
                 break
             shift += lacks[shortest] * normals[shortest]
         return float(shift[0]), float(shift[1])
