@@ -192,7 +192,7 @@ def test_a_gap_in_the_joints_is_bridged(robot):
 
 @pytest.mark.slow
 def test_covariance_grows_without_the_imu():
-    """The heading's variance must tell users of the topic that nothing measures the turn any more."""
+    """The heading's variance must show users of the topic that nothing measures the turn any more."""
     grown = []
     for silent in (False, True):
         robot = standing()
@@ -308,7 +308,7 @@ def published(made, name):
     return [topic for topic in made.topics() if isinstance(topic, TopicOut) and topic.name == name]
 
 
-def test_the_base_is_a_transform_where_it_is_wanted(robot):
+def test_the_base_is_a_transform_where_it_is_configured(robot):
     assert not published(component(standing()), "/tf")
     made = component(robot, transform=True)
     drive(made, 0.5)
