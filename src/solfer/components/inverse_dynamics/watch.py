@@ -190,9 +190,8 @@ def _watch(
 _ROWS = "float64[:, ::1]"
 _ROW = "float64[::1]"
 _INDICES = "int64[::1]"
-_FLAGS = "boolean[::1]"
 watch = cached(
     f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, "
-    f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",
+    f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, boolean[::1], {_ROWS})",
     _watch,
 )

@@ -149,7 +149,7 @@ class Odometry(Component):
                 self._throttle.warning(check.warning, "%s: %s, it does not count", self.name, check.warning)
                 check.warning = ""
         if isinstance(self.law, FilteredOdometry) and self.law.consensus.contradicted > self._INCONSISTENCY_TIME:
-            self._throttle.warning("turn", "%s: %s", self.name, self._inconsistency())
+            self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
 
     def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""

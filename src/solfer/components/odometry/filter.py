@@ -192,7 +192,7 @@ class FilteredOdometry:
         """Write the covariances of the pose, in world axes, and of the twist, in the heading frame.
 
         Args:
-            pose: Of position and turns, shape (6, 6) [m, rad].
+            pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
         self.kalman.write_covariances(self.heading, self._motion.arm, self._period, pose, twist)

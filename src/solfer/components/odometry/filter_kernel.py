@@ -19,7 +19,7 @@ def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
 
 
 def _subtract_tilt(arms, jacobian, x, y):
-    """Turn arms and Jacobians back by a small turn about the axes x and y [rad]."""
+    """Turn arms and Jacobians back by a small rotation about the axes x and y [rad]."""
     for i in range(len(arms)):
         a, b, c = arms[i]
         arms[i, 0], arms[i, 1], arms[i, 2] = a - y * c, b + x * c, c + y * a - x * b
@@ -191,7 +191,7 @@ def along_normal(displacements, arms, i, yaw, x, y, z):
 
 @part
 def along_normal_by_tilting(arms, i, px, py, x, y, z):
-    """Return how far a wheel goes along a normal x, y, z by the turns px and py of the base [m]."""
+    """Return how far a wheel goes along a normal x, y, z by the rotations px and py of the base [m]."""
     return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
 
 
@@ -246,7 +246,7 @@ def _velocity_of_base(jacobian, rates, angular, arms, weights, velocity):
 
 
 def _turned(rotation, known, heading, out):
-    """Write the turn from a rotation that was known to another one as a vector [rad], in axes of a heading [rad].
+    """Write the rotation from one that was known to another one as a vector [rad], in axes of a heading [rad].
 
     Returns whether it is less than a right angle; where it is not nothing is written.
     """

@@ -35,15 +35,15 @@ class TiltedWheels:
         self._before = np.zeros(len(wheels))
         self.centers = np.zeros((len(wheels), 3))
 
-    def update(self, turn: np.ndarray) -> None:
+    def update(self, rotation: np.ndarray) -> None:
         """Find centres, axes and velocities by the Robot's kinematics, turned by a rotation, shape (3, 3)."""
         kinematics = self._robot.kinematics
         origin = kinematics.position(kinematics.base_link or "")
-        self.centers[:] = [turn @ (kinematics.position(link) - origin) for link in self._links]
-        self._axes = [turn @ kinematics.rotation(link)[:, 2] for link in self._links]
+        self.centers[:] = [rotation @ (kinematics.position(link) - origin) for link in self._links]
+        self._axes = [rotation @ kinematics.rotation(link)[:, 2] for link in self._links]
         joints = self._robot.state.velocity[6:]
         moving = [kinematics.jacobian(link)[:, 6:] @ joints for link in self._links]
-        self._moving = [np.concatenate((turn @ each[:3], turn @ each[3:])) for each in moving]
+        self._moving = [np.concatenate((rotation @ each[:3], rotation @ each[3:])) for each in moving]
 
     def start(self) -> None:
         """Let displacements begin where the wheels are."""
@@ -77,8 +77,8 @@ class TiltedWheels:
 class GeometricOdometry:
     """The base's pose by the steps of the wheels, each of which measures a pose, and by the IMU's tilt.
 
-    With the centre c_i of a wheel from the base, its axis a_i and its turn dt_i, it has gone (a_i x n) / |a_i x n| r
-    dt_i along the ground with the normal n. From where each wheel was, each measures the base; what disagrees is
+    With the centre c_i of a wheel from the base, its axis a_i and its rotation dt_i, it has gone (a_i x n) / |a_i x n|
+    r dt_i along the ground with the normal n. From where each wheel was, each measures the base; what disagrees is
     left out (`middle`). The yaw rate about n and the base's velocity solve the velocities of each pair of wheels, for
     which the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The yaw
     rate is integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the

@@ -188,12 +188,11 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
 _F = "float64"
-_I = "int64[:, ::1]"
 _T = "float64[:, :, ::1]"
 _N = "int64[::1]"
 
 missing_height = cached(
-    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, {_I}, {_V}, {_M})",
+    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, int64[:, ::1], {_V}, {_M})",
     _missing_height,
 )
 note = cached(f"boolean({_M}, {_F}, {_V}, {_V}, {_T}, {_M}, {_N})", _note)

@@ -103,8 +103,8 @@ class ImuSamples:
         fraction = (time - float(samples.stamps[before])) / span if span else 0.0
         self._angles_before[:] = self._angles
         for axis in range(3):
-            turn = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
-            self._angles[axis] = first[axis] + fraction * turn
+            change = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
+            self._angles[axis] = first[axis] + fraction * change
         state.position[3:6] = self._angles
         turned = self._turned_at(before, after, fraction)
         passed = time - self.measured_at
@@ -128,6 +128,6 @@ class ImuSamples:
         second = samples.rows[after]
         span = samples.stamps[after] - samples.stamps[before]
         if span > LONGEST_LAG:  # too long for rates: angles do not drift in it
-            turn = second[ANGLES] - first[ANGLES]
-            return first[INTEGRALS] + fraction * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
+            change = second[ANGLES] - first[ANGLES]
+            return first[INTEGRALS] + fraction * (change - 2.0 * math.pi * np.round(change / (2.0 * math.pi)))
         return first[INTEGRALS] + fraction * span * (first[RATES] + 0.5 * fraction * (second[RATES] - first[RATES]))

@@ -226,7 +226,7 @@ class WheelInertialFilter:
         )  # fmt: skip
 
     def follow_tilt(self, yaw: float, x: float, y: float) -> None:
-        """Let the tilt's error follow what the IMU's orientation turns more than its gyroscope.
+        """Let the tilt's error follow what the IMU's orientation rotates more than its gyroscope.
 
         Args:
             yaw: Yaw of H [rad].
@@ -323,7 +323,7 @@ class WheelInertialFilter:
             heading: Heading [rad].
             arm: From the base's origin to the ground point in H, shape (3,) [m].
             period: Interval for which the angular velocity is a mean [s].
-            pose: Of position and turns, shape (6, 6) [m, rad].
+            pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
         kernel.write_covariances(self.covariance, heading, arm, self._variances.noise / period, pose, twist)

@@ -64,7 +64,7 @@ def set_rotation(transition, first, angle):
 
 @part
 def tilt_moves(arm, heading, axis, out):
-    """Write how far the ground point goes in the world for a small turn about an axis (0 or 1) of H: R (e x arm)."""
+    """Write how far the ground point goes in the world by a small rotation about an axis (0, 1) of H: R (e x arm)."""
     cosine = math.cos(heading)
     sine = math.sin(heading)
     x, y = (0.0, -arm[2]) if axis == 0 else (arm[2], 0.0)
@@ -77,7 +77,7 @@ def tilt_moves(arm, heading, axis, out):
 def set_process(transition, axes, arm, heading, yaw, tilt_yaw, imu_time, scrub_keep, slope_keep, moves):
     """Write the Jacobian of the process up to the wheels' measurement.
 
-    A bias that errs turns the tilt wrongly for the time of the IMU's samples, and moves the base by that turn.
+    A bias that errs turns the tilt wrongly for the time of the IMU's samples, and moves the base by that rotation.
     """
     set_identity(transition)
     set_rotation(transition, VELOCITY, yaw)
@@ -399,15 +399,15 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
 _F = "float64"
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
-_T = "float64[:, :, ::1]"
-_B = "boolean[::1]"
 _PAIR = "UniTuple(float64, 2)"
 
 predict = cached(
     f"void({_M}, {_V}, {_M}, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5), {_M}, {_M}, {_M})", _predict
 )
 correct = cached(
-    f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, {_B}, {_V}, {_M}, {_M})", _correct, sources=[DENSE]
+    f"void({_M}, {_V}, float64[:, :, ::1], {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, boolean[::1], {_V}, {_M}, {_M})",
+    _correct,
+    sources=[DENSE],
 )
 integrate = cached(f"void({_M}, {_V}, {_F}, {_V}, {_F}, {_F}, UniTuple(float64, 3), {_M}, {_M}, {_M})", _integrate)
 level = cached(f"boolean({_M}, {_V}, {_F}, {_F}, {_F}, {_M})", _level)

@@ -66,7 +66,7 @@ class MeasuredBase:
         self.angular[:] = about_vertical(angular, -self.heading)
 
     def subtract_tilt(self, x: float, y: float) -> None:
-        """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn lacks it."""
+        """Subtract an error of the tilt, rotations about x and y of the heading frame [rad]; the next lacks it."""
         cosine = math.cos(self.heading)
         sine = math.sin(self.heading)
         x, y = cosine * x - sine * y, sine * x + cosine * y

@@ -24,7 +24,7 @@ class SetBase:
 
 @dataclass(frozen=True)
 class UncertainPose:
-    """A pose, and the covariance of x, y, z [m] and of turns about the axes of the world [rad], row by row."""
+    """A pose, and the covariance of x, y, z [m] and of rotations about the axes of the world [rad], row by row."""
 
     pose: Pose = field(default_factory=Pose)
     covariance: tuple[float, ...] = (0.0,) * 36

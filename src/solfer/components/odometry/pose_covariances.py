@@ -14,7 +14,7 @@ class PoseCovariances:
         command: The desired State, which gets both as interfaces more.
 
     Attributes:
-        pose: Covariance of position and turns in world axes, shape (6, 6) [m, rad]; live.
+        pose: Covariance of position and rotations in world axes, shape (6, 6) [m, rad]; live.
         deviations: Standard deviations of the pose, shape (6,) [m, rad], as of the last `find_deviations`; live.
     """
 

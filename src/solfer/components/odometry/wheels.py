@@ -37,7 +37,7 @@ class _Ground:
         if self.is_level and not was_level:
             self._tilt(self.normal)
 
-    def turn(self, cosine: float, sine: float) -> None:
+    def rotate(self, cosine: float, sine: float) -> None:
         """Let the contacts have the normal, turned about the vertical."""
         if not self.is_level:
             x, y, z = self.normal.tolist()
@@ -136,7 +136,7 @@ class Wheels:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)
         sine = math.sin(heading)
-        self._ground.turn(cosine, sine)
+        self._ground.rotate(cosine, sine)
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
         places = self._contacts.value.reshape(-1, 3)

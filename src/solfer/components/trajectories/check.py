@@ -22,8 +22,8 @@ class TrajectoryCheck:
 
     Args:
         joints: Names of the joints that may be moved.
-        lower: Their least positions, shape (n,) [rad, m].
-        upper: Their largest positions.
+        lower: Their lower limits of position, shape (n,) [rad, m].
+        upper: Their upper limits.
         speed: Their velocity limits [rad/s, m/s].
         turns: Revolution of those that are continuous, 0 of the others [rad].
     """

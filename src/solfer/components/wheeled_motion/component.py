@@ -174,7 +174,7 @@ class WheeledMotion(Component):
         self._pace.limit(speeds, accelerations[0])
         self.tasks.limit(speeds, accelerations, values[6:9])
         margin, self._lifting.margin = values[9:]
-        self._guard.leave(margin)
+        self._guard.set_required_margin(margin)
 
     def _take_across(self, gain: np.ndarray) -> None:
         if self.received.straight is None:

@@ -51,7 +51,7 @@ class Drive:
 
     Attributes:
         is_active: Whether it drives.
-        ratio: Ratio to the newest velocity that is not larger than it may be.
+        ratio: Factor that scales the newest velocity to its limits, 1 within them.
         progress: Ratio of that which it has reached, where it began in the middle of a motion, as after a restart: the
             rest of the way would be lost to the sender. Else 1.
     """
@@ -136,7 +136,7 @@ class Drive:
         Args:
             references: The desired motion.
             heading: Of the base [rad].
-            ratio: Ratio of the newest velocity that counts, no larger than `self.ratio`.
+            ratio: Factor of the newest velocity, no larger than `self.ratio`.
             passed: Time since the cycle before [s].
         """
         if not self.is_active:
@@ -149,7 +149,7 @@ class Drive:
             self._measure_progress(references, ratio)
 
     def _measure_progress(self, references: References, ratio: float) -> None:
-        """Compare velocity and yaw rate with the ratio of those that were sent."""
+        """Compare velocity and yaw rate with those that were sent, times a ratio."""
         x, y, z, yaw_rate = self._state[:IN_WORLD].tolist()
         progress = 1.0
         if speed := ratio * math.hypot(x, y, z):

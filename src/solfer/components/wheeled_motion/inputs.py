@@ -41,7 +41,7 @@ class ReferenceInputs:
 
     @property
     def ratio(self) -> float:
-        """Ratio of the velocities of others that is not larger than it may be: one of base and vertices."""
+        """Factor that scales the velocities of others to their limits: one of base and vertices."""
         return min(self.drive.ratio, self.targets.ratio)
 
     @property

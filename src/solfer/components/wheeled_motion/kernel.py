@@ -17,7 +17,7 @@ WAKE_DISTANCE = 4e-3
 """Error of a vertex that lets its wheel steer again [m]."""
 
 WAKE_TIME = 0.3
-"""Time for which it has to be larger [s]: an estimate of the base that is late for a moment would turn wheels on the
+"""Time for which that error has to last [s]: an estimate of the base that is late for a moment would turn wheels on the
 spot, and they the base."""
 
 EXTRA_ANGLE = 0.35
@@ -218,8 +218,8 @@ def _find_soft(angles, desired, half, most, error):
 
 
 @part
-def _choose_turns(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
-    """Write desired directions of wheels, by the shorter turn whose end is within the range of the steering joint.
+def _choose_rotations(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
+    """Write desired directions of wheels, by the shorter rotation whose end is within the range of the steering joint.
 
     The way goes from where the joint is measured, as the wheel is; its commanded position may be elsewhere, and has to
     be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its
@@ -287,7 +287,7 @@ def _find_errors(start):
             wheels = _states_at(memory.wheels, count)
             angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
-            _choose_turns(*given, lower, upper, most[0], ahead)
+            _choose_rotations(*given, lower, upper, most[0], ahead)
         _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles = vector_at(memory.camber, count)

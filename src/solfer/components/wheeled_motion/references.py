@@ -30,7 +30,7 @@ class References:
         motion: Velocity, angular velocity and position, shape (3, 3).
         places: Velocities of the vertices, and vertices, shape (2, count, 3).
         orientations: Orientation and tilt, shape (2, 4).
-        numbers: Pace, ratio of the limits, heading, and whether velocities wait, shape (4,).
+        numbers: Pace, factor by the limits, heading, and whether velocities wait, shape (4,).
     """
 
     def __init__(self, count: int):
@@ -47,7 +47,7 @@ class References:
 
     @property
     def pace(self) -> float:
-        """Ratio of the velocities with which they go on."""
+        """Factor of the velocities with which they go on."""
         return float(self.numbers[PACE])
 
     @pace.setter
@@ -56,7 +56,7 @@ class References:
 
     @property
     def limits(self) -> float:
-        """Ratio of them that keeps all limits."""
+        """Factor that scales them to their limits."""
         return float(self.numbers[LIMIT_RATIO])
 
     @property

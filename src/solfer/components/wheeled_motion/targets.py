@@ -76,7 +76,7 @@ class Targets:
     Attributes:
         ports: What the component receives by pipes: the pose `base` in the world, `vertices` and `vertex_velocities`
             seen from the heading of the base.
-        ratio: Ratio of the newest velocities, and of those to the newest places, that is not larger than it may be.
+        ratio: Factor that scales the newest velocities, or those to the newest places, to their limits.
     """
 
     def __init__(self, count: int, speeds: tuple[float, float, float], accelerations: tuple[float, float, float]):
@@ -166,7 +166,7 @@ class Targets:
 
         Args:
             references: The desired motion.
-            ratio: Ratio of the received velocities that counts.
+            ratio: Factor of the received velocities.
             passed: Time since the cycle before [s].
         """
         if self._base.is_followed or self._vertices.is_followed:

@@ -13,12 +13,9 @@ LATERAL_SPEED = 4e-3
 PACE, LIMIT_RATIO, HEADING = range(3)
 """Indices of the numbers of the references."""
 
-AIMS_ROW, SPEEDS_ROW, MEASURED_ROW = 1, 2, 3
-"""Rows of what is known of steered wheels."""
-
 VALUE, LIMITED, HELD, FOLLOWED, SPEED = range(5)
-"""State of the pace, see `solfer.components.wheeled_motion.pace.path.PathPace`: the pace, the ratio that no speed limit
-cuts, that of joints at their bounds, that which wheels and joints can follow, and the fastest vertex at it [m/s]."""
+"""State of the pace, see `solfer.components.wheeled_motion.pace.path.PathPace`: the pace, the factor by the limits,
+that of joints at their bounds, that which wheels and joints can follow, and the fastest vertex at it [m/s]."""
 
 GOING = np.dtype(
     [
@@ -39,7 +36,7 @@ DESIRED_X, DESIRED_Y, DESIRED_Z, DESIRED_YAW_RATE, IN_WORLD, AGE, BEFORE = range
 
 @part
 def _limit(memory, state):
-    """Find the ratio of what is desired that keeps all speed limits."""
+    """Find the factor that scales what is desired to the limits."""
     motion = matrix_at(memory.motion, 3, 3)
     velocity = motion[0]
     angular = motion[1]
@@ -57,13 +54,16 @@ def _limit(memory, state):
 def _update(memory, state, is_held, most, passed):
     """Find the ratio with which wheels and joints can follow."""
     steered = matrix_at(memory.steered, 4, memory.count)
+    aims_row = 1
+    speeds_row = 2
+    measured_row = 3
     heading = vector_at(memory.base, 1)[0]
     fastest = 0.0
     across = LATERAL_SPEED
     for index in range(memory.count):
-        speed = steered[SPEEDS_ROW, index]
+        speed = steered[speeds_row, index]
         fastest = max(fastest, speed)
-        across = max(across, speed * abs(math.sin(steered[AIMS_ROW, index] - steered[MEASURED_ROW, index] + heading)))
+        across = max(across, speed * abs(math.sin(steered[aims_row, index] - steered[measured_row, index] + heading)))
     decay_rate = 8.0  # [1/s] where joints are at their bounds; it recovers with 1/s
     change = (-decay_rate if is_held else 1.0) * passed
     state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - decay_rate * passed))

@@ -112,14 +112,14 @@ class MotionGuard:
             legs=np.array(list(legs.values()), dtype=np.int64),
             turning_count=len(turning),
             turning=turning,
-            least=polygon.least,
+            required_margin=polygon.required_margin,
         )
         self._address = self._memory.address
 
-    def leave(self, least: float) -> None:
+    def set_required_margin(self, margin: float) -> None:
         """Set the margin that motions leave [m]."""
-        self.polygon.least = least
-        self._memory.record["least"] = least
+        self.polygon.required_margin = margin
+        self._memory.record["required_margin"] = margin
 
     @property
     def margin(self) -> float:

@@ -28,7 +28,7 @@ GUARD = np.dtype(
         # rows that are watched, and their bounds; joints of the legs, and those that steer
         *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds")),
         *((name, np.int64) for name in ("leg_count", "legs", "turning_count", "turning")),
-        ("least", np.float64),
+        ("required_margin", np.float64),
     ]
 )
 """What `hold_back` reads and writes, see `solfer.numerics.pointers.Memory`."""
@@ -128,7 +128,7 @@ def _keep_margin(memory, state, velocity):
     for index in range(_find(points, lifted, order, edges)):
         edge = edges[index]
         margin = min(margin, edge[INSIDE])
-        left = edge[INSIDE] - memory.least
+        left = edge[INSIDE] - memory.required_margin
         if left > horizon * top_speed:
             continue
         rate = _rate(memory, points, edge, velocity)

@@ -8,7 +8,7 @@ from solfer.components.wheeled_motion.references import KeptVelocities, Referenc
 
 
 class StraightAhead:
-    """Removes from the desired velocities what wheels without steering cannot do: motions across them, and turns.
+    """Removes from the desired velocities what wheels without steering cannot do: motions across them, and yaw rates.
 
     Velocities along the wheels and heights stay. The wheels are parallel; the direction of the first one counts.
 
