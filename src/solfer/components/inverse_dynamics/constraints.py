@@ -65,7 +65,7 @@ class ProblemConstraints:
         np.dot(ground.cones, force, out=values[drives:cones])
         np.dot(ground.normals, force, out=values[cones:first])
         values[first:] = acceleration
-        self.upper[cones:first] = ground.most
+        self.upper[cones:first] = ground.largest
         self.lower[first:], self.upper[first:] = self._bounds.lower, self._bounds.upper
         # within a millionth of a limit, or of 1
         touch(values, self.lower, self.upper, 1e-6, self.active)

@@ -20,7 +20,7 @@ class Ground:
     A contact that holds a point has three forces in world axes, another one a force along each row of its constraint,
     in its own frame with z along the normal. Forces keep G f <= 0: a pyramid of four sides within the friction cone,
     and for a flat foot the centre of pressure in its sole, and the torque about the normal. The normal forces N f lie
-    between zero and `most`, which grows and shrinks while contacts come and go. A robot on a fixed base needs none.
+    between zero and `largest`, which grows and shrinks while contacts come and go. A robot on a fixed base needs none.
 
     Args:
         robot: The Robot.
@@ -34,7 +34,7 @@ class Ground:
         cones: G, shape (g, k).
         owners: Contact of each row of G, shape (g,).
         normals: N, shape (c, k).
-        most: Largest normal force of each contact, shape (c,) [N].
+        largest: Largest normal force of each contact, shape (c,) [N].
         fractions: How far each contact has come, from 0 for one that is lifted to 1, shape (c,).
         holds: Whether each row counts, shape (k,).
         unit: Force of the size that a contact has [N].
@@ -64,7 +64,7 @@ class Ground:
         self._placed = np.array([contact.active for contact in self.contacts.values()], dtype=float)
         self._goals, self.fractions = self._placed.copy(), self._placed.copy()
         self._spans = np.full(count, weight)
-        self.most = np.zeros(count)
+        self.largest = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
         self._change()
 
@@ -130,7 +130,7 @@ class Ground:
         for index, contact in enumerate(self.contacts.values()):
             fraction = float(self.fractions[index])
             contact.active = fraction > 0.0
-            self.most[index] = math.inf if fraction == 1.0 else fraction * self._spans[index]
+            self.largest[index] = math.inf if fraction == 1.0 else fraction * self._spans[index]
             self.holds[self.starts[index] : self.starts[index + 1]] = fraction > 0.0
 
 

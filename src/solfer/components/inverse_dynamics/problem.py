@@ -67,7 +67,7 @@ class WholeBodyProblem:
     """The accelerations a and contact forces f next to what tasks demand, and the torques that make them.
 
         least |W (J a - r)|^2  with  M a + h = S' tau + Jc' f,  Jc a + b = - D Jc v,
-        G f <= 0,  0 <= N f <= most,  |tau| <= tau_max,  a_min <= a <= a_max
+        G f <= 0,  0 <= N f <= largest,  |tau| <= tau_max,  a_min <= a <= a_max
 
     Torques follow from a and f, and are no unknowns; nor is what the equalities fix, see `kernel`. The method starts
     from the cost alone: equal states have equal torques.
@@ -141,7 +141,7 @@ class WholeBodyProblem:
             constraints.limits,
             ground.cones,
             ground.normals,
-            ground.most,
+            ground.largest,
             self.bounds.lower,
             self.bounds.upper,
             *solved,

@@ -73,7 +73,10 @@ WHEELS_DTYPE = np.dtype(
         *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
         # rates by which errors go away, and desired rates
-        *((name, np.int64) for name in ("steering_rows", "aims", "most", "error", "gain", "rates", "away", "forward")),
+        *(
+            (name, np.int64)
+            for name in ("steering_rows", "aims", "largest_errors", "error", "gain", "rates", "away", "forward")
+        ),
         *((name, np.float64) for name in ("half", "furthest")),
         # largest speeds and accelerations of corrections, and largest speeds of corrections and motions together
         *((f"{name}_correction", np.float64) for name in ("base", "turn", "vertex")),
@@ -259,7 +262,7 @@ def _find_errors(start):
     dofs = memory.dofs
     half = memory.half
     error = vector_at(memory.error, memory.rows)
-    most = vector_at(memory.most, 3)
+    largest_errors = vector_at(memory.largest_errors, 3)
     if memory.of_base >= 0:
         _find_base(
             vector_at(memory.place, 3),
@@ -287,16 +290,16 @@ def _find_errors(start):
             wheels = _states_at(memory.wheels, count)
             angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
-            _choose_rotations(*given, lower, upper, most[0], ahead)
-        _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
+            _choose_rotations(*given, lower, upper, largest_errors[0], ahead)
+        _find_soft(steered[MEASURED], desired, half, largest_errors[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles = vector_at(memory.camber, count)
         desired = vector_at(memory.desired_camber, count)
-        _find_soft(angles, desired, half, most[1], error[memory.of_camber :])
+        _find_soft(angles, desired, half, largest_errors[1], error[memory.of_camber :])
     if memory.of_caster >= 0:
         angles = vector_at(memory.caster, count)
         desired = vector_at(memory.desired_caster, count)
-        _find_soft(angles, desired, half, most[2], error[memory.of_caster :])
+        _find_soft(angles, desired, half, largest_errors[2], error[memory.of_caster :])
 
 
 def _find_soft_alone(angles, desired, half, most, error):
@@ -369,13 +372,13 @@ def _turn_ahead(memory, rates, gain, pace):
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
     wheels = _states_at(memory.wheels, memory.count)
-    most = vector_at(memory.most, 1)[0]
+    largest_error = vector_at(memory.largest_errors, 1)[0]
     error = vector_at(memory.error, memory.rows)
     with_base = pace * matrix_at(memory.motion, 3, 3)[ANGULAR][2]
     for index in range(memory.count):
         row = memory.of_steering + index
-        if abs(error[row]) < (1.0 - 1e-9) * most:
-            limit = most * gain[row]
+        if abs(error[row]) < (1.0 - 1e-9) * largest_error:
+            limit = largest_error * gain[row]
             rates[row] = min(max(rates[row] + wheels[index].rate, -limit), limit)
         if memory.lower:
             lower, upper = _room(memory, index)

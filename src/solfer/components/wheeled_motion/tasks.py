@@ -125,7 +125,7 @@ class DrivingTasks:
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*TASK_POINTS.items(), (STEERING, "steering"))},
             steering_rows=self.stack.jacobian[self.rows[STEERING]] if STEERING in first else 0,
             aims=self.aims,
-            most=np.array(
+            largest_errors=np.array(
                 [
                     PACED_STEERING_ERROR if tags.is_paced else ANGLE_ERRORS[STEERING],
                     ANGLE_ERRORS[CAMBER],
