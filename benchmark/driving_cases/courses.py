@@ -131,7 +131,7 @@ class Profile:
         cos, sin = math.cos(references.heading), math.sin(references.heading)
         x, y, turn = self.base.tolist()
         references.velocity[:] = cos * x - sin * y, sin * x + cos * y, self.up
-        references.turn[2] = turn
+        references.angular[2] = turn
         references.vertex_velocity[:] = self.vertices
 
     @property

@@ -55,13 +55,13 @@ class Golden:
         if self._messages is not None:
             message = self._messages[min(round(cycle * self.period * 1e4) // 100, len(self._messages) - 1)]
             references.vertex_velocity[:] = message[:12].reshape(4, 3)
-            references.velocity[:], references.turn[2] = message[12:15], message[15]
+            references.velocity[:], references.angular[2] = message[12:15], message[15]
             references.camber[:] = message[16:20]
             return
         row = self.rows[min(cycle // self.every, len(self.rows) - 1)]
         velocity = self._base[cycle]
         references.velocity[:] = velocity.real, velocity.imag, row[self._columns["ref_vz"]]
-        references.turn[2] = row[self._columns["ref_wz"]]
+        references.angular[2] = row[self._columns["ref_wz"]]
         references.vertex_velocity[:] = self._vertices[cycle].reshape(4, 3)
 
     def _read_messages(self, path: Path) -> np.ndarray | None:

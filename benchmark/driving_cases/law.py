@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from solfer.components.wheeled_motion import WheeledMotion, kernel, steering, wheels
 from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.tags import SOFT, SOFT_PACED
+from solfer.components.wheeled_motion.tags import ANGLE_ERRORS, PACED_STEERING_ERROR
 from solfer.tasks.constraints import joint_bounds
 
 
@@ -85,7 +85,7 @@ class Merged:
             error: Its error [m].
             base_speed: Speed of the wheel by the motion of the base in the last cycle [m/s].
         """
-        if self._rests and not desired and abs(error) < kernel.ORIGINAL_REST_ERROR:
+        if self._rests and not desired and abs(error) < kernel.REST_ERROR:
             return self._wheel.angle
         return self._wheel.update(desired, error, base_speed)
 
@@ -117,15 +117,15 @@ class Kept:
         self._before, distance = desired, abs(error)
         if desired:
             self._rest = 0.0
-        elif distance < (kernel.AWAKE if self._rest else kernel.STEERING_SMALLNESS):
-            self._rest = kernel.STEERING_PERSISTENT
+        elif distance < (kernel.WAKE_DISTANCE if self._rest else kernel.REST_DISTANCE):
+            self._rest = kernel.WAKE_TIME
         else:
             self._rest = max(self._rest - self._period, 0.0)
         if not self._rest:
-            velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.ORIGINAL_REST_ERROR / max(distance, 1e-300))
+            velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.REST_ERROR / max(distance, 1e-300))
             aim = nearest(cmath.phase(velocity), self.angle)
             way = abs(velocity) * self._period
-            self.angle += (1.0 - math.exp(-way / steering.STEERING_RELAXATION)) * (aim - self.angle)
+            self.angle += (1.0 - math.exp(-way / steering.RELAXATION_LENGTH)) * (aim - self.angle)
         return self.angle
 
 
@@ -145,7 +145,7 @@ class WheeledLaw:
         records = wheels.find_wheels(robot, self._tags)
         self._turning = [wheels.steered_by(robot, self._tags, wheel) for wheel in records]
         self._bounds = joint_bounds(robot, self._period)
-        self._most = SOFT | ({"STEERING": SOFT_PACED} if self._tags.is_paced else {})
+        self._most = ANGLE_ERRORS | ({"STEERING": PACED_STEERING_ERROR} if self._tags.is_paced else {})
         self._start(measured(component))
 
     def _start(self, state: Measured) -> None:
@@ -183,7 +183,7 @@ class WheeledLaw:
         moved = (place - self._before[0]) / turn / self._period
         rate = cmath.phase(turn / self._before[1]) / self._period
         share = 0.0 if references.waits else references.limits
-        base, angular = share * complex(*references.velocity[:2]) / turn, 1j * share * references.turn[2]
+        base, angular = share * complex(*references.velocity[:2]) / turn, 1j * share * references.angular[2]
         aims = np.zeros(len(errors))
         for index, wheel in enumerate(self._wheels):
             arm = (complex(*state.vertices[index, :2]) - complex(*state.place[:2])) / turn
@@ -204,12 +204,12 @@ class WheeledLaw:
             lower, upper, begun = bounds.lower_position[dof], bounds.upper_position[dof], self._ways[index]
             angle = math.atan2(state.rolling[index, 1], state.rolling[index, 0])
             way = begun + soft(aims[index], angle + begun, math.pi, math.pi)
-            end, step = state.position[dof] + row * way, kernel.STEERING_LEAD * self._period * self.velocity[dof]
+            end, step = state.position[dof] + row * way, kernel.LEAD_CYCLES * self._period * self.velocity[dof]
             is_inside = lower < end < upper
             is_next_inside = lower < self.position[dof] + step < upper
             other = way - math.copysign(math.pi, step * row if is_inside and not is_next_inside else way)
-            is_short = abs(way) <= math.pi / 2.0 + kernel.LONGER
-            is_free = lower + kernel.SPARE < state.position[dof] + row * other < upper - kernel.SPARE
+            is_short = abs(way) <= math.pi / 2.0 + kernel.EXTRA_ANGLE
+            is_free = lower + kernel.END_MARGIN < state.position[dof] + row * other < upper - kernel.END_MARGIN
             if not (is_short and is_inside and is_next_inside) and is_free:
                 way = other
             self._ways[index], found[index] = way, angle + np.clip(way, -most, most)
@@ -246,9 +246,9 @@ class WheeledLaw:
         turn, free = cmath.exp(1j * heading_of(state)), references.lifted
         along = turn * (references.vertex_velocity[:, :2] @ (1.0, 1j)) / (state.rolling @ (1.0, 1j))
         up, pace = references.vertex_velocity[:, 2], references.pace
-        rates[rows["BASE"]] += pace * np.concatenate((references.turn, references.velocity))
+        rates[rows["BASE"]] += pace * np.concatenate((references.angular, references.velocity))
         rates[rows["CONTACT_POINTS"]] += pace * np.concatenate((along.real, free * along.imag, free * up))
-        with_base = pace * references.turn[2]
+        with_base = pace * references.angular[2]
         rates[steer] += with_base
         if not is_paced:
             return rates

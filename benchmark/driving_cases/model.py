@@ -27,7 +27,7 @@ from driving_cases.world import NAME, PERIOD, TRUE_BASE, configuration_of, param
 
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.pace.kernel import SIDEWAYS
+from solfer.components.wheeled_motion.pace.kernel import LATERAL_SPEED
 from solfer.config import load
 from solfer.errors import SolferError
 from solfer.scenarios import Scenario
@@ -124,8 +124,8 @@ class Model:
             return
         pace, steering = self.component._pace, self.component._steering
         away = steering.aims - steering.measured + self.component.wheels.offsets.heading
-        across = max(SIDEWAYS, float(np.abs(steering.speeds * np.sin(away)).max()))
-        speeds, wheels = self.component.references.limits, SIDEWAYS / across
+        across = max(LATERAL_SPEED, float(np.abs(steering.speeds * np.sin(away)).max()))
+        speeds, wheels = self.component.references.limits, LATERAL_SPEED / across
         free = min(wheels, pace.held)
         slow = "wheels" if wheels <= pace.held else "joints"
         for cause, share in (("speeds", 1.0 - speeds), (slow, speeds * (1.0 - free))):

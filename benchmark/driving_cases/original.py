@@ -142,14 +142,14 @@ class Desired(NamedTuple):
 
     Attributes:
         velocity: Velocity of the base in the world, shape (3,) [m/s].
-        turn: Its angular velocity, of which z counts, shape (3,) [rad/s].
+        angular: Its angular velocity, of which z counts, shape (3,) [rad/s].
         vertex_velocity: Velocities of the contact points, seen from the heading, shape (wheels, 3) [m/s].
         camber: Camber of the wheels, shape (wheels,) [rad].
         caster: The same of their caster.
     """
 
     velocity: np.ndarray
-    turn: np.ndarray
+    angular: np.ndarray
     vertex_velocity: np.ndarray
     camber: np.ndarray
     caster: np.ndarray
@@ -207,7 +207,7 @@ class OriginalLaw:
         robot, period = self._robot, self._period
         self._footprint += period * self.desired.vertex_velocity
         self._place += period * self.desired.velocity
-        self._heading = math.remainder(self._heading + period * self.desired.turn[2], 2.0 * math.pi)
+        self._heading = math.remainder(self._heading + period * self.desired.angular[2], 2.0 * math.pi)
         robot.update()
         errors, jacobians = self._tasks()
         rates = self._descend(errors, jacobians)
@@ -252,7 +252,7 @@ class OriginalLaw:
             offset = to_world.apply(self._footprint[index])
             error = complex(*(offset - point + late)[:2])
             seen = 0j if self._is_first else error * np.exp(-1j * heading)
-            velocity = base_velocity * np.exp(-1j * heading) + 1j * wish.turn[2] * arm
+            velocity = base_velocity * np.exp(-1j * heading) + 1j * wish.angular[2] * arm
             velocity += complex(*wish.vertex_velocity[index, :2])
             aim = self.steering[index].update(velocity, seen, abs(step + 1j * rate * seen)) + heading
             rows["CONSTRAINTS"].append(material if self._has_contacts else 0.0 * material)

@@ -70,7 +70,7 @@ class ScenarioProfile:
         """Write the velocities of this cycle, and the camber."""
         x, y, z, turn = self._velocity[:4].tolist()
         references.velocity[:] = self._cos * x - self._sin * y, self._sin * x + self._cos * y, z
-        references.turn[2] = turn
+        references.angular[2] = turn
         references.vertex_velocity[:] = self._velocity[4:].reshape(references.vertex_velocity.shape)
         references.camber[:] = self._camber
 

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
     from solfer.robot import Robot
 
 
-LONGEST_STEP = 0.05
-"""Longest time over which a component integrates in one cycle [s]: after a longer gap it goes on from where it is."""
-
-
 class Component:
     """An algorithm: it reads a Robot's state and writes the Robot's desired state.
 
@@ -72,8 +68,9 @@ class Component:
 
     @property
     def time_step(self) -> float:
-        """Time over which a component integrates in this cycle [s]: `passed`, but no more than `LONGEST_STEP`."""
-        return min(self.passed, max(self.period, LONGEST_STEP))
+        """Time over which a component integrates in this cycle [s]: `passed`, but no more than 0.05 s or the period."""
+        # after a longer gap it goes on from where it is
+        return min(self.passed, max(self.period, 0.05))
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz]; called once before `init`.

@@ -1,4 +1,4 @@
-"""Positions of motors that bring the links of series elastic joints where others want them."""
+"""Positions of motors that bring the links of series elastic joints where others request them."""
 
 import logging
 from typing import Annotated, Any
@@ -53,7 +53,7 @@ class ComplianceCompensation(Component):
         self._position += self._desired_positions.values
 
     def send(self) -> None:
-        """Write positions of the motors; velocities and efforts stay those that others want."""
+        """Write positions of the motors; velocities and efforts stay those that others request."""
         self._desired_positions.send(self._position)
 
     def start_log(self, logger: Any) -> None:

@@ -1,4 +1,4 @@
-"""Positions that others want of a Robot, kept apart from those that a component commands."""
+"""Positions that others request of a Robot, kept apart from those that a component commands."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ class DesiredPositions:
 
     A component that commands others than those that it received, and found its own numbers there in a cycle without a
     message, would add its change again in each cycle. Here each DoF keeps what was received last. DoFs that no message
-    wants anything stay where they are at a start.
+    addresses stay where they are at a start.
 
     Args:
         robot: The Robot; its desired positions are no numbers until a pipe, or `start`, writes them.

@@ -1,4 +1,4 @@
-"""Torques that carry a robot on its contacts, and what others want of its parts (Figs. 3 to 5 of the paper)."""
+"""Torques that carry a robot on its contacts, and what others request of its parts (Figs. 3 to 5 of the paper)."""
 
 import logging
 from typing import Annotated, Any
@@ -40,7 +40,7 @@ class GravityTags(Record):
 
 
 class GravityCompensation(Component):
-    """Carries a robot on its contacts by joint torques, and merges what others want of its parts.
+    """Carries a robot on its contacts by joint torques, and merges what others request of its parts.
 
     The torques are `CarryingTorques` of the Robot's state, measured or, offline, desired. Positions and velocities of
     the desired State are those that the pipes of the configuration write there; joints without any desired value
@@ -107,7 +107,7 @@ class GravityCompensation(Component):
             self._torque += self._before
 
     def send(self) -> None:
-        """Write torques, and the gains that are configured; positions and velocities are those that others want."""
+        """Write torques, and the gains that are configured; positions and velocities are those that others request."""
         command = self.model.command
         command.torque[:] = self._torque
         self._desired_positions.send(self._desired_positions.values)
@@ -115,7 +115,7 @@ class GravityCompensation(Component):
             values[dofs] = numbers
 
     def start_log(self, logger: Any) -> None:
-        """Declare the torques, what the joints measure beyond them (the share of the springs), and positions."""
+        """Declare the torques, what the joints measure beyond them (those of the springs), and positions."""
         dofs = self.model.dofs
         logger.add("torque", self._torque, dofs)
         logger.add("spring_torque", self._springs, dofs)

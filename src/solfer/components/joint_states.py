@@ -98,11 +98,11 @@ class _WheelSpeeds:
         self.goal = np.zeros(count)
         self._step = np.zeros(count)
 
-    def advance(self, most: float) -> None:
-        """Change each speed by `most` at most [rad/s]."""
+    def advance(self, limit: float) -> None:
+        """Change each speed by `limit` at most [rad/s]."""
         np.subtract(self.goal, self.velocity, out=self._step)
-        np.maximum(self._step, -most, out=self._step)
-        np.minimum(self._step, most, out=self._step)
+        np.maximum(self._step, -limit, out=self._step)
+        np.minimum(self._step, limit, out=self._step)
         self.velocity += self._step
 
 
@@ -170,7 +170,7 @@ class JointStates(Component):
         """Follow the ramp and the trajectory of the joints, and bring the wheels nearer to their speed."""
         step = self.time_step
         if self._follower.waiting:
-            self._take_turn(step)
+            self._take_over(step)
         self._ramp.advance(step, self._position, self._velocity)
         self._follower.advance(step)
         if self._follower.violated:
@@ -294,12 +294,12 @@ class JointStates(Component):
 
     def _take(self, trajectory: JointTrajectory, goal: FollowGoal | None = None) -> None:
         self._follower.begin(trajectory, self.clock(), goal)
-        self._take_turn(0.0)
+        self._take_over(0.0)
 
-    def _take_turn(self, step: float) -> None:
+    def _take_over(self, step: float) -> None:
         """Let a trajectory take over whose time has come, within some time [s]."""
         before = self._follower.moving
-        taken = self._follower.take_turn(step)
+        taken = self._follower.take_over(step)
         if taken is not None:
             if before:
                 self._slow_down()

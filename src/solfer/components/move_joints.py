@@ -63,10 +63,6 @@ class CmndReply:
     message: str = ""
 
 
-ORIGINAL_TOP_SPEED = 2.0
-"""Speed to which `JointStateCmnd` is limited, as in the original program [rad/s]."""
-
-
 class JointGoals:
     """Finds the goals of a request.
 
@@ -104,7 +100,7 @@ class JointGoals:
             raise NotFinite(f"velocity or pos_step of '{name}' is not a finite number")
         if command.pos_step < 0.0:
             raise ComponentError(f"pos_step {command.pos_step:g} rad", expected="a positive number, or 0")
-        speed = min(command.pos_step / period, ORIGINAL_TOP_SPEED)
+        speed = min(command.pos_step / period, 2.0)  # [rad/s] as in the original program
         if name == RESET or name in self._robot.semantics.states:
             return MoveJoints(state=name, speed=speed)
         if name in self._wheel_place:

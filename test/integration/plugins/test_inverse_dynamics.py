@@ -368,7 +368,7 @@ def test_hands_in_the_air_hold_nothing(tmp_path):
         plugin = world.plugin("upper_squat", file, target="solfer.components.inverse_dynamics:InverseDynamics")
         world.run(0.5)
         assert plugin.component.ground.names == ("left_arm", "right_arm")
-        assert not plugin.component.ground.shares.any()
+        assert not plugin.component.ground.fractions.any()
         circle = Circle(world.bus, plugin)
         world.run(5.0)
         circle.check()
@@ -386,6 +386,6 @@ def test_all_contacts_of_the_whole_robot_may_be_tracked(tmp_path):
         watch.check(GRIP, 0.1)
         ground = plugin.component.ground
         legs = {f"{side}_leg" for side in ("front_left", "front_right", "rear_left", "rear_right")}
-        assert {name for name, ratio in zip(ground.names, ground.shares, strict=True) if ratio.any()} == legs
+        assert {name for name, ratio in zip(ground.names, ground.fractions, strict=True) if ratio.any()} == legs
         assert set(ground.names) == legs | {"left_arm", "right_arm"}
         assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding

@@ -124,7 +124,7 @@ def numbers_of(component):
             demand, problem = component._demand, component.problem
             limits = problem._constraints.limits
             yield from (demand.velocity_gains, demand.roots, problem.bounds.speed, component.ground.cones)
-            yield from (limits, problem._constraints.most[: len(limits)])
+            yield from (limits, problem._constraints.upper[: len(limits)])
             yield [problem.bounds.braking, component.ground.fade, demand.settle, component._motion.follow]
             yield from (numbers for _, _, numbers in component._gains)
             yield from (component.references._filter.limits, component.references._tolerances)
@@ -137,7 +137,7 @@ def numbers_of(component):
             )
             yield [float(record[key]) for key in record.dtype.names if record.dtype[key].kind == "f"]
             yield [*component.drive._speeds, *component.drive._limits, component._lifting.margin]
-            yield [float(component._guard._memory.record["least"]), component._guard.polygon.least]
+            yield [float(component._guard._memory.record["required_margin"]), component._guard.polygon.required_margin]
             yield [float(component._pace._memory.record[key]) for key in ("base_speed", "vertex_speed", "acceleration")]
             if isinstance(component, SupportShaping):
                 governor = component.shaping.governor

@@ -47,7 +47,7 @@ def standing(folder: Path) -> str:
         component.update()
         component.send()
         robot.state.position[:30], robot.state.velocity[:30] = robot.command.position[:30], robot.command.velocity[:30]
-    return str(component.shaping.governor.share)
+    return str(component.shaping.governor.ratio)
 
 
 def lifted(folder: Path) -> str:

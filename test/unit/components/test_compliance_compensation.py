@@ -42,12 +42,12 @@ def robot():
 
 
 def test_motors_lead_by_the_deflection_of_springs(robot):
-    component, wanted = started(robot), np.random.default_rng(4).uniform(-1.0, 1.0, robot.size)
-    robot.command.write("position", wanted)
+    component, desired = started(robot), np.random.default_rng(4).uniform(-1.0, 1.0, robot.size)
+    robot.command.write("position", desired)
     torque, springs = robot.command.torque, robot.actuators.stiffness
     motors = cycle(component)
-    carried = springs * (motors - wanted)
-    assert np.abs(carried - torque)[6:].max() < 1e-9 and np.array_equal(motors[:6], wanted[:6])
+    carried = springs * (motors - desired)
+    assert np.abs(carried - torque)[6:].max() < 1e-9 and np.array_equal(motors[:6], desired[:6])
 
 
 @pytest.mark.slow

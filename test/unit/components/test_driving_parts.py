@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.original.resteering import Resteering
-from solfer.components.wheeled_motion.pace.delay import ROLLED, ClockDelay
+from solfer.components.wheeled_motion.pace.delay import ROLLING_TIMEOUT, ClockDelay
 from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from, turned
-from solfer.components.wheeled_motion.support.weight import WEIGHT_SHIFT_ACCELERATION, WEIGHT_SHIFT_SPEED, WeightShift
+from solfer.components.wheeled_motion.support.weight import SHIFT_ACCELERATION, SHIFT_SPEED, WeightShift
 
 PERIOD = 0.005  # [s]
 
@@ -27,30 +27,30 @@ def test_headings_turn_as_complex_numbers_do(heading):
 def test_wheels_roll_on_through_a_gap():
     delay = ClockDelay()
     assert delay.advance(0.05, passed=0.2, lost=0.0) == pytest.approx(0.15)
-    assert delay.share == 1.0
+    assert delay.ratio == 1.0
 
 
-@pytest.mark.parametrize(("passed", "lost"), [(ROLLED + 0.1, 0.0), (PERIOD, 0.1)])
+@pytest.mark.parametrize(("passed", "lost"), [(ROLLING_TIMEOUT + 0.1, 0.0), (PERIOD, 0.1)])
 def test_the_share_makes_up_for_what_is_lost(passed, lost):
     delay = ClockDelay()
     delay.advance(PERIOD, passed, lost)
-    made_up = (1.0 - delay.share) * (passed + lost)
-    assert delay.share < 1.0
+    made_up = (1.0 - delay.ratio) * (passed + lost)
+    assert delay.ratio < 1.0
     for _ in range(2000):
         assert delay.advance(PERIOD, PERIOD, 0.0) == 0.0
-        made_up += (1.0 - delay.share) * PERIOD
-    assert made_up == pytest.approx(0.1, abs=1e-6) and delay.share == pytest.approx(1.0)
+        made_up += (1.0 - delay.ratio) * PERIOD
+    assert made_up == pytest.approx(0.1, abs=1e-6) and delay.ratio == pytest.approx(1.0)
 
 
 def test_kept_velocities_are_desired_again():
     references = References(4)
-    references.velocity[:], references.turn[2], references.vertex_velocity[:] = (0.1, 0.2, 0.3), 0.4, 0.5
+    references.velocity[:], references.angular[2], references.vertex_velocity[:] = (0.1, 0.2, 0.3), 0.4, 0.5
     kept = KeptVelocities(4)
     kept.keep(references)
-    references.velocity[:], references.turn[2], references.vertex_velocity[:] = 0.0, 0.0, 0.0
+    references.velocity[:], references.angular[2], references.vertex_velocity[:] = 0.0, 0.0, 0.0
     kept.restore(references)
     assert_allclose(references.velocity, (0.1, 0.2, 0.3))
-    assert references.turn[2] == 0.4 and (references.vertex_velocity == 0.5).all()
+    assert references.angular[2] == 0.4 and (references.vertex_velocity == 0.5).all()
 
 
 def test_only_moved_joints_are_commanded():
@@ -90,7 +90,7 @@ def test_the_weight_goes_there_and_back():
                 break
             joints.velocity[:] = references.velocity
             speed = float(np.linalg.norm(references.velocity))
-            assert speed <= WEIGHT_SHIFT_SPEED + 1e-12 and speed - last <= WEIGHT_SHIFT_ACCELERATION * PERIOD + 1e-12
+            assert speed <= SHIFT_SPEED + 1e-12 and speed - last <= SHIFT_ACCELERATION * PERIOD + 1e-12
             last = speed
             references.step(PERIOD)
         joints.velocity[:] = 0.0

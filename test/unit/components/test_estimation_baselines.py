@@ -19,10 +19,10 @@ PLACES = np.array(((0.5, 0.3), (0.5, -0.3), (-0.5, 0.3), (-0.5, -0.3)))
 
 
 def body(velocity, angular):
-    """Make wheels whose joints tell a velocity of the base, and a turn about each axis."""
+    """Make wheels whose joints measure a velocity of the base, and a turn about each axis."""
     arms = np.hstack((PLACES, np.full((4, 1), -0.6)))
-    told = -(velocity + np.cross(angular, arms)).ravel()
-    return SimpleNamespace(arms=arms, jacobian=np.diag(told), velocity=np.ones(12), touching=np.ones(4, dtype=bool))
+    measured = -(velocity + np.cross(angular, arms)).ravel()
+    return SimpleNamespace(arms=arms, jacobian=np.diag(measured), velocity=np.ones(12), touching=np.ones(4, dtype=bool))
 
 
 def test_wheels_that_agree_tell_the_twist():
@@ -33,10 +33,12 @@ def test_wheels_that_agree_tell_the_twist():
 
 
 def test_the_turn_is_weighted_by_arms():
-    told, measured = 0.4, 0.1
-    _, angular = rolling_squares.twist(body(np.zeros(3), np.array((0.0, 0.0, told))), np.array((0.0, 0.0, measured)))
+    by_wheels, measured = 0.4, 0.1
+    _, angular = rolling_squares.twist(
+        body(np.zeros(3), np.array((0.0, 0.0, by_wheels))), np.array((0.0, 0.0, measured))
+    )
     spread = float(np.sum(PLACES**2))  # squared distances from the mean of the wheels
-    assert angular[2] == pytest.approx((measured + spread * told) / (1.0 + spread), rel=1e-12)
+    assert angular[2] == pytest.approx((measured + spread * by_wheels) / (1.0 + spread), rel=1e-12)
 
 
 def still(force=9.81):
@@ -66,8 +68,8 @@ def test_the_imu_is_integrated_exactly():
     np.testing.assert_allclose(made.rotation, begun @ Rotation.from_rotvec(rate * duration).as_matrix(), atol=1e-12)
     gravity = baseline.GRAVITY
     np.testing.assert_allclose(made.vectors[0], velocity + begun @ first + gravity * duration, atol=1e-11)
-    wanted = place + velocity * duration + begun @ second + gravity * duration**2 / 2.0
-    np.testing.assert_allclose(made.vectors[1], wanted, atol=1e-11)
+    expected = place + velocity * duration + begun @ second + gravity * duration**2 / 2.0
+    np.testing.assert_allclose(made.vectors[1], expected, atol=1e-11)
 
 
 def test_a_contact_corrects_by_the_variances():

@@ -162,11 +162,11 @@ def test_nothing_carries_a_robot_without_contacts(caplog):
 def test_offline_the_desired_state_is_carried():
     """The same numbers in the State, wherever they are from, give the same torques."""
     component, other = started(), started()
-    wanted = State(component.model.dofs)
-    wanted.position[:] = component.model.state.position
-    wanted.position[7] += 0.2
+    desired = State(component.model.dofs)
+    desired.position[:] = component.model.state.position
+    desired.position[7] += 0.2
     for robot in (component.model, other.model):
-        robot.state.write("position", wanted.position)
+        robot.state.write("position", desired.position)
     assert np.array_equal(cycle(component).torque, cycle(other).torque)
 
 

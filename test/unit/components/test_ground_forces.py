@@ -61,11 +61,11 @@ def test_forces_are_those_of_the_original(robot):
         robot.state.velocity[:] = amplitude * rate * np.cos(phase)
         robot.state.torque[:] = row[[columns[f"tau_filtered.{dof}"] for dof in data["dof_names"]]]
         cycle(made)
-        wanted = np.array([[row[columns[f"f.{name}_{axis}"]] for axis in "xyz"] for name in data["contacts"]])
-        np.testing.assert_allclose(robot.contacts.forces[WHEELS], wanted, atol=1e-6 * np.abs(wanted).max())
+        expected = np.array([[row[columns[f"f.{name}_{axis}"]] for axis in "xyz"] for name in data["contacts"]])
+        np.testing.assert_allclose(robot.contacts.forces[WHEELS], expected, atol=1e-6 * np.abs(expected).max())
         base = [row[columns[f"BIAS_FORCE.{dof}"]] for dof in data["dof_names"][:6]]
         np.testing.assert_allclose(bias[:6], base, atol=1e-4)
-        if (wanted[:, 2] > 0.0).all():
+        if (expected[:, 2] > 0.0).all():
             pressed = [row[columns[f"cop_{axis}"]] for axis in "xyz"]
             np.testing.assert_allclose(made.outputs["center_of_pressure"].value, pressed, atol=1e-6)
 

@@ -11,8 +11,8 @@ import pytest
 from support.allocations import check_that_it_keeps_no_memory
 
 from solfer.components.inverse_dynamics import InverseDynamics
-from solfer.components.inverse_dynamics.component import SECOND_LEVEL
-from solfer.components.inverse_dynamics.problem import QP_ACCELERATION, QP_FORCE
+from solfer.components.inverse_dynamics.component import SECOND_LEVEL_WEIGHT
+from solfer.components.inverse_dynamics.problem import ACCELERATION_WEIGHT, FORCE_WEIGHT
 from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
 from solfer.interfaces.geometry import Pose, Vector
 from solfer.interfaces.support import LiftContacts
@@ -129,15 +129,15 @@ class Second:
         moved = np.setdiff1d(joints, self._robot.selectors["wheels"].indices)
         posture = np.eye(size)[moved]
         posture_error = references["posture"][np.isin(joints, moved)] - q[moved]
-        rows, wanted = [], []
+        rows, desired = [], []
         for jacobian, error, drift, gain, weight in (
             (com, com_error, com_drift, 8.0, 1.0),
             (turn, turn_error, turn_drift, 8.0, 1.0),
-            (posture, posture_error, 0.0, 5.0, SECOND_LEVEL),
+            (posture, posture_error, 0.0, 5.0, SECOND_LEVEL_WEIGHT),
         ):
             rows.append(np.sqrt(weight) * jacobian)
-            wanted.append(np.sqrt(weight) * (4.0 * gain * (gain * error - jacobian @ v) - drift))
-        return np.vstack(rows), np.concatenate(wanted)
+            desired.append(np.sqrt(weight) * (4.0 * gain * (gain * error - jacobian @ v) - drift))
+        return np.vstack(rows), np.concatenate(desired)
 
     def solve(self, bounds):
         """Return accelerations, forces and torques."""
@@ -147,12 +147,12 @@ class Second:
         inertia, bias = self._data.M.copy(), self._data.nle.copy()
         held = self.contact_jacobian(q)
         demanded = -self.drift(v, q) - SETTLE * held @ v
-        jacobian, wanted = self.tasks(q, v)
+        jacobian, desired = self.tasks(q, v)
         unit = pin.computeTotalMass(self._model) * 9.81 / 4.0
         count = len(held)
-        hessian = np.diag([QP_ACCELERATION] * size + [QP_FORCE] * count)
+        hessian = np.diag([ACCELERATION_WEIGHT] * size + [FORCE_WEIGHT] * count)
         hessian[:size, :size] += jacobian.T @ jacobian
-        gradient = np.concatenate((-jacobian.T @ wanted, np.zeros(count)))
+        gradient = np.concatenate((-jacobian.T @ desired, np.zeros(count)))
         dynamics = np.hstack((inertia, -unit * held.T))
         limited = np.flatnonzero(np.isfinite(self._torques[6:])) + 6
         share = FRICTION / np.sqrt(2.0)
@@ -253,7 +253,7 @@ def test_a_lifted_contact_fades_and_comes_back():
     assert component.lift(LiftContacts(("front_left_leg",))).success
     cycle(component, 10)
     some = component.problem.force[2]
-    assert some == pytest.approx(component.ground.most[0]) == pytest.approx(0.5 * before[2])
+    assert some == pytest.approx(component.ground.largest[0]) == pytest.approx(0.5 * before[2])
     cycle(component, 15)
     assert not component.is_holding and np.abs(component.problem.force[:3]).max() < 1e-9
     assert not component.model.contacts["front_left_leg"].active
@@ -303,7 +303,7 @@ def test_what_cannot_be_kept_is_named_and_held(caplog):
     assert component.is_holding and np.array_equal(command.position, start) and not command.velocity.any()
     assert "friction of rear_right_leg contradicts the others; it holds" in caplog.text
     assert np.abs(command.torque - 3.0)[6:].max() < 5.0  # it passes to the carrying torques
-    report = component._report_now_and_then()
+    report = component._due_report()
     assert report.status[0].level == 1 and "rear_right_leg" in report.status[0].message
 
 

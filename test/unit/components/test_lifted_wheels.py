@@ -53,7 +53,7 @@ def make(repository, robot):
 
 
 def cycle(component, count=1, velocity=None):
-    """Run cycles in which the robot does what it is told; `cmd_vel` comes at 20 Hz."""
+    """Run cycles in which the robot does what is commanded; `cmd_vel` comes at 20 Hz."""
     robot = component.model
     for index in range(count):
         if velocity is not None and index % 10 == 0:

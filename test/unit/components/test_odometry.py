@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from support.unit.golden import golden, lower_body, rolling_legs
 
 from solfer.components.odometry import Odometry
-from solfer.components.odometry.kalman_kernel import STATE_TILT
+from solfer.components.odometry.kalman_kernel import TILT
 from solfer.components.odometry.messages import SetBase, StampedUncertainPose, UncertainPose
 from solfer.components.odometry.tags import OdometryTags
 from solfer.errors import ComponentError, NotFinite
@@ -192,7 +192,7 @@ def test_a_gap_in_the_joints_is_bridged(robot):
 
 @pytest.mark.slow
 def test_covariance_grows_without_the_imu():
-    """The heading's variance must tell users of the topic that nothing measures the turn any more."""
+    """The heading's variance must show users of the topic that nothing measures the turn any more."""
     grown = []
     for silent in (False, True):
         robot = standing()
@@ -246,7 +246,7 @@ def test_covariances_are_those_of_the_errors(robot):
     turn = Rotation.from_euler("z", law.heading).as_matrix()[:2, :2]
     made_of = np.zeros((6, len(errors)))
     made_of[[0, 1, 2, 5], range(4)] = 1.0
-    made_of[3:5, STATE_TILT : STATE_TILT + 2] = -turn
+    made_of[3:5, TILT : TILT + 2] = -turn
     np.testing.assert_allclose(pose, made_of @ errors @ made_of.T, atol=1e-16)
     assert np.abs(pose[3:5, 5]).max() > 0.0 or np.abs(pose[3:5, :2]).max() > 0.0
     np.testing.assert_allclose(twist[:3, :3] - errors[4:7, 4:7], (twist[:3, :3] - errors[4:7, 4:7]).T, atol=1e-16)
@@ -308,7 +308,7 @@ def published(made, name):
     return [topic for topic in made.topics() if isinstance(topic, TopicOut) and topic.name == name]
 
 
-def test_the_base_is_a_transform_where_it_is_wanted(robot):
+def test_the_base_is_a_transform_where_it_is_configured(robot):
     assert not published(component(standing()), "/tf")
     made = component(robot, transform=True)
     drive(made, 0.5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solfer.components.odometry.consensus import WheelConsensus, turn_of
+from solfer.components.odometry.consensus import WheelConsensus, yaw_of
 
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
 ACROSS = np.stack((-ARMS[:, 1], ARMS[:, 0], np.zeros(4)), axis=1)
@@ -73,7 +73,7 @@ def test_a_wheel_that_slips_is_rejected(wheel):
 
 
 def test_the_turn_of_wheels_is_that_of_their_ways():
-    turn, spread = turn_of(0.01 * ACROSS + (0.2, -0.1, 0.0), ARMS, np.ones(4))
+    turn, spread = yaw_of(0.01 * ACROSS + (0.2, -0.1, 0.0), ARMS, np.ones(4))
     assert turn == pytest.approx(0.01) and spread == pytest.approx(0.55**2 + 0.32**2)
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solfer.components.odometry.height_kernel import TRACK_TOLERANCE
+from solfer.components.odometry.height_kernel import FLOOR_TOLERANCE
 from solfer.components.odometry.height_map import HeightMap
 
 PERIOD, SPEED, RADIUS, HEIGHT = 0.005, 0.3, 0.078, 0.6
@@ -19,8 +19,8 @@ def ridge(slope, length=3.0, top=2.0, begin=1.5):
     return lambda x: np.interp(x, edges, slope * np.array((0.0, length, length, 0.0)))
 
 
-def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
-    """Drive over ground with a height at x [m], the tilt wrong by `lean` [rad]; return the errors of the height [m].
+def drive(profile, way, velocity=(SPEED, 0.0), tilt=0.0, weights=ALL):
+    """Drive over ground with a height at x [m], the tilt wrong by `tilt` [rad]; return the errors of the height [m].
 
     Joints and IMU measure how high wheels are against each other; the base is at their mean. Nothing measures its
     height: each cycle predicts the one before.
@@ -32,9 +32,11 @@ def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
         place = direction * (cycle + 1) * PERIOD
         ground = profile(place[0] + PLACES[:, 0])
         true = HEIGHT + float(ground.mean())
-        arms = np.column_stack((PLACES, ground - true - lean * PLACES[:, 0]))
+        arms = np.column_stack((PLACES, ground - true - tilt * PLACES[:, 0]))
         position[:2] = place
-        missing = heights.missing_height(arms, UP, position, 0.0, weights, velocity=np.append(direction, 0.0), turn=0.0)
+        missing = heights.missing_height(
+            arms, UP, position, 0.0, weights, velocity=np.append(direction, 0.0), yaw_rate=0.0
+        )
         raised = 0.0 if math.isnan(missing) else missing
         position[2] += raised
         heights.note(raised, weights)
@@ -62,16 +64,16 @@ def test_other_directions_work_alike(velocity):
 
 
 def test_a_wrong_tilt_counts_by_the_way():
-    lean, way = 1e-3, 4.0
-    errors, _ = drive(ridge(math.tan(math.radians(10.0)), length=20.0), way, lean=lean)
+    tilt, way = 1e-3, 4.0
+    errors, _ = drive(ridge(math.tan(math.radians(10.0)), length=20.0), way, tilt=tilt)
     # on the slope the ways are measured wrongly by the tilt; before it the floor gives the height
-    assert abs(errors[-1]) < 1.5 * lean * (way - 0.95) + 1e-3
+    assert abs(errors[-1]) < 1.5 * tilt * (way - 0.95) + 1e-3
 
 
 @pytest.mark.slow
 def test_a_floor_that_is_uneven_stays_one():
-    errors, heights = drive(lambda x: 0.5 * TRACK_TOLERANCE * np.sin(4.0 * x), 20.0)
-    assert heights.floor == 0.0 and np.abs(errors).max() < TRACK_TOLERANCE
+    errors, heights = drive(lambda x: 0.5 * FLOOR_TOLERANCE * np.sin(4.0 * x), 20.0)
+    assert heights.floor == 0.0 and np.abs(errors).max() < FLOOR_TOLERANCE
 
 
 @pytest.mark.slow

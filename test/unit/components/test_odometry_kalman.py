@@ -7,14 +7,14 @@ import pytest
 
 from solfer.components.odometry import kalman_kernel as kernel
 from solfer.components.odometry.kalman import (
-    KALMAN_UNEVENNESS,
-    PATCH,
-    PLANE,
+    FLOOR_DEVIATION,
+    FLOOR_LENGTH,
+    PLANE_DEVIATION,
     TILT_TIME_CONSTANT,
     ImuSample,
     WheelInertialFilter,
 )
-from solfer.components.odometry.kalman_kernel import GYRO_BIAS, STATE_HEADING, STATE_TILT
+from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, TILT
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
@@ -57,7 +57,7 @@ def go(pose, velocity, turn):
 
 @pytest.mark.slow
 def test_errors_are_as_large_as_it_says():
-    random, places = np.random.default_rng(3), [0, 1, 2, STATE_HEADING, GYRO_BIAS + 2]
+    random, places = np.random.default_rng(3), [0, 1, 2, HEADING, GYRO_BIAS + 2]
     squares = []
     for _ in range(12):
         kalman = filtered()
@@ -105,23 +105,23 @@ def wander(random, value, deviation, passed):
 def test_the_tilt_is_as_uncertain_as_it_says():
     """Forty simulated runs: normalised squared errors average near 1, so the covariance is neither timid nor bold."""
     random, arm, squares = np.random.default_rng(5), np.array((0.0, 0.0, -0.6)), []
-    deviation, places = math.radians(0.5), [0, 1, STATE_TILT, STATE_TILT + 1]
+    deviation, places = math.radians(0.5), [0, 1, TILT, TILT + 1]
     for _ in range(40):
         kalman = WheelInertialFilter(4, 1.0, NOISE, BIAS, 0.0, radius=RADIUS, tilt=deviation)
-        tilt, slope = deviation * random.standard_normal(2), KALMAN_UNEVENNESS * random.standard_normal(2)
+        tilt, slope = deviation * random.standard_normal(2), FLOOR_DEVIATION * random.standard_normal(2)
         base, bias = np.zeros(2), BIAS * random.standard_normal(2)
         for k in range(200):
             before, tilt = tilt, wander(random, tilt, deviation, PERIOD / TILT_TIME_CONSTANT)
-            slope, known = wander(random, slope, KALMAN_UNEVENNESS, 0.01 / PATCH), kalman.tilt.copy()
+            slope, known = wander(random, slope, FLOOR_DEVIATION, 0.01 / FLOOR_LENGTH), kalman.tilt.copy()
             # the base does not turn: the IMU turns to right itself, and the gyroscope measures its bias and its noise
             measured = bias - kalman.biases[:2] + NOISE / math.sqrt(PERIOD) * random.standard_normal(2)
-            kalman.lean(0.0, *(tilt - before - measured * PERIOD))
+            kalman.follow_tilt(0.0, *(tilt - before - measured * PERIOD))
             kalman.predict(0.0, PERIOD, 0.01, arm=arm, sample=ImuSample(time=PERIOD))
             (x, y), z = tilt - before - (kalman.tilt - known), arm[2]
             base += -y * z, x * z
             if k % 5 == 0:
                 kalman.settle_tilt(5 * PERIOD)
-                kalman.level(*(tilt + slope + PLANE * random.standard_normal(2)))
+                kalman.level(*(tilt + slope + PLANE_DEVIATION * random.standard_normal(2)))
             base += kalman.correction[:2]
             kalman.correction[:] = 0.0
         errors = np.concatenate((-base, tilt - kalman.tilt))
@@ -151,7 +151,7 @@ def test_the_noise_of_the_gyroscope_limits_what_is_learned_at_rest():
 
 SHARE, RATE = 0.8, 0.3
 AXIS = np.array((0.1, -0.2, math.sqrt(0.95)))
-STATE = np.random.default_rng(11).normal(scale=0.05, size=kernel.STATE_RADIUS + 4)
+STATE = np.random.default_rng(11).normal(scale=0.05, size=kernel.RADIUS + 4)
 
 
 def jacobian(function, at):
@@ -164,15 +164,13 @@ def jacobian(function, at):
 def test_the_jacobian_of_wheels_is_that_of_their_velocity(share):
     """It is (1 - e) (v + (u - share (b_z + n) + c) z x r); without an IMU there is no bias, and no scrubbing."""
     at = STATE.copy()
-    at[kernel.STATE_RADIUS :] = 0.0
+    at[kernel.RADIUS :] = 0.0
     for wheel in range(4):
 
         def velocity(state, wheel=wheel):
             bias = AXIS @ state[GYRO_BIAS : GYRO_BIAS + 3] + state[kernel.GYRO_NOISE]
             turn = RATE - share * bias + (state[kernel.SCRUB] if share else 0.0)
-            return (1.0 - state[kernel.STATE_RADIUS + wheel]) * (
-                state[kernel.STATE_VELOCITY : GYRO_BIAS] + turn * ACROSS[wheel]
-            )
+            return (1.0 - state[kernel.RADIUS + wheel]) * (state[kernel.VELOCITY : GYRO_BIAS] + turn * ACROSS[wheel])
 
         expected, rows = np.zeros(3), np.zeros((3, len(at)))
         kernel.wheel_velocity(at, wheel, ARMS[wheel], AXIS, RATE, share, expected)
@@ -187,17 +185,17 @@ def test_the_jacobian_of_the_pose_is_that_of_its_integral(imu_time):
     heading = 0.7
     velocity = np.array((0.3, -0.2, 0.05))
     at = np.zeros(len(STATE))
-    at[kernel.STATE_VELOCITY : GYRO_BIAS] = velocity
+    at[kernel.VELOCITY : GYRO_BIAS] = velocity
 
     def integrate(state):
-        after, (x, y, z) = state.copy(), state[kernel.STATE_VELOCITY : GYRO_BIAS]
-        turn = heading + state[STATE_HEADING]
-        a, b = state[STATE_TILT : STATE_TILT + 2]
+        after, (x, y, z) = state.copy(), state[kernel.VELOCITY : GYRO_BIAS]
+        turn = heading + state[HEADING]
+        a, b = state[TILT : TILT + 2]
         after[0] += PERIOD * (math.cos(turn) * x - math.sin(turn) * y)
         after[1] += PERIOD * (math.sin(turn) * x + math.cos(turn) * y)
         after[2] += PERIOD * (z + b * velocity[0] - a * velocity[1])
         bias = AXIS @ state[GYRO_BIAS : GYRO_BIAS + 3] + state[kernel.GYRO_NOISE]
-        after[STATE_HEADING] -= imu_time * bias if imu_time else PERIOD * state[kernel.SCRUB]
+        after[HEADING] -= imu_time * bias if imu_time else PERIOD * state[kernel.SCRUB]
         return after
 
     transition = np.zeros((len(at), len(at)))
@@ -225,10 +223,8 @@ def test_the_jacobian_of_the_process_is_that_of_its_equations():
         after[4:6] = rotated(turn, state[4:6])
         after[kernel.GYRO_NOISE] = 0.0
         after[kernel.SCRUB] *= keep
-        after[STATE_TILT : STATE_TILT + 2] = rotated(turn, state[STATE_TILT : STATE_TILT + 2]) + tilting[:2]
-        after[kernel.SLOPE : kernel.STATE_RADIUS] = slope_keep * rotated(
-            turn, state[kernel.SLOPE : kernel.STATE_RADIUS]
-        )
+        after[TILT : TILT + 2] = rotated(turn, state[TILT : TILT + 2]) + tilting[:2]
+        after[kernel.SLOPE : kernel.RADIUS] = slope_keep * rotated(turn, state[kernel.SLOPE : kernel.RADIUS])
         return after
 
     transition = np.zeros((len(STATE), len(STATE)))
@@ -249,8 +245,8 @@ def test_the_covariance_is_propagated_and_corrected_as_matrices_are():
     state, row = STATE.copy(), random.normal(size=size)
     variance = row @ expected @ row + 0.3
     gain = expected @ row / variance
-    gain[:STATE_HEADING] = gain[kernel.STATE_RADIUS :] = 0.0  # considered
-    kernel.update(covariance, state, row, 0.2, 0.3, half[0], half[1], STATE_HEADING)
+    gain[:HEADING] = gain[kernel.RADIUS :] = 0.0  # considered
+    kernel.update(covariance, state, row, 0.2, 0.3, half[0], half[1], HEADING)
     np.testing.assert_allclose(state, STATE + 0.2 * gain, rtol=1e-10)
     left = np.eye(size) - np.outer(gain, row)
     np.testing.assert_allclose(covariance, left @ expected @ left.T + 0.3 * np.outer(gain, gain), atol=1e-8)

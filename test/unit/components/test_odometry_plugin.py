@@ -30,9 +30,9 @@ class Rolling:
         self._send(self._sample(), ("joints", "imu"))
         self.plugin = methods.plugin_on(self._plugins._bus, self._plugins._file, f"odometry_{method}")
 
-    def _send(self, sample, told):
+    def _send(self, sample, sensors):
         self._plugins._bus.time = self.time
-        for name in told:
+        for name in sensors:
             getattr(self._plugins, f"_{name}").write(getattr(sample, name))
 
     def _sample(self):
@@ -51,14 +51,14 @@ class Rolling:
         joints = JointMessage(self._names, position, velocity, np.zeros(len(self._names)), stamp=1.0 + self.time)
         return SimpleNamespace(time=self.time, joints=joints, imu=imu)
 
-    def roll(self, duration, spoil=lambda sample: None, told=("joints", "imu")):
-        """Roll for a time [s], of which only some sensors tell, what a function has spoiled."""
+    def roll(self, duration, spoil=lambda sample: None, sensors=("joints", "imu")):
+        """Roll for a time [s], in which only some sensors send, what a function has changed."""
         for _ in range(round(duration / PERIOD)):
             self.time += PERIOD
             self._position[self._wheels] += SIDES * SPEED / RADIUS * PERIOD
             sample = self._sample()
             spoil(sample)
-            self._send(sample, told)
+            self._send(sample, sensors)
             self.plugin.cycle()
 
     @property
@@ -74,10 +74,10 @@ def rolling(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("told", [("joints",), ("imu",), ()])
-def test_half_a_second_of_silence_is_bridged(rolling, told):
+@pytest.mark.parametrize("sensors", [("joints",), ("imu",), ()])
+def test_half_a_second_of_silence_is_bridged(rolling, sensors):
     before = rolling.way
-    rolling.roll(0.49, told=told)
+    rolling.roll(0.49, sensors=sensors)
     rolling.roll(0.5)
     assert rolling.plugin.running
     assert rolling.way - before == pytest.approx(0.99 * SPEED, abs=0.01)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.unit.golden import lower_body
 
-from solfer.components.odometry.imu_samples import IMU_SAMPLES_LAG
+from solfer.components.odometry.imu_samples import LONGEST_LAG
 from solfer.components.odometry.samples import SortedSamples
 from solfer.components.odometry.stamps import StampCheck
-from solfer.components.odometry.streams import IMU_LEAD, Streams
+from solfer.components.odometry.streams import LONGEST_EXTRAPOLATION, Streams
 from solfer.model.history import History
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002
@@ -123,7 +123,7 @@ def test_each_measurement_has_both_at_one_time(late, lost, close):
         if turned is not None and elapsed < 0.02:
             assert speed == pytest.approx((heading(time) - heading(before)) / elapsed, abs=20.0 * close)
         turned = angle
-    assert passed == pytest.approx(time - begin, abs=1e-6) and time > 4.0 - 2.0 * IMU_SAMPLES_LAG
+    assert passed == pytest.approx(time - begin, abs=1e-6) and time > 4.0 - 2.0 * LONGEST_LAG
     assert count > (0.99 - 1.3 * lost[0] - 0.5 * (late[0] > 0.0)) * 4.0 / JOINTS
 
 
@@ -153,7 +153,7 @@ def test_frozen_joints_are_no_measurement():
     streams.start()
     list(measurements(sensors, streams, 0.1))
     sensors.frozen = sensors.time
-    assert len(list(measurements(sensors, streams, 1.0))) <= 1 and streams.ahead == IMU_LEAD
+    assert len(list(measurements(sensors, streams, 1.0))) <= 1 and streams.ahead == LONGEST_EXTRAPOLATION
     sensors.frozen = math.inf
     time, elapsed, measured, _, speed = next(measurements(sensors, streams, 0.05))
     assert measured and elapsed == pytest.approx(1.0, abs=0.01)
@@ -172,7 +172,7 @@ def test_the_base_goes_on_while_joints_are_silent():
     list(measurements(sensors, streams, 0.06))
     assert streams.ahead == pytest.approx(0.06, abs=JOINTS + IMU)
     list(measurements(sensors, streams, 1.0))
-    assert streams.ahead == IMU_LEAD
+    assert streams.ahead == LONGEST_EXTRAPOLATION
 
 
 def test_a_known_offset_of_the_clocks_counts():
@@ -200,7 +200,7 @@ def test_an_imu_of_another_clock_does_not_count(behind, kind):
     sensors.cycle()
     streams.start()
     assert not any(measured for _, _, measured, *_ in measurements(sensors, streams, 0.5))
-    assert streams.imu_stamps.refused[kind] > 140 and streams.imu_stamps.complaint.endswith(f"/imu_driver is {kind}")
+    assert streams.imu_stamps.refused[kind] > 140 and streams.imu_stamps.warning.endswith(f"/imu_driver is {kind}")
 
 
 @pytest.mark.parametrize("speed", [0.03, 0.2, 0.7])
@@ -218,7 +218,7 @@ def test_a_simulation_slower_than_real_time_has_one_clock(speed):
             assert joints.accepts(stamp, clock + draw.uniform(0.0, 0.02), 0.0, "")
         if step % 2 == 0 and step:
             assert imu.accepts(stamp - 0.001, clock + draw.uniform(0.0, 0.02), 0.0, "")
-    assert clock > 5.0 + 8.0 / speed and not joints.complaint and not imu.complaint
+    assert clock > 5.0 + 8.0 / speed and not joints.warning and not imu.warning
 
 
 def test_what_arrives_together_after_a_gap_has_one_clock():
@@ -231,8 +231,8 @@ def test_what_arrives_together_after_a_gap_has_one_clock():
     assert all(imu.accepts(1.0 + 0.002 * step, 0.5, 0.0, "") for step in range(1, 250))
 
 
-@pytest.mark.parametrize(("ahead", "complaint"), [(0.0, ""), (-2.0, "a stamp of imu is of another clock")])
-def test_what_has_waited_for_the_start_has_one_clock(ahead, complaint):
+@pytest.mark.parametrize(("ahead", "warning"), [(0.0, ""), (-2.0, "a stamp of imu is of another clock")])
+def test_what_has_waited_for_the_start_has_one_clock(ahead, warning):
     """In the first cycle come all messages of 0.4 s, first those of the joints; an IMU 2 s behind is another clock."""
     joints = StampCheck()
     imu = StampCheck(joints)
@@ -241,8 +241,8 @@ def test_what_has_waited_for_the_start_has_one_clock(ahead, complaint):
     times = 7.0 + 0.005 * np.arange(80)
     assert all(joints.accepts(float(time), float(time) - 6.999, 0.0, "") for time in times)
     accepted = [imu.accepts(float(time) + ahead, float(time) - 6.999, 0.0, "imu") for time in times]
-    assert imu.complaint == complaint
-    assert all(accepted) if not complaint else not any(accepted)
+    assert imu.warning == warning
+    assert all(accepted) if not warning else not any(accepted)
 
 
 def test_an_imu_whose_clock_is_set_counts_as_another():
@@ -251,7 +251,7 @@ def test_an_imu_whose_clock_is_set_counts_as_another():
     imu = StampCheck(joints, offset=0.003)
     for time in np.arange(0.5, 1.0, 0.002):  # no joints yet, whose time it could be
         assert not imu.accepts(time, time - 1.0, -math.inf, "")
-    assert not imu.complaint
+    assert not imu.warning
     assert joints.accepts(1.0, 0.0, -math.inf, "")
     assert all(imu.accepts(0.997 + 0.002 * step, 0.002 * step, -math.inf, "") for step in range(500))
     assert joints.accepts(1.998, 0.998, -math.inf, "")
@@ -259,9 +259,7 @@ def test_an_imu_whose_clock_is_set_counts_as_another():
         joints.begin_cycle()
         assert joints.accepts(1.0 + time, time, -math.inf, "")
         assert not imu.accepts(0.797 + time, time, -math.inf, "imu")
-    assert imu.refused["of another clock"] == pytest.approx(100, abs=1) and imu.complaint.startswith(
-        "a stamp of imu is"
-    )
+    assert imu.refused["of another clock"] == pytest.approx(100, abs=1) and imu.warning.startswith("a stamp of imu is")
 
 
 def test_stamps_before_the_estimate_are_counted():

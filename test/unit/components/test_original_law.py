@@ -82,7 +82,7 @@ def drive(component, law, motion, cycles):
     for cycle in range(cycles):
         base, turn, footprint = motion(cycle * PERIOD)
         for desired in (component.references, law.desired):
-            desired.velocity[:2], desired.turn[2] = (base.real, base.imag), turn
+            desired.velocity[:2], desired.angular[2] = (base.real, base.imag), turn
             desired.vertex_velocity[:] = footprint * np.reshape(NARROWER, (4, 3))
         robot.update()
         component.update()

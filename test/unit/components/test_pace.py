@@ -54,7 +54,7 @@ class Course:
 def test_no_velocity_is_above_its_bound(velocity, turn, vertices):
     course = Course()
     references = course.references
-    references.velocity[:], references.turn[2], references.vertex_velocity[:] = velocity, turn, vertices
+    references.velocity[:], references.angular[2], references.vertex_velocity[:] = velocity, turn, vertices
     pace, fastest = course.cycle(is_first=True), np.linalg.norm(vertices, axis=1).max()
     shares = np.linalg.norm(velocity) / BASE_SPEED, abs(turn) / TURN_SPEED, fastest / VERTEX_SPEED
     assert references.pace == references.limits == pace
@@ -67,7 +67,7 @@ def test_references_integrate_velocities_at_the_pace(velocity, turn, vertices, t
     course = Course()
     references, base = course.references, Rotation.from_euler("ZX", (heading, 0.3 * tilt))
     references.start(np.ones(3), heading, base.as_quat())
-    references.velocity[:], references.turn[:], references.vertex_velocity[:] = velocity, turn, vertices
+    references.velocity[:], references.angular[:], references.vertex_velocity[:] = velocity, turn, vertices
     references.vertices[:] = 0.5
     way = PERIOD * course.cycle(is_first=True)
     assert_allclose(references.position, 1.0 + way * velocity, rtol=1e-12)
@@ -173,12 +173,12 @@ def test_velocities_follow_messages_within_accelerations(before, desired, headin
     share = min(1.0, BASE_SPEED / max(math.hypot(*desired[:2]), 1e-9), TURN_SPEED / max(abs(desired[2]), 1e-9))
     for _ in range(math.ceil(2.6 / passed)):
         drive.receive(Twist(Vector(*desired[:2]), Vector(0.0, 0.0, desired[2])))
-        assert drive.share == pytest.approx(share)
-        drive.update(references, heading, drive.share, passed)
+        assert drive.ratio == pytest.approx(share)
+        drive.update(references, heading, drive.ratio, passed)
         velocity = seen(references.velocity, heading)
         assert abs(velocity - last) <= 0.3 * passed + 1e-12
-        assert abs(references.turn[2] - turn) <= 0.5 * passed + 1e-12
-        last, turn, heading = velocity, references.turn[2], heading + rate
+        assert abs(references.angular[2] - turn) <= 0.5 * passed + 1e-12
+        last, turn, heading = velocity, references.angular[2], heading + rate
     assert_allclose((last.real, last.imag, turn), share * desired, atol=1e-9)
 
 
@@ -189,11 +189,11 @@ def test_a_spike_of_a_velocity_is_refused(spike):
     drive.receive(Twist(Vector(0.1)))
     with pytest.raises(ComponentError, match="times what the base may do"):
         drive.receive(spike)
-    assert drive.share == 1.0
+    assert drive.ratio == 1.0
     drive.update(references, 0.0, 1.0, 0.4)
     assert_allclose(references.velocity, [0.1, 0.0, 0.0])
     drive.receive(Twist(Vector(10.0 * BASE_SPEED)))
-    assert drive.share == pytest.approx(0.1)
+    assert drive.ratio == pytest.approx(0.1)
 
 
 @given(st.floats(2e-3, 0.02), st.floats(0.1, 0.5))

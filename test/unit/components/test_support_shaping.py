@@ -72,7 +72,7 @@ def make(repository, robot):
 
 
 def cycle(component, count=1, support=None):
-    """Run cycles in which the robot does what it is told; velocities of vertices come at 20 Hz."""
+    """Run cycles in which the robot does what is commanded; velocities of vertices come at 20 Hz."""
     robot = component.model
     for index in range(count):
         if support is not None and index % 10 == 0:
@@ -93,9 +93,9 @@ def reserve(component, name):
 @pytest.mark.parametrize("name", ["rest", "forward"])
 def test_recorded_motions_are_met(repository, recorded, player, robot, name):
     tags = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
-    found, wanted = player.play_shaping(recorded[name], robot, tags)
-    assert np.ptp(wanted, axis=0).max() > 0.1
-    assert_allclose(found, wanted, rtol=0.0, atol=1e-8)
+    found, expected = player.play_shaping(recorded[name], robot, tags)
+    assert np.ptp(expected, axis=0).max() > 0.1
+    assert_allclose(found, expected, rtol=0.0, atol=1e-8)
 
 
 def test_first_program_and_its_solution(repository, recorded, player, robot):
@@ -150,11 +150,11 @@ def test_margins_and_their_gradients():
     moved, pushed = random.normal(size=(4, 2)), random.normal(size=2)
     vertices[:, :2] += step * moved
     polygon.update(vertices.tolist(), (point + step * pushed).tolist())
-    wanted = [
+    expected = [
         start[index] @ moved[first] + end[index] @ moved[second] + of_point[index] @ pushed
         for index, (first, second) in enumerate(polygon.edges)
     ]
-    assert_allclose((polygon.margins - margins) / step, wanted, atol=1e-5)
+    assert_allclose((polygon.margins - margins) / step, expected, atol=1e-5)
 
 
 def test_rolling_wheel_carries_its_vertex(robot):
@@ -228,7 +228,7 @@ def test_infeasible_margins_let_it_stand(make, caplog, policy, share, words):
     cycle(component, 1500, (0.0,) * 12)
     before = component.model.command.position.copy()
     cycle(component, 400)
-    assert component.shaping.governor.share == pytest.approx(share)
+    assert component.shaping.governor.ratio == pytest.approx(share)
     assert FRONT in component.shaping.report.margins().infeasible or reserve(component, FRONT) < -0.5
     assert f"'{FRONT}' cannot be kept" in caplog.text and words in caplog.text
     assert np.abs(component.model.command.position - before)[:LOWER].max() < 2e-2

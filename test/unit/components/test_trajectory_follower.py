@@ -35,7 +35,7 @@ NECK = ("neck_yaw", "neck_pitch")
 
 
 class Scene:
-    """The component in a loop, a robot that is where it is wanted, and a client."""
+    """The component in a loop, a robot that is where it is commanded, and a client."""
 
     def __init__(self):
         robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
@@ -74,7 +74,7 @@ class Scene:
                 self.robot.state.position[:], self.robot.state.velocity[:] = command.position, command.velocity
 
     def at(self, *joints):
-        """Return where joints are wanted."""
+        """Return where joints are desired."""
         return [float(self.robot.command.position[self.robot.dof(joint)]) for joint in joints]
 
     def jerkiness(self):

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
-from solfer.components.wheeled_motion.original.resteering import RESTEERING_MAXIMUM, Resteering
+from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
@@ -54,7 +54,7 @@ def make(repository, robot):
 
 
 def cycle(component, count=1, velocity=None):
-    """Run cycles in which the robot does what it is told; `cmd_vel` comes at 20 Hz."""
+    """Run cycles in which the robot does what is commanded; `cmd_vel` comes at 20 Hz."""
     robot = component.model
     for index in range(count):
         if velocity is not None and index % 10 == 0:
@@ -74,7 +74,7 @@ def begin(component, motion):
     references, robot = component.references, component.model
     if motion["centred"]:
         references.position[:2] = robot.state.position[:2]
-    references.velocity[:2], references.turn[2] = motion["velocity"][:2], motion["velocity"][2]
+    references.velocity[:2], references.angular[2] = motion["velocity"][:2], motion["velocity"][2]
     references.vertex_velocity[:] = np.reshape(motion["vertices"], (4, 3))
 
 
@@ -103,10 +103,10 @@ def test_the_originals_first_cycles_task_by_task(make, recorded):
 
 def test_a_wheel_at_its_end_turns_back():
     joint = Resteering(np.array([-2.0]), np.array([2.0]))
-    state, wanted = np.array([-1.997]), np.array([-2.01])
+    state, desired = np.array([-1.997]), np.array([-2.01])
     for _ in range(19):
-        joint.update(state, wanted)
-        assert wanted == -2.01
+        joint.update(state, desired)
+        assert desired == -2.01
     steps = 0
     while True:
         command = np.array([state[0] - 0.02])
@@ -114,12 +114,12 @@ def test_a_wheel_at_its_end_turns_back():
         if not joint.sides[0]:
             break
         state, steps = command, steps + 1
-    assert steps == np.ceil(RESTEERING_MAXIMUM / np.radians(5.0)) and joint.sides[0] == 0.0
+    assert steps == np.ceil(2.8 / np.radians(5.0)) and joint.sides[0] == 0.0
     assert_allclose(state, -1.997 + steps * np.radians(5.0))
 
 
 @pytest.mark.parametrize("velocity", [(0.0, -0.15, 0.0), (0.15, 0.0, 0.2)])
-def test_the_base_goes_where_it_is_wanted(make, velocity):
+def test_the_base_goes_where_it_is_desired(make, velocity):
     component = make()
     cycle(component, 400, velocity)
     references, robot = component.references, component.model
@@ -302,7 +302,7 @@ def test_wheels_stay_where_silence_leaves_them(make):
     assert not components[True].references.velocity.any()
 
 
-def test_vertices_without_messages_are_told(make, caplog):
+def test_vertices_without_messages_are_reported(make, caplog):
     component = make()
     component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2))
     cycle(component, 150)
@@ -331,13 +331,13 @@ def speeds_and_changes(component, count, of):
 
 def test_vertices_go_to_places_by_a_pipe(make):
     component = make()
-    wanted, port = component.references.vertices.copy(), component.inputs["vertices"]
-    wanted[:, 1] *= 0.85
-    port.value[:], port.fresh = wanted, True
+    desired, port = component.references.vertices.copy(), component.inputs["vertices"]
+    desired[:, 1] *= 0.85
+    port.value[:], port.fresh = desired, True
     cycle(component)
     port.fresh = False
     speed, change = speeds_and_changes(component, 800, lambda references: references.vertex_velocity[0])
-    assert_allclose(component.references.vertices[:, :2], wanted[:, :2], atol=1e-9)
+    assert_allclose(component.references.vertices[:, :2], desired[:, :2], atol=1e-9)
     assert abs(component.wheels.offsets.errors[:, :2]).max() < 3e-3
     assert 0.02 < speed <= 0.1 + 1e-9 and change <= 0.2 + 1e-6
 
@@ -345,13 +345,13 @@ def test_vertices_go_to_places_by_a_pipe(make):
 def test_the_base_goes_to_a_pose_by_a_pipe(make):
     component = make()
     references, port = component.references, component.inputs["base"]
-    wanted, turn = references.position + (0.2, 0.1, -0.02), 0.4
-    port.value[:], port.fresh = (*wanted, 0.0, 0.0, np.sin(turn / 2.0), np.cos(turn / 2.0)), True
+    desired, turn = references.position + (0.2, 0.1, -0.02), 0.4
+    port.value[:], port.fresh = (*desired, 0.0, 0.0, np.sin(turn / 2.0), np.cos(turn / 2.0)), True
     cycle(component)
     port.fresh = False
     speed, change = speeds_and_changes(component, 900, lambda references: references.velocity)
-    assert_allclose((*references.position, references.heading), (*wanted, turn), atol=1e-9)
-    assert_allclose(component.wheels.points["base"].value[3:], wanted, atol=1e-3)
+    assert_allclose((*references.position, references.heading), (*desired, turn), atol=1e-9)
+    assert_allclose(component.wheels.points["base"].value[3:], desired, atol=1e-3)
     assert speed <= 0.5 + 1e-9 and change <= 0.3 + 1e-6
 
 
@@ -374,7 +374,7 @@ def test_positions_ahead_of_a_motion_are_followed_without_a_lag(make):
     begin, vertices = references.position.copy(), references.vertices.copy()
     time, rows = 0.0, []
     for index in range(1600):
-        time += PERIOD * references.pace * component.targets.share  # of the course, which waits for the wheels
+        time += PERIOD * references.pace * component.targets.ratio  # of the course, which waits for the wheels
         speed = rate * min(1.0, time / 1.5)
         angle = rate * (0.5 * time**2 / 1.5 if time < 1.5 else time - 0.75)
         x, y = radius * np.sin(angle), radius * (1.0 - np.cos(angle))
@@ -465,7 +465,7 @@ def test_velocities_are_bounded(make):
         component._take_over(0.0)
     assert_allclose(component.references.velocity, (0.09, 0.12, 0.0))  # 0.3 m/s2 for 0.5 s
     assert_allclose(component.wheels.offsets.heading, 0.0)
-    assert_allclose(component.references.turn[2], -0.25)
+    assert_allclose(component.references.angular[2], -0.25)
     assert_allclose(
         component.references.vertex_velocity[:, 0], 0.5 / 7.0
     )  # one share of all: the path stays what it is

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solfer.components.odometry.kalman import ImuSample, WheelInertialFilter
-from solfer.components.odometry.kalman_kernel import STATE_HEADING, STATE_RADIUS, STATE_VELOCITY
+from solfer.components.odometry.kalman_kernel import HEADING, RADIUS, VELOCITY
 
 CONSTANT = re.compile(r"^\| .* \| ([\d.e-]+) \| `([\w.]+)\.(\w+)` \|$", re.MULTILINE)
 
@@ -35,7 +35,7 @@ def test_the_center_of_rotation_is_at_rest():
 def test_a_correction_is_that_of_the_page():
     """Wheel by wheel and row by row, in plain NumPy: innovation, gain without position and radii, and covariance."""
     kalman = WheelInertialFilter(2, acceleration=1.0, noise=1e-3, bias=1e-2, walk=1e-6, radius=0.0)
-    kalman.predict(turn=0.01, period=0.02, sample=ImuSample(time=0.02))
+    kalman.predict(yaw=0.01, period=0.02, sample=ImuSample(time=0.02))
     arms = np.array(((0.3, 0.4, -0.9), (-0.3, 0.4, -0.9)))
     speeds = np.array(((0.01, 0.002, 0.0), (0.011, 0.001, 0.001)))
     state, covariance = kalman.state.copy(), kalman.covariance.copy()
@@ -50,8 +50,8 @@ def test_a_correction_is_that_of_the_page():
 
 def expected(state, arm, rate):
     """Return h(x) of the page, of a wheel whose radius does not err, with the gyroscope's time s = T."""
-    turn = rate - state[STATE_VELOCITY + 5] - state[10] + state[11]
-    return state[STATE_VELOCITY : STATE_VELOCITY + 3] + turn * np.cross((0.0, 0.0, 1.0), arm)
+    turn = rate - state[VELOCITY + 5] - state[10] + state[11]
+    return state[VELOCITY : VELOCITY + 3] + turn * np.cross((0.0, 0.0, 1.0), arm)
 
 
 def corrected(state, covariance, speed, arm, axis, rate, variance):
@@ -60,7 +60,7 @@ def corrected(state, covariance, speed, arm, axis, rate, variance):
     row = np.array(row)
     spread = row @ covariance @ row + variance
     gain = covariance @ row / spread
-    gain[:STATE_HEADING] = gain[STATE_RADIUS:] = 0.0
+    gain[:HEADING] = gain[RADIUS:] = 0.0
     innovation = speed[axis] - expected(state, arm, rate)[axis]
     mapped = covariance @ row
     change = spread * np.outer(gain, gain) - np.outer(gain, mapped) - np.outer(mapped, gain)

@@ -71,7 +71,7 @@ class ReferenceInterface:
             for target in self._list
         )
         published = TopicOut(
-            "references", "solfer/TaskReferences", TaskReferences, collect=self._references_now_and_then
+            "references", "solfer/TaskReferences", TaskReferences, collect=self._due_references
         )
         return (*received, published)
 
@@ -139,7 +139,7 @@ class ReferenceInterface:
             tuple(pose_of(target.quantity, target.desired) for target in self._list),
         )
 
-    def _references_now_and_then(self) -> TaskReferences | None:
+    def _due_references(self) -> TaskReferences | None:
         self._countdown -= 1
         if self._countdown > 0:
             return None

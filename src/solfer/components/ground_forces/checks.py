@@ -14,13 +14,6 @@ from solfer.throttle import Throttle
 
 logger = logging.getLogger(__name__)
 
-PULLS = 5.0
-"""Mean force with which a contact may pull before that is reported: what noise makes [N]."""
-
-
-CARRIED = (0.5, 2.0)
-"""Ratios to the robot's weight between which its contacts carry in the mean of a second."""
-
 
 class ContactChecks:
     """Sums up the forces of contacts, and reports those that the ground cannot have.
@@ -64,10 +57,10 @@ class ContactChecks:
         wrong = []
         entries = []
         for name, normal, tangential in zip(self._names, along.tolist(), across.tolist(), strict=True):
-            text, complaint = self._judge(normal, tangential)
+            text, finding = self._evaluate(normal, tangential)
             entries.append(Entry(name, text))
-            wrong += [f"'{name}' {complaint}"] if complaint else []
-        load = self._judge_load(means)
+            wrong += [f"'{name}' {finding}"] if finding else []
+        load = self._evaluate_load(means)
         if load:
             wrong.insert(0, load)
             self._throttle.warning("load", "%s: %s", owner, load)
@@ -76,25 +69,25 @@ class ContactChecks:
         status = Status(int(bool(wrong)), f"{owner}: contacts", summary, hardware_id=owner, values=tuple(entries))
         return Statuses(status=(status,))
 
-    def _judge_load(self, means: np.ndarray) -> str:
+    def _evaluate_load(self, means: np.ndarray) -> str:
         """Return what is wrong with the load that the contacts carry together; empty if nothing is."""
         weight = self._weight
         if weight is None or not self._count:
             return ""
         ratio = -float(means.sum(axis=0) @ weight) / float(weight @ weight)
-        least, most = CARRIED
-        if least <= ratio <= most:
+        if 0.5 <= ratio <= 2.0:
             return ""
         return f"contacts carry {ratio:.2g} of the robot's weight by the joints' efforts: wrong, or it is lifted"
 
-    def _judge(self, normal: float, tangential: float) -> tuple[str, str]:
+    def _evaluate(self, normal: float, tangential: float) -> tuple[str, str]:
         """Return what a contact does, and what is wrong with that, empty if nothing is; forces in [N]."""
-        if normal < -PULLS:
+        noise = 5.0  # [N]
+        if normal < -noise:
             return f"pulls with {-normal:.1f} N", "pulls, which the ground cannot do"
-        if normal <= PULLS:
+        if normal <= noise:
             return "does not press", ""
-        share = tangential / normal
-        text = f"presses with {normal:.1f} N, {share:.2f} of that along the ground"
-        if self.friction is None or share <= self.friction:
+        ratio = tangential / normal
+        text = f"presses with {normal:.1f} N, {ratio:.2f} of that along the ground"
+        if self.friction is None or ratio <= self.friction:
             return text, ""
-        return text, f"needs a friction of {share:.2f}, the ground has {self.friction:g}"
+        return text, f"needs a friction of {ratio:.2f}, the ground has {self.friction:g}"

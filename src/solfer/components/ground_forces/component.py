@@ -25,12 +25,6 @@ from solfer.numerics.filters import LowPass
 from solfer.points.contact.contacts import Contact, make_contact
 from solfer.robot import Robot
 
-PUBLISHED = 50.0
-"""Rate at which the wrench of each contact is published on a topic of its own, at most [Hz]."""
-
-REPORTED = 1.0
-"""Rate at which contacts are reported [Hz]."""
-
 
 class GroundForces(Component):
     """Writes the forces of the ground into the contacts of its Robot, and publishes them.
@@ -79,8 +73,8 @@ class GroundForces(Component):
         self.law = self._make_law()
         self._filter: LowPass | None = None
         self._cycles = 0
-        self._silence = 1
-        self._between = 1
+        self._wrench_cycles = 1
+        self._report_cycles = 1
         weight = None if robot.kinematics.base is None else robot.kinematics.mass * robot.gravity
         self.checks = ContactChecks(names, self._pushed.normals, tags.friction, weight=weight)
         self.touch = None if tags.touch is None else Touch(count, **dict(tags.touch))
@@ -114,10 +108,10 @@ class GroundForces(Component):
         interface = "geometry_msgs/WrenchStamped"
         return (
             *(
-                TopicOut(each, interface, StampedWrench, collect=functools.partial(self._wrench_now_and_then, contact))
+                TopicOut(each, interface, StampedWrench, collect=functools.partial(self._due_wrench, contact))
                 for each, contact in zip(self._pushed.names, self._pushed.contacts, strict=True)
             ),
-            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._report_now_and_then),
+            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_report),
         )
 
     def start_log(self, logger: Any) -> None:
@@ -134,11 +128,11 @@ class GroundForces(Component):
         if self.touch is not None:
             self._touching[:] = self.touch.touching
 
-    def _wrench_now_and_then(self, contact: Contact) -> StampedWrench | None:
-        return None if self._cycles % self._silence else wrench_on_link(contact, self.model)
+    def _due_wrench(self, contact: Contact) -> StampedWrench | None:
+        return None if self._cycles % self._wrench_cycles else wrench_on_link(contact, self.model)
 
-    def _report_now_and_then(self) -> Statuses | None:
-        return self.checks.report(self.name) if self._cycles % self._between == 0 else None
+    def _due_report(self) -> Statuses | None:
+        return self.checks.report(self.name) if self._cycles % self._report_cycles == 0 else None
 
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
         robot = self.model
@@ -205,8 +199,8 @@ class GroundForces(Component):
         super().set_rate(rate)
         tags = self.tags.filter.torque
         self._filter = None if tags is None else tags.low_pass(self.model.size, rate)
-        self._silence = max(1, round(rate / PUBLISHED))
-        self._between = max(2, round(rate / REPORTED))
+        self._wrench_cycles = max(1, round(rate / 50.0))  # at 50 Hz at most
+        self._report_cycles = max(2, round(rate))  # once a second
 
     def init(self) -> None:
         """Begin with the torques of now, unfiltered, and with the contacts that touch now."""

@@ -5,12 +5,12 @@ from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
 
 @part
-def _normal_matrix(jacobian, weights, columns, least, factor):
-    """Write the factor of J S J^T plus `least` on the diagonal."""
+def _normal_matrix(jacobian, weights, columns, diagonal, factor):
+    """Write the factor of J S J^T plus a number on the diagonal."""
     rows = len(jacobian)
     for i in range(rows):
         for j in range(i + 1):
-            factor[i, j] = least if i == j else 0.0
+            factor[i, j] = diagonal if i == j else 0.0
         for column in columns:
             weighted = jacobian[i, column] * weights[column]
             if weighted != 0.0:
@@ -19,9 +19,9 @@ def _normal_matrix(jacobian, weights, columns, least, factor):
     cholesky(factor)
 
 
-def _fit(jacobian, world, weights, columns, least, factor, forces, rest):
+def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
     """Write the forces that explain the world best, and what they leave."""
-    _normal_matrix(jacobian, weights, columns, least, factor)
+    _normal_matrix(jacobian, weights, columns, diagonal, factor)
     for i in range(len(forces)):
         forces[i] = 0.0
         for column in columns:
@@ -36,13 +36,13 @@ def _fit(jacobian, world, weights, columns, least, factor, forces, rest):
 
 
 def _learn(
-    jacobian, world, weights, columns, least, first, share, decay, prior, factor, spread, needed, information, learned,
-    solved, offsets,
+    jacobian, world, weights, columns, diagonal, first, fraction, decay, prior, factor, spread, needed, information,
+    learned, solved, offsets,
 ):  # fmt: skip
     """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     rows = len(jacobian)
     size = len(learned)
-    _normal_matrix(jacobian, weights, columns, least, factor)
+    _normal_matrix(jacobian, weights, columns, diagonal, factor)
     for i in range(rows):
         needed[i] = 0.0
         for column in columns:
@@ -58,12 +58,12 @@ def _learn(
         left = weights[column] * world[column]
         for i in range(rows):
             left -= spread[a, i] * needed[i]
-        learned[a] += -share * left - decay * learned[a]
+        learned[a] += -fraction * left - decay * learned[a]
         for b in range(a + 1):
             left = weights[column] if a == b else 0.0
             for i in range(rows):
                 left -= spread[a, i] * spread[b, i]
-            information[a, b] += share * left - decay * information[a, b]
+            information[a, b] += fraction * left - decay * information[a, b]
             solved[a, b] = information[a, b]
         solved[a, a] += prior
     cholesky(solved)

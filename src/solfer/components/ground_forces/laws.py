@@ -122,11 +122,8 @@ class WeightedLaw:
         rest = self._forces.rest
         rx, ry = self._robot.state.position[3:5].tolist()
         tx, ty, tz = rest[3:6].tolist()
-        for axis, turn in enumerate(_FORCE_AXES):
-            roll, pitch, yaw = rates_of(rx, ry, *turn)
+        for axis, direction in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
+            roll, pitch, yaw = rates_of(rx, ry, *direction)
             self._moment[axis] = roll * tx + pitch * ty + yaw * tz
         np.dot(chart.rotation, rest[:3], out=self.push[:3])
         np.dot(chart.rotation, self._moment, out=self.push[3:])
-
-
-_FORCE_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -40,15 +40,15 @@ class MomentumObserver:
     def update(self, torque: np.ndarray, period: float) -> np.ndarray:
         """Return what the world does after `period` [s] more, by the torques of now, shape (n,); live."""
         np.subtract(self._robot.dynamics.bias, torque, out=self._input)
-        share = 1.0
+        coefficient = 1.0
         if self._cut_off is not None:
             velocity = self._robot.state.velocity
             np.subtract(velocity, self._before, out=self._change)
             self._before[:] = velocity
             self._change /= period
             self._input += self._robot.dynamics.inertia @ self._change
-            share = -math.expm1(-2.0 * math.pi * self._cut_off * period)
+            coefficient = -math.expm1(-2.0 * math.pi * self._cut_off * period)
         self._input -= self.value
-        self._input *= share
+        self._input *= coefficient
         self.value += self._input
         return self.value

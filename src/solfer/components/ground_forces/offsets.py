@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.components.ground_forces import kernel
 from solfer.components.ground_forces.tags import OffsetTags
-from solfer.components.ground_forces.weighted_forces import PRIOR_MINIMUM, weighed
+from solfer.components.ground_forces.weighted_forces import PRIOR_INFORMATION, weighed
 from solfer.points.contact.contacts import Contact
 
 
@@ -56,7 +56,7 @@ class TorqueOffsets:
         rows = 3 * len(contacts)
         size = len(deviations)
         self._tags = tags
-        self._share = 0.0
+        self._fraction = 0.0
         self._decay = 0.0
         self._calm = deviations**-2
         self._pushed = self._calm.copy()
@@ -81,7 +81,7 @@ class TorqueOffsets:
 
     def start(self, period: float) -> None:
         """Begin with cycles of `period` [s]; what is known stays."""
-        self._share = period / self._tags.interval
+        self._fraction = period / self._tags.interval
         self._decay = period / self._tags.memory
 
     def update(self, jacobian: np.ndarray, world: np.ndarray, lifted: np.ndarray, pushed: bool) -> None:
@@ -102,9 +102,9 @@ class TorqueOffsets:
             world,
             self._pushed if pushed else self._calm,
             self._columns,
-            PRIOR_MINIMUM,
+            PRIOR_INFORMATION,
             self._first,
-            self._share,
+            self._fraction,
             self._decay,
             self._tags.deviation**-2,
             *self._estimate,

@@ -2,9 +2,6 @@
 
 import numpy as np
 
-SURE = 0.1
-"""Time after which a contact that does not touch is in the air for sure [s]."""
-
 
 class Touch:
     """Contacts that touch the ground, by their normal forces.
@@ -22,13 +19,13 @@ class Touch:
 
     Attributes:
         touching: Which contacts touch, shape (k,).
-        lifted: Which have not touched for `SURE`, shape (k,).
+        lifted: Which have not touched for 0.1 s: they are in the air for sure, shape (k,).
     """
 
     def __init__(self, count: int, above: float, below: float, delay: float, speed: float = 0.0):
         self.set(above, below, delay, speed=speed)
         self.touching, self._changing, self._above, self.lifted = np.zeros((4, count), dtype=bool)
-        self._waited, self._away, self._sure = np.zeros((3, count))
+        self._waited, self._away, self._reduced = np.zeros((3, count))
 
     def set(self, above: float, below: float, delay: float, speed: float = 0.0) -> None:
         """Set when contacts touch, see above; those that touch do so until they end."""
@@ -51,12 +48,12 @@ class Touch:
             speeds: Their speeds along the normal, shape (k,) [m/s].
             period: See above.
         """
-        np.abs(speeds, out=self._sure)
-        self._sure *= -self._rise
-        self._sure += forces
-        # a contact that touches wants to change below `below`, another one above `above`
-        np.greater(self._sure, self._begin, out=self._changing)
-        np.less(self._sure, self._end, out=self._above)
+        np.abs(speeds, out=self._reduced)
+        self._reduced *= -self._rise
+        self._reduced += forces
+        # a contact that touches changes below `below`, another one above `above`
+        np.greater(self._reduced, self._begin, out=self._changing)
+        np.less(self._reduced, self._end, out=self._above)
         np.copyto(self._changing, self._above, where=self.touching)
         self._waited += period
         self._waited *= self._changing
@@ -66,5 +63,5 @@ class Touch:
         np.copyto(self._waited, 0.0, where=self._changing)
         self._away += period
         np.copyto(self._away, 0.0, where=self.touching)
-        np.greater(self._away, SURE, out=self.lifted)
+        np.greater(self._away, 0.1, out=self.lifted)
         return self.touching

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.components.ground_forces import kernel
 from solfer.points.contact.contacts import Contact
 
-PRIOR_MINIMUM = 1e-10
+PRIOR_INFORMATION = 1e-10
 """What is known of a force before anything is measured, as the inverse of its variance [1/N^2]."""
 
 
@@ -45,5 +45,7 @@ class WeightedForces:
 
     def update(self, jacobian: np.ndarray, world: np.ndarray) -> np.ndarray:
         """Return the forces by the Jacobian, shape (3k, n), and by what the world does, shape (n,); live."""
-        kernel.fit(jacobian, world, self._weights, self._columns, PRIOR_MINIMUM, self._factor, self._forces, self.rest)
+        kernel.fit(
+            jacobian, world, self._weights, self._columns, PRIOR_INFORMATION, self._factor, self._forces, self.rest
+        )
         return self.value

@@ -18,7 +18,7 @@ from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.holding import Holding
 from solfer.components.inverse_dynamics.output import CommandedMotion, CommandedTorques
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
-from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
+from solfer.components.inverse_dynamics.tags import DynamicTaskRecord, InverseDynamicsTags
 from solfer.components.inverse_dynamics.touch import touching
 from solfer.components.inverse_dynamics.watch import DynamicsWatch
 from solfer.config.tasks.references import ReferenceRecord
@@ -35,16 +35,10 @@ from solfer.tasks.building.build import ConfiguredTasks
 
 log = logging.getLogger(__name__)
 
-SECOND_LEVEL = 1e-5
+SECOND_LEVEL_WEIGHT = 1e-5
 """Weight of the second level's tasks beside those of the first. These are weights, and no second QP, which would take
 as long again: a task of the first level yields by a hundred-thousandth of what the second demands against it, less
 than a millimetre where legs are nearly stretched."""
-
-HORIZON_PERIODS = 2.0
-"""Least horizon of joint limits, in periods: a cycle acts one period after its measurement."""
-
-REPORTED = 1.0
-"""Reports a second."""
 
 
 class InverseDynamics(Component):
@@ -133,10 +127,11 @@ class InverseDynamics(Component):
         )
         lower[:base], upper[:base] = -math.inf, math.inf
         speed = self._speed_limits(self.tags)
-        horizon = max(limits.horizon, HORIZON_PERIODS * self.period)
+        # a cycle acts one period after its measurement
+        horizon = max(limits.horizon, 2.0 * self.period)
         bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
         self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=self._torque_limits(self.tags))
-        self._between = max(2, round(rate / REPORTED))
+        self._report_cycles = max(2, round(rate))  # once a second
         self.references.connect(self.period)
 
     def actions(self) -> tuple[Action, ...]:
@@ -252,9 +247,7 @@ class InverseDynamics(Component):
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive references; publish forces of contacts and active constraints on `/diagnostics`."""
-        diagnostics = TopicOut(
-            "/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._report_now_and_then
-        )
+        diagnostics = TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_report)
         return (*self.references.interface.topics(), diagnostics)
 
     def lift(self, request: LiftContacts) -> LiftReply:
@@ -290,7 +283,7 @@ class InverseDynamics(Component):
         configured = ConfiguredTasks(self.tags.stack, robot, {})
         for level in configured.levels[1:]:
             for task in level:
-                task.weight *= SECOND_LEVEL
+                task.weight *= SECOND_LEVEL_WEIGHT
         return configured, Stack(configured.levels)
 
     def _make_demand(self, robot: Robot, stack: Stack) -> DemandedAccelerations:
@@ -322,7 +315,7 @@ class InverseDynamics(Component):
     def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
         """Write the numbers of a task; a second level weighs less."""
         if key == "weight":
-            numbers = numbers * (1.0 if task in self._configured.levels[0] else SECOND_LEVEL)
+            numbers = numbers * (1.0 if task in self._configured.levels[0] else SECOND_LEVEL_WEIGHT)
             self._demand.roots[self._demand.rows[task.name]] = np.sqrt(numbers)
         self.references.take_number(task, key, numbers)
 
@@ -411,8 +404,8 @@ class InverseDynamics(Component):
             self._holding.reason = ""
             self._watch.start()
 
-    def _report_now_and_then(self) -> Statuses | None:
-        if self._cycles % self._between != 1:
+    def _due_report(self) -> Statuses | None:
+        if self._cycles % self._report_cycles != 1:
             return None
         problem = self.problem
         ground = self.ground
@@ -440,4 +433,5 @@ def _velocity_gain(task: DynamicTaskRecord) -> np.ndarray:
     if task.velocity_gain is not None:
         return np.array(task.velocity_gain, dtype=float)
     gain = 0.0 if task.is_motion and task.gain is None else 1.0 if task.gain is None else task.gain
-    return np.where(np.array(gain) > 0.0, CRITICAL * np.array(gain), MOTION_GAIN)
+    # errors vanish without swinging; 10/s where there is no position
+    return np.where(np.array(gain) > 0.0, 4.0 * np.array(gain), 10.0)

@@ -7,9 +7,6 @@ from solfer.components.inverse_dynamics.kernel import touch
 from solfer.numerics.acceleration_bounds import AccelerationBounds
 from solfer.robot import Robot
 
-TOUCHES = 1e-6
-"""Share of a limit, or of 1, within which it counts as active."""
-
 
 class ProblemConstraints:
     """The constraints of the QP in the order of their names, and which of them the last solution touches.
@@ -26,7 +23,7 @@ class ProblemConstraints:
         active: 1 for each that is at a limit, else 0, shape (c,); live.
         driven: See above.
         limits: Largest torques of these, shape (m,) [Nm, N]; live.
-        least, values, most: Bounds, and what they bound, shape (c,) each; live.
+        lower, values, upper: Bounds, and what they bound, shape (c,) each; live.
         count: Number of those of torques, friction and normal forces, which come before those of accelerations.
     """
 
@@ -44,18 +41,18 @@ class ProblemConstraints:
             *(f"acceleration of {dof}" for dof in robot.dofs),
         )
         self.active = np.zeros(len(self.names), dtype=np.int64)
-        self.values, self.least, self.most = np.zeros((3, len(self.names)))
+        self.values, self.lower, self.upper = np.zeros((3, len(self.names)))
         self._cones = len(driven) + len(ground.cones)
         self.count = self._cones + len(ground.normals)
-        self.least[len(driven) : self._cones] = -np.inf
+        self.lower[len(driven) : self._cones] = -np.inf
         self.limit_torques(torque_limits)
 
     def limit_torques(self, limits: np.ndarray) -> None:
         """Set the largest torques of all DoFs, shape (n,) [Nm, N]."""
         drives = len(self.driven)
         np.take(limits, self.driven, out=self.limits)
-        np.negative(self.limits, out=self.least[:drives])
-        self.most[:drives] = self.limits
+        np.negative(self.limits, out=self.lower[:drives])
+        self.upper[:drives] = self.limits
 
     def compare(self, torque: np.ndarray, force: np.ndarray, acceleration: np.ndarray) -> None:
         """Write what is bounded in a solution, and which bounds it touches; see `WholeBodyProblem`."""
@@ -68,12 +65,13 @@ class ProblemConstraints:
         np.dot(ground.cones, force, out=values[drives:cones])
         np.dot(ground.normals, force, out=values[cones:first])
         values[first:] = acceleration
-        self.most[cones:first] = ground.most
-        self.least[first:], self.most[first:] = self._bounds.lower, self._bounds.upper
-        touch(values, self.least, self.most, TOUCHES, self.active)
+        self.upper[cones:first] = ground.largest
+        self.lower[first:], self.upper[first:] = self._bounds.lower, self._bounds.upper
+        # within a millionth of a limit, or of 1
+        touch(values, self.lower, self.upper, 1e-6, self.active)
 
     def farthest(self) -> str:
         """Return the name of the constraint that is violated most; empty where a value is not finite."""
         if not np.isfinite(self.values).all():
             return ""
-        return self.names[int(np.argmax(np.maximum(self.least - self.values, self.values - self.most)))]
+        return self.names[int(np.argmax(np.maximum(self.lower - self.values, self.values - self.upper)))]

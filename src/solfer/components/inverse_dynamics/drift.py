@@ -4,9 +4,6 @@ import numpy as np
 
 from solfer.tasks import Stack
 
-DRIFT_STEP = 1e-5
-"""Time by which the robot is moved ahead and back [s]: errors are those of third derivatives times its square."""
-
 
 class TaskDrift:
     """dJ/dt v of a stack's rows, for whatever points its tasks have: by central differences along the velocity v.
@@ -27,7 +24,9 @@ class TaskDrift:
 
     def update(self, position: np.ndarray, velocity: np.ndarray) -> None:
         """Compute `value` at a position [rad, m] and a velocity [rad/s, m/s], shape (n,) each."""
-        np.multiply(velocity, DRIFT_STEP, out=self._move)
+        # [s] by which the robot is moved ahead and back: errors are those of third derivatives times its square
+        step = 1e-5
+        np.multiply(velocity, step, out=self._move)
         for sign, out in ((1.0, self.value), (-1.0, self._back)):
             np.multiply(self._move, sign, out=self._robot.state.position)
             self._robot.state.position += position
@@ -35,4 +34,4 @@ class TaskDrift:
             self._stack.update_jacobian()
             np.dot(self._stack.jacobian, velocity, out=out)
         self.value -= self._back
-        self.value /= 2.0 * DRIFT_STEP
+        self.value /= 2.0 * step

@@ -13,9 +13,6 @@ from solfer.points.contact.contact_constraint import held_acceleration
 from solfer.points.contact.contacts import Contact, RollingContact, across
 from solfer.robot import Robot
 
-INNER_FRICTION = math.sqrt(0.5)
-"""Share of the friction with which a pyramid of four sides lies within the cone."""
-
 
 class Ground:
     """Contacts with unknown forces f along the rows that they hold.
@@ -23,7 +20,7 @@ class Ground:
     A contact that holds a point has three forces in world axes, another one a force along each row of its constraint,
     in its own frame with z along the normal. Forces keep G f <= 0: a pyramid of four sides within the friction cone,
     and for a flat foot the centre of pressure in its sole, and the torque about the normal. The normal forces N f lie
-    between zero and `most`, which grows and shrinks while contacts come and go. A robot on a fixed base needs none.
+    between zero and `largest`, which grows and shrinks while contacts come and go. A robot on a fixed base needs none.
 
     Args:
         robot: The Robot.
@@ -37,8 +34,8 @@ class Ground:
         cones: G, shape (g, k).
         owners: Contact of each row of G, shape (g,).
         normals: N, shape (c, k).
-        most: Largest normal force of each contact, shape (c,) [N].
-        shares: How far each contact has come, from 0 for one that is lifted to 1, shape (c,).
+        largest: Largest normal force of each contact, shape (c,) [N].
+        fractions: How far each contact has come, from 0 for one that is lifted to 1, shape (c,).
         holds: Whether each row counts, shape (k,).
         unit: Force of the size that a contact has [N].
         fade: Time in which the force of a contact comes or goes [s]; may be set before each `update`.
@@ -65,9 +62,9 @@ class Ground:
         self.unit = weight / max(count, 1)
         self.fade = tags.fade
         self._placed = np.array([contact.active for contact in self.contacts.values()], dtype=float)
-        self._goals, self.shares = self._placed.copy(), self._placed.copy()
+        self._goals, self.fractions = self._placed.copy(), self._placed.copy()
         self._spans = np.full(count, weight)
-        self.most = np.zeros(count)
+        self.largest = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
         self._change()
 
@@ -102,11 +99,11 @@ class Ground:
         pressed = max(float(self.normals[index] @ force), 0.0)
         weight = self.unit * len(self.contacts)
         self._spans[index] = pressed if lifted else weight
-        self.shares[index] = 1.0 if lifted else min(pressed / weight, 1.0)
+        self.fractions[index] = 1.0 if lifted else min(pressed / weight, 1.0)
 
     def start(self) -> None:
         """Let all contacts have come where they are to be."""
-        self._goals[:] = self.shares[:] = self._placed
+        self._goals[:] = self.fractions[:] = self._placed
         self._change()
 
     def leave_out(self, absent: np.ndarray) -> tuple[str, ...]:
@@ -116,25 +113,25 @@ class Ground:
             absent: Which contacts touch nothing, shape (c,).
         """
         left_out = absent & (self._goals > 0.0)
-        self._goals[left_out] = self.shares[left_out] = 0.0
+        self._goals[left_out] = self.fractions[left_out] = 0.0
         self._change()
         return tuple(name for name, is_absent in zip(self.contacts, left_out, strict=True) if is_absent)
 
     def update(self, step: float) -> None:
         """Advance by `step` [s], and compute the rows at the state of the last update of the Robot."""
-        if not np.array_equal(self.shares, self._goals):
+        if not np.array_equal(self.fractions, self._goals):
             largest = step / self.fade if self.fade > step else 1.0
-            self.shares += np.clip(self._goals - self.shares, -largest, largest)
+            self.fractions += np.clip(self._goals - self.fractions, -largest, largest)
             self._change()
         self.rows.update()
 
     def _change(self) -> None:
-        """Write what follows from the shares."""
+        """Write what follows from the fractions."""
         for index, contact in enumerate(self.contacts.values()):
-            share = float(self.shares[index])
-            contact.active = share > 0.0
-            self.most[index] = math.inf if share == 1.0 else share * self._spans[index]
-            self.holds[self.starts[index] : self.starts[index + 1]] = share > 0.0
+            fraction = float(self.fractions[index])
+            contact.active = fraction > 0.0
+            self.largest[index] = math.inf if fraction == 1.0 else fraction * self._spans[index]
+            self.holds[self.starts[index] : self.starts[index + 1]] = fraction > 0.0
 
 
 def _tracked(robot: Robot, tags: InverseDynamicsTags) -> Mapping[str, Contact]:
@@ -168,10 +165,8 @@ def _cone(name: str, contact: Contact, tags: InverseDynamicsTags) -> np.ndarray:
     """Return the rows of G of a contact, shape (g, rows)."""
     local = _local(contact)
     normal = local[2]
-    sides: list[tuple[np.ndarray, float]] = [
-        (local[0], INNER_FRICTION * tags.friction),
-        (local[1], INNER_FRICTION * tags.friction),
-    ]
+    friction = math.sqrt(0.5) * tags.friction  # a pyramid of four sides within the cone
+    sides: list[tuple[np.ndarray, float]] = [(local[0], friction), (local[1], friction)]
     if local[3:].any():
         if tags.sole is None and local[3:5].any():
             raise ComponentError(
@@ -179,10 +174,10 @@ def _cone(name: str, contact: Contact, tags: InverseDynamicsTags) -> np.ndarray:
             )
         length, width = tags.sole or (0.0, 0.0)
         sides += [(local[3], width), (local[4], length), (local[5], tags.torsion)]
-    rows = [sign * side - share * normal for side, share in _present(sides) for sign in (1.0, -1.0)]
+    rows = [sign * side - ratio * normal for side, ratio in _present(sides) for sign in (1.0, -1.0)]
     return np.array(rows).reshape(-1, local.shape[1])
 
 
 def _present(sides: Sequence[tuple[np.ndarray, float]]) -> list[tuple[np.ndarray, float]]:
     """Return the sides along which a contact has a force at all."""
-    return [(side, share) for side, share in sides if side.any()]
+    return [(side, ratio) for side, ratio in sides if side.any()]

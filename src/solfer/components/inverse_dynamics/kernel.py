@@ -8,9 +8,6 @@ import numpy as np
 
 from solfer.numerics.compilation import REORDERED, cached, part
 
-DEPENDENT = 1e-9
-"""Share of a row's largest entry below which what other rows leave of it counts as zero: rounding errors."""
-
 
 @part
 def _write_equalities(inertia, bias, jacobian, demanded, unit, dofs, holds, rows, sides):
@@ -37,11 +34,11 @@ def _write_equalities(inertia, bias, jacobian, demanded, unit, dofs, holds, rows
 
 
 @part
-def _subtract(rows, sides, i, other, share):
-    """Subtract a share of row `other` from row i."""
+def _subtract(rows, sides, i, other, factor):
+    """Subtract a multiple of row `other` from row i."""
     for j in range(rows.shape[1]):
-        rows[i, j] -= share * rows[other, j]
-    sides[i] -= share * sides[other]
+        rows[i, j] -= factor * rows[other, j]
+    sides[i] -= factor * sides[other]
 
 
 @part
@@ -82,11 +79,13 @@ def _eliminate(rows, sides, first, fixed, scales, origins):
     for i in range(count - first):
         origins[i] = 0.0
         origins[i, i] = 1.0
+    # what other rows leave of a row counts as zero below this ratio to its largest entry: rounding errors
+    tolerance = 1e-9
     # contacts come first: torques that no drive has are then forces
     for step in range(count):
         i = (first + step) % count
         column, most = _largest(rows[i])
-        if not most > DEPENDENT * scales[i]:
+        if not most > tolerance * scales[i]:
             if i < first:
                 return False
             rows[i] = 0.0
@@ -98,14 +97,14 @@ def _eliminate(rows, sides, first, fixed, scales, origins):
                 if rows[i, fixed[other]] != 0.0:
                     _subtract(rows, sides, i, other, rows[i, fixed[other]])
             column, most = _largest(rows[i])
-            if not most > DEPENDENT:
+            if not most > tolerance:
                 return False
-        share = 1.0 / rows[i, column]
+        factor = 1.0 / rows[i, column]
         for j in range(rows.shape[1]):
-            rows[i, j] *= share
-        sides[i] *= share
+            rows[i, j] *= factor
+        sides[i] *= factor
         if i >= first:
-            origins[i - first] *= share
+            origins[i - first] *= factor
         rows[i, column] = 1.0
         fixed[i] = column
         for other in range(count):
@@ -192,8 +191,8 @@ def _build(
     cones,
     normals,
     most,
-    least_acceleration,
-    largest_acceleration,
+    lower_acceleration,
+    upper_acceleration,
     rows,
     sides,
     fixed,
@@ -249,13 +248,13 @@ def _build(
         matrix[place] = table[i]
         lower[place], upper[place] = -np.inf, np.inf
         if fixed[i] < size:
-            lower[place] = least_acceleration[fixed[i]] - sides[i]
-            upper[place] = largest_acceleration[fixed[i]] - sides[i]
+            lower[place] = lower_acceleration[fixed[i]] - sides[i]
+            upper[place] = upper_acceleration[fixed[i]] - sides[i]
         place += 1
     for i in range(len(free)):
         least[i], largest[i] = -np.inf, np.inf
         if free[i] < size:
-            least[i], largest[i] = least_acceleration[free[i]], largest_acceleration[free[i]]
+            least[i], largest[i] = lower_acceleration[free[i]], upper_acceleration[free[i]]
     return True
 
 
@@ -286,11 +285,11 @@ def _finish(z, inertia, bias, jacobian, unit, passive, fixed, sides, free, table
         torque[passive[i]] = 0.0
 
 
-def _touch(values, least, most, slack, active):
-    """Write which values are at one of their limits, but for a share of them, or of 1."""
+def _touch(values, lower, upper, slack, active):
+    """Write which values are at one of their limits, but for a small ratio of them, or of 1."""
     for i in range(len(values)):
         near = slack * max(1.0, abs(values[i]))
-        active[i] = 1 if values[i] >= most[i] - near or values[i] <= least[i] + near else 0
+        active[i] = 1 if values[i] >= upper[i] - near or values[i] <= lower[i] + near else 0
 
 
 _MATRIX = "float64[:, ::1]"

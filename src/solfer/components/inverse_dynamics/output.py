@@ -5,7 +5,7 @@ import numpy as np
 from solfer.dynamics import CarryingTorques
 from solfer.robot import Robot
 
-CHANGE = 0.2
+BLEND_TIME = 0.2
 """Time in which torques pass from the law to what holds the robot, and back [s]."""
 
 
@@ -35,16 +35,16 @@ class CommandedMotion:
     def advance(self, acceleration: np.ndarray, step: float) -> None:
         """Go on by accelerations, shape (n,) [rad/s^2, m/s^2], for a time [s]."""
         state = self._robot.state
-        share = step / (self.follow + step)
+        coefficient = step / (self.follow + step)
         np.multiply(acceleration, step, out=self._step)
         self.velocity += self._step
         np.subtract(state.velocity, self.velocity, out=self._step)
-        self._step *= share
+        self._step *= coefficient
         self.velocity += self._step
         np.multiply(self.velocity, step, out=self._step)
         self.position += self._step
         np.subtract(state.position, self.position, out=self._step)
-        self._step *= share
+        self._step *= coefficient
         self.position += self._step
         np.maximum(self.position, self._robot.lower_limits.position, out=self.position)
         np.minimum(self.position, self._robot.upper_limits.position, out=self.position)
@@ -80,13 +80,13 @@ class CommandedTorques:
     def change(self, before: np.ndarray) -> None:
         """Begin to pass from torques to those of another law, shape (n,) [Nm, N]."""
         self._before[:] = before
-        self._left = CHANGE
+        self._left = BLEND_TIME
 
     def blend(self, step: float) -> None:
         """Blend the torques of the law in, a time [s] after the last call."""
         if self._left > 0.0:
             self._left = max(self._left - step, 0.0)
-            u = 1.0 - self._left / CHANGE
+            u = 1.0 - self._left / BLEND_TIME
             self.value -= self._before
             self.value *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))
             self.value += self._before

@@ -12,17 +12,14 @@ from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, 
 from solfer.numerics.solvers.problem import Problem
 from solfer.robot import Robot
 
-QP_TOLERANCE = 1e-9
-"""Largest residual of a solution, see `numerics.solvers.qp.Solution`."""
+ACCELERATION_WEIGHT = 1e-8
+"""Weight of the square of each acceleration beside tasks of weight 1 [s^4/rad^2, s^4/m^2]: what tasks leave open is
+small."""
 
-QP_ACCELERATION, QP_FORCE = 1e-8, 1e-5
-"""Weights of the squares of each acceleration [s^4/rad^2, s^4/m^2], and of each force in units of a contact's share of
-the weight, beside tasks of weight 1: what tasks leave open is small, and forces are shared out."""
+FORCE_WEIGHT = 1e-5
+"""Weight of the square of each force in units of a contact's part of the weight: forces are distributed."""
 
-CONTRADICTION = "what contacts hold"
-"""What is violated where equalities have no solution."""
-
-_WHY = {
+_REASONS = {
     INFEASIBLE: "contradicts the others",
     GAVE_UP: "takes too many steps",
     INACCURATE: "depends on others almost",
@@ -70,7 +67,7 @@ class WholeBodyProblem:
     """The accelerations a and contact forces f next to what tasks demand, and the torques that make them.
 
         least |W (J a - r)|^2  with  M a + h = S' tau + Jc' f,  Jc a + b = - D Jc v,
-        G f <= 0,  0 <= N f <= most,  |tau| <= tau_max,  a_min <= a <= a_max
+        G f <= 0,  0 <= N f <= largest,  |tau| <= tau_max,  a_min <= a <= a_max
 
     Torques follow from a and f, and are no unknowns; nor is what the equalities fix, see `kernel`. The method starts
     from the cost alone: equal states have equal torques.
@@ -100,12 +97,12 @@ class WholeBodyProblem:
         self._passive = np.setdiff1d(moved, robot.actuated).astype(np.int64)
         fixed = len(self._passive) + forces
         free = size - len(self._passive)
-        self._smallest = np.concatenate((np.full(size, QP_ACCELERATION), np.full(forces, QP_FORCE)))
+        self._smallest = np.concatenate((np.full(size, ACCELERATION_WEIGHT), np.full(forces, FORCE_WEIGHT)))
         self._elimination = Elimination.empty(fixed, free, forces)
         self._constraints = ProblemConstraints(robot, ground, bounds, driven, torque_limits)
         count = self._constraints.count + fixed
         self._problem = Problem.empty(free, 0, count)
-        self._method = ActiveSet(free, count, QP_TOLERANCE)
+        self._method = ActiveSet(free, count, 1e-9)  # largest residual of a solution
         self._z = np.zeros(free)
         self.acceleration = np.zeros(size)
         self.torque = np.zeros(size)
@@ -144,7 +141,7 @@ class WholeBodyProblem:
             constraints.limits,
             ground.cones,
             ground.normals,
-            ground.most,
+            ground.largest,
             self.bounds.lower,
             self.bounds.upper,
             *solved,
@@ -197,4 +194,4 @@ class WholeBodyProblem:
     def violated(self) -> str:
         """The constraint that the last `solve` could not keep beside the others, and why."""
         name = "" if self._outcome == NOT_FINITE else self._constraints.farthest()
-        return f"{name or CONTRADICTION} {_WHY[self._outcome]}"
+        return f"{name or 'what contacts hold'} {_REASONS[self._outcome]}"

@@ -10,15 +10,6 @@ from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.config.tasks.stack import Gain, Positive, TaskLevelsRecord, TaskRecord
 
-MAX_LEVELS = 2
-"""Most levels of tasks."""
-
-CRITICAL = 4.0
-"""Gain of the velocity relative to that of the position, where errors vanish without swinging."""
-
-MOTION_GAIN = 10.0
-"""Gain of the velocity of a task without a position [1/s]."""
-
 HalfSize = Annotated[float, Field(gt=0.0, le=10.0)]
 
 
@@ -68,7 +59,7 @@ class DynamicStackRecord(TaskLevelsRecord):
 
     @model_validator(mode="after")
     def _check(self) -> "DynamicStackRecord":
-        if len(self.levels) > MAX_LEVELS:
+        if len(self.levels) > 2:
             raise ValueError(f"{len(self.levels)} levels; expected one or two: contacts and limits come before them")
         return self
 

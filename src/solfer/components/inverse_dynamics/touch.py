@@ -5,10 +5,6 @@ import numpy as np
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.robot import Robot
 
-PRESSED_SHARE, BORNE_SHARE = 0.05, 0.2
-"""Share of a contact's part of the weight from which on it touches something: of its measured force, and of the one
-that follows from the torques of the joints, of which friction takes some."""
-
 
 def touching(robot: Robot, ground: Ground) -> np.ndarray:
     """Find the contacts that bear a load, the robot being at rest, shape (c,).
@@ -21,12 +17,12 @@ def touching(robot: Robot, ground: Ground) -> np.ndarray:
         ground: Its contacts.
     """
     forces = robot.contacts.wrenches[[robot.contacts.names.index(name) for name in ground.names], :3]
-    if forces.any():
-        return np.linalg.norm(forces, axis=1) >= PRESSED_SHARE * ground.unit
+    if forces.any():  # a twentieth of a contact's part of the weight
+        return np.linalg.norm(forces, axis=1) >= 0.05 * ground.unit
     torque = robot.state.torque
     if not torque.any():
         return np.full(len(ground.names), robot.kinematics.base is not None)
     ground.rows.update()
     left = robot.kinematics.bias(robot.state.position, np.zeros(robot.size)) - torque
     borne, *_ = np.linalg.lstsq(ground.jacobian.T, left)
-    return ground.normals @ borne >= BORNE_SHARE * ground.unit
+    return ground.normals @ borne >= 0.2 * ground.unit  # a fifth: friction takes some of the torques

@@ -8,23 +8,6 @@ from solfer.components.inverse_dynamics.ground import Ground
 from solfer.numerics.compilation import cached, part
 from solfer.robot import Robot
 
-SMOOTHING = 0.2
-"""Time over which torques are compared [s]: motors swing, and take a while."""
-
-CONTACT_CALM_TIME = 3.0
-"""Time at the start in which torques are not compared [s]: commands blend in from those of before."""
-
-LOST_EFFORT_SHARE, CONTACT_MINIMUM = 0.5, 0.03
-"""A joint has lost its effort where that differs by more than this share of the commanded one, and by more than the
-second number [m] times the robot's weight: friction of wrists is more than they carry."""
-
-CONTACT_SLIP, MEMORY = 0.02, 0.5
-"""Way of a contact that slips [m], within about the second number [s]."""
-
-ABSENT, CARRIES, CONTACT_DELAY = 0.05, 0.3, 0.2
-"""Share of a contact's part of the weight below which it touches nothing, though it is to carry more than the second
-share, for the third number [s]."""
-
 
 class DynamicsWatch:
     """Compares what is measured with what the QP takes for granted.
@@ -45,7 +28,8 @@ class DynamicsWatch:
     def __init__(self, robot: Robot, ground: Ground, efforts: np.ndarray):
         self._robot, self._ground, self._efforts = robot, ground, efforts.astype(np.int64)
         count = len(ground.normals)
-        self._limit = CONTACT_MINIMUM * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
+        # [Nm] friction of wrists is more than they carry: 3 cm times the weight
+        self._limit = 0.03 * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         contacts = robot.contacts
         self._tracked = np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64)
         self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
@@ -88,7 +72,7 @@ class DynamicsWatch:
         self._add_springs()
         found = watch(
             step,
-            self._time > CONTACT_CALM_TIME,
+            self._time > 3.0,  # [s] in which commands blend in from those of before
             robot.command.torque,
             self._springs,
             robot.state.torque,
@@ -98,7 +82,7 @@ class DynamicsWatch:
             self._difference,
             ground.normals,
             force,
-            ground.shares,
+            ground.fractions,
             ground.unit,
             robot.contacts.wrenches,
             self._tracked,
@@ -136,19 +120,19 @@ class DynamicsWatch:
 
 
 @part
-def _lost(share, torque, springs, measured, efforts, limit, sent, difference, is_calm):
+def _lost(coefficient, torque, springs, measured, efforts, limit, sent, difference, is_calm):
     """Compare torques; return a DoF that has lost its own, or -1."""
     found = -1
     any_measured = False
     for dof in efforts:
         any_measured = any_measured or measured[dof] != 0.0
-        sent[dof] += share * (torque[dof] - sent[dof])
-        least = min(springs[dof], 0.0)
-        most = max(springs[dof], 0.0)
+        sent[dof] += coefficient * (torque[dof] - sent[dof])
+        lower = min(springs[dof], 0.0)
+        upper = max(springs[dof], 0.0)
         away = measured[dof] - torque[dof]
-        away -= min(max(away, least), most)
-        difference[dof] += share * (away - difference[dof])
-        if abs(difference[dof]) > max(LOST_EFFORT_SHARE * abs(sent[dof]), limit) and found < 0:
+        away -= min(max(away, lower), upper)
+        difference[dof] += coefficient * (away - difference[dof])
+        if abs(difference[dof]) > max(0.5 * abs(sent[dof]), limit) and found < 0:
             found = dof
     return found if any_measured and is_calm else -1
 
@@ -165,7 +149,7 @@ def _watch(
     difference,
     normals,
     force,
-    shares,
+    fractions,
     unit,
     wrenches,
     tracked,
@@ -178,9 +162,11 @@ def _watch(
     """See `DynamicsWatch.update`; return the number of a DoF, of a contact that slips, or of one that is absent."""
     size = len(torque)
     count = len(tracked)
-    found = _lost(min(step / SMOOTHING, 1.0), torque, springs, measured, efforts, limit, sent, difference, is_calm)
+    smoothing_time = 0.2  # [s] motors swing, and take a while
+    found = _lost(min(step / smoothing_time, 1.0), torque, springs, measured, efforts, limit, sent, difference, is_calm)
     if found >= 0:
         return found
+    forgetting_time = 0.5  # [s] after which the displacement of a contact does not count
     are_measured = False
     for i in range(count):
         for k in range(3):
@@ -188,11 +174,11 @@ def _watch(
     for i in range(count):
         distance = 0.0
         for k in range(3 if is_point[i] or starts[i + 1] - starts[i] == 6 else 0):
-            moved[i, k] += step * (slip[starts[i] + k] - moved[i, k] / MEMORY)
-            if shares[i] < 1.0:
+            moved[i, k] += step * (slip[starts[i] + k] - moved[i, k] / forgetting_time)
+            if fractions[i] < 1.0:
                 moved[i, k] = 0.0
             distance += moved[i, k] ** 2
-        if math.sqrt(distance) > CONTACT_SLIP:
+        if math.sqrt(distance) > 0.02:  # [m]
             return size + i
         pressed = 0.0
         computed = 0.0
@@ -200,9 +186,9 @@ def _watch(
             pressed += wrenches[tracked[i], k] ** 2
         for k in range(len(force)):
             computed += normals[i, k] * force[k]
-        is_absent = math.sqrt(pressed) < ABSENT * unit and computed > CARRIES * unit and shares[i] == 1.0
+        is_absent = math.sqrt(pressed) < 0.05 * unit and computed > 0.3 * unit and fractions[i] == 1.0
         missing[i] = missing[i] + step if are_measured and is_absent else 0.0
-        if missing[i] > CONTACT_DELAY:
+        if missing[i] > 0.2:  # [s]
             return size + count + i
     return -1
 
@@ -210,9 +196,8 @@ def _watch(
 _ROWS = "float64[:, ::1]"
 _ROW = "float64[::1]"
 _INDICES = "int64[::1]"
-_FLAGS = "boolean[::1]"
 watch = cached(
     f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, "
-    f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",
+    f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, boolean[::1], {_ROWS})",
     _watch,
 )

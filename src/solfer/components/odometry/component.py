@@ -10,7 +10,6 @@ from solfer.components.base import Component
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
-from solfer.components.odometry.consensus import WHEELS_APART_TIME
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
@@ -36,30 +35,24 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
-JUDGED = ("slip", "slip_share", "touch", "clearance", "settle", "rest")
-"""Tags of the filter that each of its updates reads."""
-
 FRAME = "odom"
 """World frame of the published pose, as in REP 105."""
 
-PUBLISHED = 50.0
-"""Rate at which the pose is published with its covariance, at most [Hz]."""
 
-
-class PublishingTurns:
-    """Turns of something that is published once in several cycles, the last of which is its turn.
+class RateDivider:
+    """Selects one of several cycles, the last of them.
 
     Attributes:
-        between: Cycles from one turn to the next.
+        cycles: Cycles of which one is selected.
     """
 
     def __init__(self) -> None:
-        self.between = 1
+        self.cycles = 1
         self._left = 0
 
-    def is_next(self) -> bool:
-        """Count a cycle; return whether it is a turn."""
-        self._left = (self._left or self.between) - 1
+    def is_due(self) -> bool:
+        """Count a cycle; return whether it is selected."""
+        self._left = (self._left or self.cycles) - 1
         return not self._left
 
 
@@ -84,6 +77,9 @@ class Odometry(Component):
 
     Tags = OdometryTags
 
+    _INCONSISTENCY_TIME = 0.5
+    """Time after which a contradiction of wheels and gyroscope is reported [s]: they slip together, or it is wrong."""
+
     def __init__(self, robot: Robot, tags: OdometryTags | None = None, name: str = "odometry"):
         super().__init__(robot, tags or OdometryTags(), name)
         self.modify = True
@@ -99,8 +95,8 @@ class Odometry(Component):
         self._pose, self._rates = np.zeros((2, 6))
         self._rotation = np.eye(3)
         self._position = np.zeros(3)
-        self._pose_turns = PublishingTurns()
-        self._report_turns = PublishingTurns()
+        self._pose_divider = RateDivider()
+        self._report_divider = RateDivider()
         self._throttle = Throttle(log)
         self._child = robot.kinematics.base_link or ""
         if self.tags.method == "filter":
@@ -113,21 +109,22 @@ class Odometry(Component):
             ConfigError: A filter's cut-off is not below half of the rate.
         """
         super().set_rate(rate)
-        self._pose_turns.between = max(1, round(rate / PUBLISHED))
-        self._report_turns.between = round(self._pose_turns.between * PUBLISHED)
+        pose_rate = 50.0  # [Hz] at most; reports follow once a second
+        self._pose_divider.cycles = max(1, round(rate / pose_rate))
+        self._report_divider.cycles = round(self._pose_divider.cycles * pose_rate)
         tags = self.tags
         self.law.filter = None if tags.filter is None else tags.filter.low_pass(3, rate)
         self.law.smoothing = None if tags.velocity is None else tags.velocity.low_pass(4, rate)
 
     def live_parameters(self) -> tuple[LiveParameter, ...]:
-        """Offer the filters, and how wheels and ground are judged."""
+        """Offer the filters, and the numbers by which wheels and ground are classified."""
         law = self.law
         rate = 1.0 / self.period
         write = law.take if isinstance(law, FilteredOdometry) else lambda _: None
         return (
             *live_filter(("filter",), law.filter, lambda tags: tags.filter.low_pass(3, rate)),
             *live_filter(("velocity",), law.smoothing, lambda tags: tags.velocity.low_pass(4, rate)),
-            *(LiveParameter((key,), write) for key in JUDGED),
+            *(LiveParameter((key,), write) for key in ("slip", "slip_share", "touch", "clearance", "settle", "rest")),
         )
 
     def init(self) -> None:
@@ -148,19 +145,19 @@ class Odometry(Component):
         streams.finish()
         self._write()
         for check in (streams.joint_stamps, streams.imu_stamps):
-            if check.complaint:
-                self._throttle.warning(check.complaint, "%s: %s, it does not count", self.name, check.complaint)
-                check.complaint = ""
-        if isinstance(self.law, FilteredOdometry) and self.law.consensus.contradicted > WHEELS_APART_TIME:
-            self._throttle.warning("turn", "%s: %s", self.name, self._doubt())
+            if check.warning:
+                self._throttle.warning(check.warning, "%s: %s, it does not count", self.name, check.warning)
+                check.warning = ""
+        if isinstance(self.law, FilteredOdometry) and self.law.consensus.contradicted > self._INCONSISTENCY_TIME:
+            self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
 
-    def _doubt(self) -> str:
+    def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""
         law = self.law
-        if not isinstance(law, FilteredOdometry) or law.consensus.contradicted < WHEELS_APART_TIME:
+        if not isinstance(law, FilteredOdometry) or law.consensus.contradicted < self._INCONSISTENCY_TIME:
             return ""
-        apart = law.consensus.contradiction
-        return f"the gyroscope turns by {apart:.2g} rad/s otherwise than the wheels, which slip, or it is wrong"
+        difference = law.consensus.contradiction
+        return f"the gyroscope turns by {difference:.2g} rad/s otherwise than the wheels, which slip, or it is wrong"
 
     def send(self) -> None:
         """Write the base into the desired State."""
@@ -180,10 +177,8 @@ class Odometry(Component):
         known = isinstance(self.law, FilteredOdometry)
         made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, handler=self.set_pose)]
         if known:
-            made.append(
-                TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._state_now_and_then)
-            )
-            made.append(TopicOut("pose", interface, StampedUncertainPose, collect=self._pose_now_and_then))
+            made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_states))
+            made.append(TopicOut("pose", interface, StampedUncertainPose, collect=self._due_pose))
         if self.tags.transform:
             made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, collect=self._place))
         return tuple(made)
@@ -211,11 +206,11 @@ class Odometry(Component):
         if isinstance(self.law, FilteredOdometry):
             self._covariances.find_deviations()
 
-    def _pose_now_and_then(self) -> object:
-        return self.uncertain_pose() if self._pose_turns.is_next() else None
+    def _due_pose(self) -> object:
+        return self.uncertain_pose() if self._pose_divider.is_due() else None
 
-    def _state_now_and_then(self) -> object:
-        return self.wheel_states() if self._report_turns.is_next() else None
+    def _due_states(self) -> object:
+        return self.wheel_states() if self._report_divider.is_due() else None
 
     def _place(self) -> object:
         quaternion = quaternion_from_rotation(self._rotation)
@@ -233,12 +228,12 @@ class Odometry(Component):
             state = "lifted" if lifted else "rolls" if rolls else "slips"
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
-        doubt = self._doubt()
-        summary = doubt or ("a wheel slips" if slips else "all wheels that touch roll")
+        inconsistency = self._inconsistency()
+        summary = inconsistency or ("a wheel slips" if slips else "all wheels that touch roll")
         return Statuses(
             status=(
                 Status(
-                    int(slips or bool(doubt)),
+                    int(slips or bool(inconsistency)),
                     f"{self.name}: wheels",
                     summary,
                     hardware_id=self.name,
@@ -259,8 +254,8 @@ class Odometry(Component):
         if frame not in ("", FRAME):
             raise ComponentError(f"a pose in the frame '{frame}'", expected=f"the frame '{FRAME}'")
         place = stamped.pose.position
-        turn = stamped.pose.orientation
-        rotation = rotation_from_quaternion((turn.x, turn.y, turn.z, turn.w))
+        orientation = stamped.pose.orientation
+        rotation = rotation_from_quaternion((orientation.x, orientation.y, orientation.z, orientation.w))
         variances = [stamped.covariance[7 * axis] for axis in (0, 1, 5)]
         if not all(map(math.isfinite, (place.x, place.y, *variances))):
             raise NotFinite(f"a pose at ({place.x:g}, {place.y:g})", expected="finite numbers")
@@ -289,17 +284,17 @@ class Odometry(Component):
         return Accepted()
 
     def _write(self) -> None:
-        """Write where the base is now into the measured State; its angles go on without jumps by whole turns."""
+        """Write where the base is now into the measured State; its angles go on without jumps by revolutions."""
         law = self.law
         state = self.model.state
         ahead = self.streams.ahead
         linear = about_vertical(law.velocity, law.heading)
         angular = about_vertical(law.angular, law.heading)
-        turn = law.heading - self._base.heading
+        yaw = law.heading - self._base.heading
         turned = self.streams.turned_since() if ahead else None
         if turned is None:
-            turn += ahead * float(angular[2])
-        filter_kernel.turn_rotation(self._base.rotation, turn, self._rotation)
+            yaw += ahead * float(angular[2])
+        filter_kernel.turn_rotation(self._base.rotation, yaw, self._rotation)
         if turned is not None:
             self._rotation[:] = self._rotation @ turned
         angles = self._pose[3:].tolist()

@@ -6,18 +6,14 @@ import numpy as np
 
 from solfer.components.odometry import consensus_kernel as kernel
 
-COMPARED = 0.3
+COMPARISON_TIME = 0.3
 """Time over which wheels are compared [s]: encoders are too coarse for less."""
-
-WHEELS_APART, WHEELS_APART_TIME = 0.1, 0.5
-"""Difference of the turn of wheels that agree with each other and that of the gyroscope [rad/s], and time after which
-it is named [s]: they slip together, or it is wrong."""
 
 
 class WheelConsensus:
     """Finds wheels that slip, and weighs those that slide a little.
 
-    Wheel i at r_i measures the base's velocity v + turn z x r_i, wherever it rolls without slip.
+    Wheel i at r_i measures the base's velocity v + yaw_rate z x r_i, wherever it rolls without slip.
 
     Slip is fast: the worst wheel is left out while it is further than a tolerance from the mean of the others.
 
@@ -35,8 +31,8 @@ class WheelConsensus:
     Attributes:
         inliers: Which wheels do not slip, shape (k,); live.
         distances: Squared distances d^2, shape (k,) [m^2/s^2]; live.
-        contradiction: By how much the turn of the wheels contradicts the gyroscope [rad/s].
-        contradicted: For how long that has been more than `WHEELS_APART` [s].
+        contradiction: By how much the yaw rate of the wheels contradicts the gyroscope [rad/s].
+        contradicted: For how long that has been more than 0.1 rad/s [s].
     """
 
     def __init__(self, count: int, slip_time: float = 0.02):
@@ -64,7 +60,7 @@ class WheelConsensus:
         Args:
             speeds: What wheels measure of the base's velocity, shape (k, 3) [m/s].
             arms: r, shape (k, 3) [m].
-            rate: Turn about the vertical [rad/s].
+            rate: Yaw rate [rad/s].
             weights: Weights of the wheels, shape (k,); at least two are positive.
             tolerance: How far a wheel may be from the others [m/s].
             time: Time of these speeds [s].
@@ -88,16 +84,16 @@ class WheelConsensus:
         Args:
             speeds: What wheels measure of the base's velocity, shape (k, 3) [m/s].
             arms: r, shape (k, 3) [m].
-            rate: Turn about the vertical that the gyroscope measures [rad/s].
-            variance: Its variance over `COMPARED` [rad^2/s^2].
+            rate: Yaw rate that the gyroscope measures [rad/s].
+            variance: Its variance over `COMPARISON_TIME` [rad^2/s^2].
             tolerance: c^2 [m^2/s^2].
             time: Time of these speeds [s].
             variances: Variances of the speeds, shape (k,); are multiplied by (1 + d^2 / c^2)^2, up to a bound.
 
         Returns:
-            By how much the turn of the wheels contradicts the gyroscope beyond what is likely [rad^2/s^2].
+            By how much the yaw rate of the wheels contradicts the gyroscope beyond what is likely [rad^2/s^2].
         """
-        keep = COMPARED / (COMPARED + time)
+        keep = COMPARISON_TIME / (COMPARISON_TIME + time)
         contradiction = float(
             kernel.estimate(
                 speeds, arms, self.inliers, rate, variance, keep, tolerance,
@@ -105,17 +101,17 @@ class WheelConsensus:
             )
         )  # fmt: skip
         self.contradiction = math.sqrt(max(contradiction, 0.0))
-        self.contradicted = self.contradicted + time if self.contradiction > WHEELS_APART else 0.0
+        self.contradicted = self.contradicted + time if self.contradiction > 0.1 else 0.0
         return contradiction
 
 
-def turn_of(displacements: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
-    """Compute the turn about the vertical that wheels measure [rad], and the mean square of their arms [m^2].
+def yaw_of(displacements: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
+    """Compute the yaw that wheels measure [rad], and the mean square of their arms [m^2].
 
     Args:
-        displacements: What wheels measure of the base's way, shape (k, 3) [m].
+        displacements: What wheels measure of the base's displacement, shape (k, 3) [m].
         arms: From the base's origin to the contacts, shape (k, 3) [m].
         weights: Weights, shape (k,); at least two are positive.
     """
-    turn, spread = kernel.turn(displacements, arms, weights)
-    return float(turn), float(spread)
+    yaw, spread = kernel.yaw(displacements, arms, weights)
+    return float(yaw), float(spread)

@@ -4,19 +4,10 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
-CONSENSUS_LIKELIHOOD = 4.0
-"""Variances of the gyroscope's rate by which wheels may contradict it: two standard deviations."""
-
-DOUBT = 1e4
-"""Largest factor of a wheel's variance: where all slide, they still are all that measures the base's way."""
-
-CONSENSUS_STEPS = 3
-"""Steps of reweighting to the Cauchy estimate."""
-
 
 @part
 def fit_twist(speeds, arms, weights, rate, weight):
-    """Return velocity and turn of the weighted least squares of wheels (x and y) and of a measured rate."""
+    """Return velocity and yaw rate of the weighted least squares of wheels (x and y) and of a measured rate."""
     total = x0 = y0 = u0 = v0 = across = spread = 0.0
     for i in range(len(speeds)):
         total += weights[i]
@@ -33,8 +24,8 @@ def fit_twist(speeds, arms, weights, rate, weight):
         y = arms[i, 1] - y0
         across += weights[i] * (x * (speeds[i, 1] - v0) - y * (speeds[i, 0] - u0))
         spread += weights[i] * (x * x + y * y)
-    turn = (across + weight * rate) / max(spread + weight, 1e-12)
-    return u0 + turn * y0, v0 - turn * x0, turn, spread / total
+    yaw_rate = (across + weight * rate) / max(spread + weight, 1e-12)
+    return u0 + yaw_rate * y0, v0 - yaw_rate * x0, yaw_rate, spread / total
 
 
 @part
@@ -42,10 +33,10 @@ def write_distances(speeds, arms, twist, distances):
     """Write the squared distance of each wheel from a twist [m^2/s^2]."""
     x = twist[0]
     y = twist[1]
-    turn = twist[2]
+    yaw_rate = twist[2]
     for i in range(len(speeds)):
-        u = speeds[i, 0] - x + turn * arms[i, 1]
-        v = speeds[i, 1] - y - turn * arms[i, 0]
+        u = speeds[i, 0] - x + yaw_rate * arms[i, 1]
+        v = speeds[i, 1] - y - yaw_rate * arms[i, 0]
         distances[i] = u * u + v * v
 
 
@@ -53,7 +44,7 @@ def write_distances(speeds, arms, twist, distances):
 def best_pair(speeds, arms, inliers, rate, variance, tolerance, distances, weights):
     """Return the twist of the pair of wheels with the least Cauchy cost over all, and that cost."""
     count = len(distances)
-    least = math.inf
+    lowest_cost = math.inf
     best = (0.0, 0.0, 0.0, 0.0)
     for one in range(count):
         for other in range(one):
@@ -67,10 +58,10 @@ def best_pair(speeds, arms, inliers, rate, variance, tolerance, distances, weigh
             for i in range(count):
                 if inliers[i]:
                     cost += math.log(1.0 + distances[i] / tolerance)
-            if cost < least:
-                least = cost
+            if cost < lowest_cost:
+                lowest_cost = cost
                 best = twist
-    return least, best
+    return lowest_cost, best
 
 
 def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, distances, weights, variances):
@@ -86,18 +77,19 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
     if cost == math.inf:
         distances[:] = 0.0
         return 0.0
-    for _ in range(CONSENSUS_STEPS):
+    for _ in range(3):  # reweighting
         write_distances(wheels, arms, twist, distances)
         for i in range(count):
             weights[i] = inliers[i] / (tolerance + distances[i])
         twist = fit_twist(wheels, arms, weights, rate, 1.0 / (variance + (twist[2] - rate) ** 2))
     write_distances(wheels, arms, twist, distances)
     for i in range(count):
-        variances[i] *= min((1.0 + distances[i] / tolerance) ** 2, DOUBT)
+        # bounded: where all wheels slide, they still are all that measures the base's displacement
+        variances[i] *= min((1.0 + distances[i] / tolerance) ** 2, 1e4)
     alone = fit_twist(wheels, arms, weights, rate, 0.0)
-    if alone[3] < 1e-6:  # wheels above each other measure no turn
+    if alone[3] < 1e-6:  # wheels above each other measure no yaw rate
         return 0.0
-    return max(0.0, (alone[2] - rate) ** 2 - CONSENSUS_LIKELIHOOD * variance)
+    return max(0.0, (alone[2] - rate) ** 2 - 4.0 * variance)  # two standard deviations are likely
 
 
 @part
@@ -149,10 +141,10 @@ def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mea
         total = mean_speed(smoothed, arms, rate, weights, inliers, mean)
 
 
-def _turn(displacements, arms, weights):
-    """Return the turn that wheels measure [rad], and the mean square of their distances from their middle [m^2]."""
-    _, _, turn, spread = fit_twist(displacements, arms, weights, 0.0, 0.0)
-    return turn, spread
+def _yaw(displacements, arms, weights):
+    """Return the yaw that wheels measure [rad], and the mean square of their distances from their middle [m^2]."""
+    _, _, yaw, spread = fit_twist(displacements, arms, weights, 0.0, 0.0)
+    return yaw, spread
 
 
 _F = "float64"
@@ -162,4 +154,4 @@ _B = "boolean[::1]"
 
 estimate = cached(f"float64({_M}, {_M}, {_B}, {_F}, {_F}, {_F}, {_F}, {_M}, {_V}, {_V}, {_V})", _estimate)
 reject = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_F}, {_M}, {_B}, {_V})", _reject)
-turn = cached(f"UniTuple(float64, 2)({_M}, {_M}, {_V})", _turn)
+yaw = cached(f"UniTuple(float64, 2)({_M}, {_M}, {_V})", _yaw)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry import filter_kernel
-from solfer.components.odometry.consensus import COMPARED, WheelConsensus, turn_of
+from solfer.components.odometry.consensus import COMPARISON_TIME, WheelConsensus, yaw_of
 from solfer.components.odometry.ground_plane import GroundPlane
 from solfer.components.odometry.kalman import NO_SAMPLE, ImuSample, WheelInertialFilter
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
@@ -15,40 +15,12 @@ from solfer.components.odometry.wheels import Wheels
 from solfer.numerics.filters import LowPass
 from solfer.points.contact.support_vertex import UP
 
-ODOMETRY_FORGETTING_TIME = 2.0
-"""Time in which a wheel's rise above the others is forgotten while it touches [s]."""
-
 REST_TIME = 0.1
 """Time for which wheels and joints have to stand still before the gyroscope's bias is estimated at rest [s]."""
 
-SWAYING = 0.05
-"""Share of the speed of a robot at rest which its joints may have on average: one that has stopped still sways."""
-
-GYROSCOPE_STD, UNKNOWN_BIAS_STD = 5.0, 2e-3
-"""Standard deviations of a gyroscope's noise at rest, and how fast a robot at rest may sway besides [rad/s]."""
-
-ENCODERS, ENCODER_STD = 2e-3, 1e-5
-"""Standard deviation of a wheel's velocity by encoders, and the same of a robot at rest [m/s]."""
-
-SLIP_SHARE, SKID = 0.008, 0.02
-"""Standard deviation of a wheel's velocity as a share of it, and of its way where wheels alone measure the turn."""
-
-HEIGHT_SETTLING_TIME, RAISING = 0.005, 0.2
-"""Time in which the base comes to the height of the map [s], and its largest speed [m/s]."""
-
-SHAKES, SHAKING = 2.5e-3, 0.3
-"""What samples of a gyroscope miss while legs move, as a share of the speed of their joints, and for how long [s]: the
-base shakes in time with the commands."""
-
-CRAWLING = 0.15
-"""Speed below which encoders are too coarse to measure on which slopes wheels are [m/s]."""
-
-QUIET, DEAF = 5e-4, 1.0
-"""Velocity by which wheels differ that roll and do not slide [m/s], and the variance of a turn without a gyroscope
-[rad^2/s^2]."""
-
-SPREADING = 0.1
-"""Time over which the spread of each wheel's innovations is estimated [s]."""
+SHAKE_RATIO = 2.5e-3
+"""What samples of a gyroscope miss while legs move, as a ratio to the speed of their joints: the base shakes in time
+with the commands."""
 
 
 class ImuProgress:
@@ -61,7 +33,7 @@ class ImuProgress:
         rate, rate_before: Mean angular velocity of its newest interval, and that at its begin, shape (3,) [rad/s].
         assumed: Tilting that was assumed since its last sample, shape (2,) [rad].
         since: Time since its last sample [s].
-        pending: Turn that was integrated since its last sample [rad].
+        pending: Yaw that was integrated since its last sample [rad].
         offset: From the heading of the IMU to that of the base [rad].
         rest: Time for which the robot has stood still [s].
         sway: Mean motion of each joint, shape (n,).
@@ -83,9 +55,10 @@ class ImuProgress:
 class FilteredOdometry:
     """The base's pose and its covariance by `WheelInertialFilter`.
 
-    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the turn p of the base
-    between two measurements, a wheel that rolls measures the base's way m_i = -(J_i dq + p x r_i), with J and the arm r
-    as means of both, so that the error is of third order. Encoders count and not velocities: no noise adds up.
+    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the rotation p of the
+    base between two measurements, a wheel that rolls measures the displacement m_i = -(J_i dq + p x r_i) of the base,
+    with J and the arm r as means of both, so that the error is of third order. Encoders count and not velocities: no
+    noise adds up.
 
     Each measurement of the joints is one update: the IMU predicts, the wheels that are neither lifted nor slip correct,
     and the pose is integrated. Ground that rises less than `level` is level and measures the error of the IMU's tilt;
@@ -105,7 +78,7 @@ class FilteredOdometry:
         angular: Angular velocity of the base in the heading frame, without the gyroscope's bias, shape (3,) [rad/s];
             live.
         filter: Filter of the angular velocity that the IMU measures, three numbers, or None.
-        smoothing: Filter of the velocity and of the turn's rate, four numbers, or None.
+        smoothing: Filter of the velocity and of the yaw rate, four numbers, or None.
     """
 
     def __init__(self, wheels: Wheels, base: MeasuredBase, tags: OdometryTags):
@@ -138,7 +111,7 @@ class FilteredOdometry:
         return self._ground.lifted
 
     def take(self, tags: OdometryTags) -> None:
-        """Go on with the numbers of other tags by which wheels and ground are judged."""
+        """Go on with the numbers of other tags by which wheels and ground are classified."""
         self._tags = tags
 
     def start(self) -> None:
@@ -196,10 +169,10 @@ class FilteredOdometry:
         shaken, sample = self._follow_imu(legs / period)
         self._weigh()
         motion.measure(self._base.turned)
-        turn, imu_time, unknown = self._measure_turn()
+        yaw, imu_time, unknown = self._measure_yaw()
         self._note_rest(moved, sway, imu_time)
         self.kalman.predict(
-            turn - self.kalman.bias * imu_time,
+            yaw - self.kalman.bias * imu_time,
             period,
             moved * motion.wheels.radii[0],
             shaken,
@@ -207,8 +180,8 @@ class FilteredOdometry:
             heading=self.heading,
             sample=sample,
         )
-        self._correct(turn, imu_time, legs / period)
-        self._integrate(turn, imu_time, unknown)
+        self._correct(yaw, imu_time, legs / period)
+        self._integrate(yaw, imu_time, unknown)
         self._ground.update(self._base.fresh, period)
         motion.remember()
         self._find_velocity()
@@ -219,7 +192,7 @@ class FilteredOdometry:
         """Write the covariances of the pose, in world axes, and of the twist, in the heading frame.
 
         Args:
-            pose: Of position and turns, shape (6, 6) [m, rad].
+            pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
         self.kalman.write_covariances(self.heading, self._motion.arm, self._period, pose, twist)
@@ -244,18 +217,19 @@ class FilteredOdometry:
             base.rotation, base.heading, base.angular, base.turned, time, base.averages,
             imu.rate_before, imu.rate, kalman.axes,
         )  # fmt: skip
-        shaken += (SHAKES * leg_speed) ** 2 * 2.0 * SHAKING / self._period
+        shaking_time = 0.3  # [s] for which it lasts
+        shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._period
         sample = NO_SAMPLE
         x, y, _ = base.turned.tolist()
         before_x, before_y = kalman.tilt.tolist()
         if imu.rest > REST_TIME:  # a robot at rest does not turn
-            kalman.lean(0.0, x, y)
+            kalman.follow_tilt(0.0, x, y)
             kalman.rest(imu.rate @ kalman.axes, time)
             base.turned[:2] = 0.0
         else:
             rate_x, rate_y, rate_z = (imu.rate - kalman.biases).tolist()
             sample = ImuSample(rate_z * time, time)
-            kalman.lean(sample.turn, x - rate_x * time, y - rate_y * time)
+            kalman.follow_tilt(sample.yaw, x - rate_x * time, y - rate_y * time)
             tilt_x, tilt_y = kalman.tilt.tolist()
             base.turned[:2] = x - (tilt_x - before_x), y - (tilt_y - before_y)
         base.angular[0] = base.turned[0] / time
@@ -268,32 +242,34 @@ class FilteredOdometry:
     def _weigh(self) -> None:
         self._motion.weigh(self._ground.lifted, self._tags.touch if self._tags.forces else None)
 
-    def _measure_turn(self) -> tuple[float, float, float]:
-        """Return the turn about the vertical [rad], the time that the gyroscope measures [s], and a variance [rad^2].
+    def _measure_yaw(self) -> tuple[float, float, float]:
+        """Return the yaw [rad], the time that the gyroscope measures [s], and a variance [rad^2].
 
-        Without a sample of the gyroscope the turn is that of the wheels, and that is its variance.
+        Without a sample of the gyroscope the yaw is that of the wheels, and that is its variance.
         """
         imu = self._imu
         motion = self._motion
         imu.since += self._period
         if self._base.fresh:
             return float(imu.rate[2]) * imu.since - imu.pending, imu.since, 0.0
-        turn, spread = turn_of(motion.displacements, motion.arms, motion.trusted)
-        deviation = SKID * float(np.abs(motion.displacements).max()) + 1e-6
+        yaw, spread = yaw_of(motion.displacements, motion.arms, motion.trusted)
+        # 2 % of the largest displacement
+        deviation = 0.02 * float(np.abs(motion.displacements).max()) + 1e-6
         wheels = float(motion.trusted.sum() / motion.trusted.max())
-        return turn, 0.0, deviation * deviation / max(wheels * spread, 1e-9)
+        return yaw, 0.0, deviation * deviation / max(wheels * spread, 1e-9)
 
     def _note_rest(self, moved: float, sway: float, imu_time: float) -> None:
         """Note for how long no joint has moved and the gyroscope has measured no more than its bias and its noise."""
         imu = self._imu
         limit = self._tags.rest * self._period
-        still = moved <= limit and sway <= SWAYING * limit
+        still = moved <= limit and sway <= 0.05 * limit  # a robot that has stopped still sways
         if still and imu_time:
             deviation = math.sqrt(self.kalman.bias_variance + self._tags.gyro_noise**2 / imu_time)
-            still = abs(float(imu.rate[2]) - self.kalman.bias) <= GYROSCOPE_STD * deviation + UNKNOWN_BIAS_STD
+            # five standard deviations of its noise, and 2 mrad/s by which a robot at rest may sway
+            still = abs(float(imu.rate[2]) - self.kalman.bias) <= 5.0 * deviation + 2e-3
         imu.rest = imu.rest + self._period if still else 0.0
 
-    def _correct(self, turn: float, imu_time: float, leg_speed: float) -> None:
+    def _correct(self, yaw: float, imu_time: float, leg_speed: float) -> None:
         """Correct the filter by the wheels that roll."""
         motion = self._motion
         kalman = self.kalman
@@ -302,24 +278,26 @@ class FilteredOdometry:
         period = self._period
         x, y, _ = kalman.velocity.tolist()
         speed = math.hypot(x, y)
-        least = ENCODER_STD if self._imu.rest > REST_TIME else ENCODERS
+        encoder_deviation = 1e-5 if self._imu.rest > REST_TIME else 2e-3  # [m/s] of a wheel's velocity
         filter_kernel.measure_speeds(
             motion.displacements,
             motion.tilting,
             period,
-            SLIP_SHARE,
-            least,
+            0.008,  # deviation of a wheel's velocity by slip, as a ratio to it
+            encoder_deviation,
             motion.spreads,
             motion.variances,
             motion.speeds,
         )
-        rate = turn / period
-        share = imu_time / period
-        expected = rate - share * kalman.bias
+        rate = yaw / period
+        covered = imu_time / period
+        expected = rate - covered * kalman.bias
         tolerance = tags.slip + tags.slip_share * speed
         consensus.reject(motion.speeds, motion.arms, expected, motion.weights, tolerance=tolerance, time=period)
-        shakes = SHAKES * leg_speed
-        variance = self._tags.gyro_noise**2 / COMPARED + kalman.bias_variance + shakes * shakes if imu_time else DEAF
+        shakes = SHAKE_RATIO * leg_speed
+        variance = 1.0  # [rad^2/s^2] without a gyroscope
+        if imu_time:
+            variance = self._tags.gyro_noise**2 / COMPARISON_TIME + kalman.bias_variance + shakes * shakes
         contradiction = consensus.compare(
             motion.speeds, motion.arms, expected, variance,
             tolerance=self._tolerance(speed), time=period, variances=motion.variances,
@@ -329,23 +307,26 @@ class FilteredOdometry:
             motion.speeds,
             motion.arms,
             rate,
-            share,
+            covered,
             variances=motion.variances,
             inliers=consensus.inliers,
         )
+        spread_time = 0.1  # [s] over which each wheel's innovations are averaged
         filter_kernel.learn_spreads(
-            motion.speeds, motion.arms, kalman.velocity, rate - share * (kalman.bias + kalman.noise),
-            consensus.inliers, SPREADING / (SPREADING + period), motion.weights, motion.spreads, motion.trusted,
+            motion.speeds, motion.arms, kalman.velocity, rate - covered * (kalman.bias + kalman.noise),
+            consensus.inliers, spread_time / (spread_time + period), motion.weights, motion.spreads, motion.trusted,
         )  # fmt: skip
 
     def _tolerance(self, speed: float) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
-        # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead
-        sloped = 0.0 if self._ground.map.level else 1.5 * float(self._motion.spreads.max()) / max(speed, CRAWLING)
-        return QUIET * QUIET + (self._tags.radius_share * speed) ** 2 + sloped * sloped
+        # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead; below 0.15 m/s
+        # encoders are too coarse to measure that
+        sloped = 0.0 if self._ground.map.level else 1.5 * float(self._motion.spreads.max()) / max(speed, 0.15)
+        noise = 5e-4  # [m/s] by encoders
+        return noise * noise + (self._tags.radius_share * speed) ** 2 + sloped * sloped
 
     def _integrate(self, measured: float, imu_time: float, unknown: float) -> None:
-        """Integrate the pose, in the middle of the turn, and come to the height of the map."""
+        """Integrate the pose, in the middle of the yaw, and come to the height of the map."""
         ground = self._ground
         imu = self._imu
         motion = self._motion
@@ -353,19 +334,19 @@ class FilteredOdometry:
         base = self._base
         wheels = motion.wheels
         period = self._period
-        turn = measured - (kalman.bias + kalman.noise) * imu_time
-        kalman.integrate(self.heading + 0.5 * turn, period, imu_time, unknown)
+        yaw = measured - (kalman.bias + kalman.noise) * imu_time
+        kalman.integrate(self.heading + 0.5 * yaw, period, imu_time, unknown)
         ground.settle(self._tags.settle, period)
         self.position += kalman.correction[:3]
-        turn += float(kalman.correction[3])
+        yaw += float(kalman.correction[3])
         kalman.correction[:] = 0.0
-        imu.pending += turn
+        imu.pending += yaw
         if base.fresh:
             imu.offset += imu.pending - float(base.turned[2])
             imu.pending = imu.since = 0.0
         displacement = kalman.velocity * period - motion.tilting
-        self.position += about_vertical(displacement, self.heading + 0.5 * turn)
-        self.heading = base.heading + imu.offset if base.fresh else self.heading + turn
+        self.position += about_vertical(displacement, self.heading + 0.5 * yaw)
+        self.heading = base.heading + imu.offset if base.fresh else self.heading + yaw
         missing = ground.map.missing_height(
             wheels.arms,
             wheels.normal,
@@ -373,17 +354,19 @@ class FilteredOdometry:
             heading=self.heading,
             weights=motion.trusted,
             velocity=kalman.velocity,
-            turn=turn / period,
+            yaw_rate=yaw / period,
         )
-        most = RAISING * period
+        settling_time = 0.005  # [s] in which the base comes to the height of the map
+        largest = 0.2 * period  # [m] at 0.2 m/s
         raised = (
-            0.0 if math.isnan(missing) else min(max(missing * period / (HEIGHT_SETTLING_TIME + period), -most), most)
+            0.0 if math.isnan(missing) else min(max(missing * period / (settling_time + period), -largest), largest)
         )
         self.position[2] += raised
         ground.map.note(raised, motion.trusted)
+        forgetting_time = 2.0  # [s] in which a wheel's rise is forgotten while it touches
         filter_kernel.find_lifted(
-            motion.displacements, motion.arms, turn, base.turned, motion.weights, motion.trusted, wheels.normal,
-            self._tags.clearance, 1.0 - period / ODOMETRY_FORGETTING_TIME, ground.slope, ground.rise, ground.lifted,
+            motion.displacements, motion.arms, yaw, base.turned, motion.weights, motion.trusted, wheels.normal,
+            self._tags.clearance, 1.0 - period / forgetting_time, ground.slope, ground.rise, ground.lifted,
         )  # fmt: skip
 
     def _find_velocity(self) -> None:

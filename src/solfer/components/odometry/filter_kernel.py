@@ -4,9 +4,6 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
-GYROSCOPE_SILENCE_LIMIT = 1e-6
-"""Angular velocity below which a gyroscope is silent [rad/s]: no real one is as quiet."""
-
 
 def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
     """Write arms and Jacobians in axes that are turned about the vertical, without the six columns of a base."""
@@ -22,7 +19,7 @@ def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
 
 
 def _subtract_tilt(arms, jacobian, x, y):
-    """Turn arms and Jacobians back by a small turn about the axes x and y [rad]."""
+    """Turn arms and Jacobians back by a small rotation about the axes x and y [rad]."""
     for i in range(len(arms)):
         a, b, c = arms[i]
         arms[i, 0], arms[i, 1], arms[i, 2] = a - y * c, b + x * c, c + y * a - x * b
@@ -72,7 +69,8 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
         largest = max(largest, abs(angular[axis]))
     square = 0.0
     for axis in range(3):
-        measured = angular[axis] if largest > GYROSCOPE_SILENCE_LIMIT else turned[axis] / time
+        # below 1e-6 rad/s the gyroscope is silent: no real one is as quiet
+        measured = angular[axis] if largest > 1e-6 else turned[axis] / time
         rate[axis] = measured if averages else 0.5 * (measured + before[axis])
         square += (measured - before[axis]) ** 2
         before[axis] = measured
@@ -105,18 +103,18 @@ def _measure_displacements(
     tilting[0], tilting[1], tilting[2] = py * arm[2], -px * arm[2], px * arm[1] - py * arm[0]
 
 
-def _measure_speeds(displacements, tilting, time, share, least, spreads, variances, speeds):
+def _measure_speeds(displacements, tilting, time, slip_ratio, encoder_deviation, spreads, variances, speeds):
     """Write the velocities of the ground point that wheels measure within a time [s], and their variances [m^2/s^2]."""
     for i in range(len(displacements)):
         square = 0.0
         for axis in range(3):
             speeds[i, axis] = (displacements[i, axis] + tilting[axis]) / time
             square += speeds[i, axis] ** 2
-        deviation = share * math.sqrt(square) + least
+        deviation = slip_ratio * math.sqrt(square) + encoder_deviation
         variances[i] = max(deviation * deviation, spreads[i])
 
 
-def _learn_spreads(speeds, arms, velocity, turn, inliers, keep, weights, spreads, trusted):
+def _learn_spreads(speeds, arms, velocity, yaw_rate, inliers, keep, weights, spreads, trusted):
     """Smooth the squares of what is left of each wheel's velocity, and write the weights of the wheels that roll."""
     count = rolling = 0
     for i in range(len(spreads)):
@@ -126,8 +124,8 @@ def _learn_spreads(speeds, arms, velocity, turn, inliers, keep, weights, spreads
     # the wheel itself is in the mean
     factor = (1.0 - keep) * max(2, count) / (3.0 * (max(2, count) - 1.0))
     for i in range(len(spreads)):
-        x = speeds[i, 0] - velocity[0] + turn * arms[i, 1]
-        y = speeds[i, 1] - velocity[1] - turn * arms[i, 0]
+        x = speeds[i, 0] - velocity[0] + yaw_rate * arms[i, 1]
+        y = speeds[i, 1] - velocity[1] - yaw_rate * arms[i, 0]
         z = speeds[i, 2] - velocity[2]
         spreads[i] = keep * spreads[i] + factor * (x * x + y * y + z * z)
         if rolling < 2:
@@ -182,22 +180,22 @@ def height_above_others(weights, arms, normal, i, slope):
 
 
 @part
-def along_normal(displacements, arms, i, turn, x, y, z):
-    """Return a wheel's part of the base's displacement along a normal x, y, z, with a turn about the vertical [m]."""
+def along_normal(displacements, arms, i, yaw, x, y, z):
+    """Return a wheel's part of the base's displacement along a normal x, y, z, with a yaw [m]."""
     return (
-        x * (displacements[i, 0] + turn * arms[i, 1])
-        + y * (displacements[i, 1] - turn * arms[i, 0])
+        x * (displacements[i, 0] + yaw * arms[i, 1])
+        + y * (displacements[i, 1] - yaw * arms[i, 0])
         + z * displacements[i, 2]
     )
 
 
 @part
 def along_normal_by_tilting(arms, i, px, py, x, y, z):
-    """Return how far a wheel goes along a normal x, y, z by the turns px and py of the base [m]."""
+    """Return how far a wheel goes along a normal x, y, z by the rotations px and py of the base [m]."""
     return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
 
 
-def _find_lifted(displacements, arms, turn, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
+def _find_lifted(displacements, arms, yaw, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
     """Note how far legs have lifted wheels above the others [m], and which are lifted.
 
     A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
@@ -212,12 +210,12 @@ def _find_lifted(displacements, arms, turn, turned, weights, trusted, normal, cl
     for i in range(len(rise)):
         total += trusted[i]
         mean_tilting += trusted[i] * along_normal_by_tilting(arms, i, px, py, x, y, z)
-        mean_displacement += trusted[i] * along_normal(displacements, arms, i, turn, x, y, z)
+        mean_displacement += trusted[i] * along_normal(displacements, arms, i, yaw, x, y, z)
     mean_tilting /= total
     mean_displacement /= total
     for i in range(len(rise)):
         # a wheel that goes up measures that the base goes down
-        up = mean_displacement - along_normal(displacements, arms, i, turn, x, y, z)
+        up = mean_displacement - along_normal(displacements, arms, i, yaw, x, y, z)
         by_leg = up - (along_normal_by_tilting(arms, i, px, py, x, y, z) - mean_tilting)
         if up * by_leg > 0.0:
             rise[i] += up if abs(up) < abs(by_leg) else by_leg
@@ -248,7 +246,7 @@ def _velocity_of_base(jacobian, rates, angular, arms, weights, velocity):
 
 
 def _turned(rotation, known, heading, out):
-    """Write the turn from a rotation that was known to another one as a vector [rad], in axes of a heading [rad].
+    """Write the rotation from one that was known to another one as a vector [rad], in axes of a heading [rad].
 
     Returns whether it is less than a right angle; where it is not nothing is written.
     """

@@ -12,8 +12,6 @@ from solfer.numerics.filters import LowPass
 from solfer.numerics.rotations import cross
 from solfer.robot import Robot
 
-GROUND_NORMAL = np.array((0.0, 0.0, 1.0))
-
 
 class TiltedWheels:
     """The wheels with the tilt of the base, without its heading.
@@ -26,6 +24,9 @@ class TiltedWheels:
         centers: Their centres from the base, shape (k, 3) [m]; live.
     """
 
+    _normal = np.array((0.0, 0.0, 1.0))
+    """Normal of the ground."""
+
     def __init__(self, robot: Robot, wheels: Wheels):
         self._robot = robot
         self._links = wheels.links
@@ -34,15 +35,15 @@ class TiltedWheels:
         self._before = np.zeros(len(wheels))
         self.centers = np.zeros((len(wheels), 3))
 
-    def update(self, turn: np.ndarray) -> None:
+    def update(self, rotation: np.ndarray) -> None:
         """Find centres, axes and velocities by the Robot's kinematics, turned by a rotation, shape (3, 3)."""
         kinematics = self._robot.kinematics
         origin = kinematics.position(kinematics.base_link or "")
-        self.centers[:] = [turn @ (kinematics.position(link) - origin) for link in self._links]
-        self._axes = [turn @ kinematics.rotation(link)[:, 2] for link in self._links]
+        self.centers[:] = [rotation @ (kinematics.position(link) - origin) for link in self._links]
+        self._axes = [rotation @ kinematics.rotation(link)[:, 2] for link in self._links]
         joints = self._robot.state.velocity[6:]
         moving = [kinematics.jacobian(link)[:, 6:] @ joints for link in self._links]
-        self._moving = [np.concatenate((turn @ each[:3], turn @ each[3:])) for each in moving]
+        self._moving = [np.concatenate((rotation @ each[:3], rotation @ each[3:])) for each in moving]
 
     def start(self) -> None:
         """Let displacements begin where the wheels are."""
@@ -53,7 +54,7 @@ class TiltedWheels:
         turned = self._robot.state.position[self._dofs]
         found = []
         for index, (axis, radius) in enumerate(zip(self._axes, self._radii, strict=True)):
-            along = cross(axis, GROUND_NORMAL)
+            along = cross(axis, self._normal)
             along *= radius * (turned[index] - self._before[index]) / np.linalg.norm(along)
             found.append(along)
         self._before[:] = turned
@@ -63,12 +64,12 @@ class TiltedWheels:
         """Return w and u of each wheel, which measures v + rate w = u of the base's velocity v, shape (3,) each.
 
         Args:
-            tilting: Angular velocity of the base without its turn, shape (3,) [rad/s].
-            axis: Axis of that turn, shape (3,).
+            tilting: Angular velocity of the base without its yaw rate, shape (3,) [rad/s].
+            axis: Axis of the yaw rate, shape (3,).
         """
         found = []
         for center, moving, radius in zip(self.centers, self._moving, self._radii, strict=True):
-            rolled = cross(tilting + moving[3:], radius * GROUND_NORMAL)
+            rolled = cross(tilting + moving[3:], radius * self._normal)
             found.append((cross(axis, center), rolled - cross(tilting, center) - moving[:3]))
         return found
 
@@ -76,12 +77,12 @@ class TiltedWheels:
 class GeometricOdometry:
     """The base's pose by the steps of the wheels, each of which measures a pose, and by the IMU's tilt.
 
-    With the centre c_i of a wheel from the base, its axis a_i and its turn dt_i, it has gone (a_i x n) / |a_i x n| r
-    dt_i along the ground with the normal n. From where each wheel was, each measures the base; what disagrees is
-    left out (`middle`). The turn about n and the base's velocity solve the velocities of each pair of wheels, for which
-    the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The turn is
-    integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the IMU's
-    turn keeps the axes of the IMU's world, as in the paper's own program: its poses are these.
+    With the centre c_i of a wheel from the base, its axis a_i and its rotation dt_i, it has gone (a_i x n) / |a_i x n|
+    r dt_i along the ground with the normal n. From where each wheel was, each measures the base; what disagrees is
+    left out (`middle`). The yaw rate about n and the base's velocity solve the velocities of each pair of wheels, for
+    which the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The yaw
+    rate is integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the
+    IMU's rotation keeps the axes of the IMU's world, as in the paper's own program: its poses are these.
 
     Args:
         robot: The Robot.
@@ -95,7 +96,7 @@ class GeometricOdometry:
         angular: Angular velocity of the base, the same axes, shape (3,) [rad/s]; live.
         candidates: Position of the base by each wheel, shape (k, 3) [m]; live.
         filter: Filter of the angular velocity that the IMU measures, three numbers, or None.
-        smoothing: Filter of the velocity and of the turn's rate, four numbers, or None.
+        smoothing: Filter of the velocity and of the yaw rate, four numbers, or None.
     """
 
     def __init__(self, robot: Robot, wheels: Wheels, base: MeasuredBase):
@@ -107,7 +108,7 @@ class GeometricOdometry:
         self._wheels = TiltedWheels(robot, wheels)
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.candidates, self._places = np.zeros((2, len(wheels), 3))
-        self.heading = self._turn = self._rate = 0.0
+        self.heading = self._yaw = self._rate = 0.0
         self._known = np.eye(3)
         self._measured = np.zeros(3)
         self._tilted = np.eye(3)
@@ -119,7 +120,7 @@ class GeometricOdometry:
         self._base.start()
         self.position[:] = 0.0
         self._rate = 0.0
-        self._turn = twist(self._base.rotation)
+        self._yaw = twist(self._base.rotation)
         self._known = self._base.rotation
         for low_pass in (self.filter, self.smoothing):
             if low_pass is not None:
@@ -127,17 +128,17 @@ class GeometricOdometry:
         self._tilt()
         self._wheels.update(self._tilted @ self._base.rotation.T)
         self._wheels.start()
-        self._places[:] = [about_vertical(center, self._turn) for center in self._wheels.centers]
+        self._places[:] = [about_vertical(center, self._yaw) for center in self._wheels.centers]
         self._solve(1.0)
         self._finish()
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Put the base somewhere else on the ground [m], with another heading [rad]."""
-        turn = heading - self.heading
-        shifted = [about_vertical(place - self.position, turn) for place in self._places]
+        yaw = heading - self.heading
+        shifted = [about_vertical(place - self.position, yaw) for place in self._places]
         self.position[:2] = x, y
         self._places[:] = shifted + self.position
-        self._turn += turn
+        self._yaw += yaw
         self.heading = heading
 
     def update(self, period: float, measured: bool) -> None:
@@ -145,25 +146,25 @@ class GeometricOdometry:
         self._base.read(measured)
         wheels = self._wheels
         wheels.update(self._tilted @ self._base.rotation.T)
-        self._turn += self._rate * period
+        self._yaw += self._rate * period
         for index, along in enumerate(wheels.displacements()):
-            center = about_vertical(wheels.centers[index], self._turn)
-            self._places[index] += about_vertical(along, self._turn)
+            center = about_vertical(wheels.centers[index], self._yaw)
+            self._places[index] += about_vertical(along, self._yaw)
             self.candidates[index] = self._places[index] - center
         self.position[:] = middle(self.candidates)
         for index, center in enumerate(wheels.centers):
-            self._places[index] = self.position + about_vertical(center, self._turn)
+            self._places[index] = self.position + about_vertical(center, self._yaw)
         self._solve(period)
         self._tilt()
         self._finish()
 
     def _tilt(self) -> None:
         """Take the tilt of the base from the IMU, without its heading."""
-        turn = -twist(self._base.rotation)
-        self._tilted = np.column_stack([about_vertical(column, turn) for column in self._base.rotation.T])
+        yaw = -twist(self._base.rotation)
+        self._tilted = np.column_stack([about_vertical(column, yaw) for column in self._base.rotation.T])
 
     def _solve(self, period: float) -> None:
-        """Solve for the base's velocity and its turn; the IMU's turn about the vertical is not used."""
+        """Solve for the base's velocity and its yaw rate; that of the IMU is not used."""
         if self._base.fresh:
             turned = rotation_vector(self._base.rotation @ self._known.T) / period
             self._known = self._base.rotation
@@ -183,7 +184,7 @@ class GeometricOdometry:
     def _finish(self) -> None:
         """Turn what is known without a heading to the base's x axis."""
         tilt = math.atan2(self._tilted[1, 0], self._tilted[0, 0])
-        self.heading = self._turn + tilt
+        self.heading = self._yaw + tilt
         self.velocity[:] = about_vertical(self.velocity, -tilt)
         self.angular[:] = about_vertical(self.angular, -tilt)
 

@@ -10,12 +10,6 @@ from solfer.components.odometry.kalman import WheelInertialFilter
 from solfer.components.odometry.wheel_motion import WheelMotion
 from solfer.points.contact.support_vertex import UP
 
-GROUND_HEIGHT_STD = 0.005
-"""Standard deviation of the height of level ground [m]."""
-
-TILT_INTERVAL = 10
-"""Measurements from one of the tilt by the ground to the next: grounds and IMUs err for longer."""
-
 
 class GroundPlane:
     """The ground by the contacts of the wheels.
@@ -43,15 +37,15 @@ class GroundPlane:
         self.lifted = np.zeros(count, dtype=bool)
         self._floor = math.nan
         self._floor_variance = 0.0
-        self._looks = 0
-        self._since_look = 0.0
+        self._samples = 0
+        self._elapsed = 0.0
 
     def start(self) -> None:
         """Begin on level ground, which all wheels touch."""
         self.rise[:] = 0.0
         self.lifted[:] = False
-        self._looks = 0
-        self._since_look = 0.0
+        self._samples = 0
+        self._elapsed = 0.0
 
     def start_map(self) -> None:
         """Begin with a floor where the wheels are on level ground, and measure the tilt by it."""
@@ -73,8 +67,9 @@ class GroundPlane:
         if self.map.floor != self._floor:
             self._floor = self.map.floor
             self._floor_variance = variance
-        if variance > self._floor_variance + GROUND_HEIGHT_STD * GROUND_HEIGHT_STD:
-            self._kalman.settle_height(GROUND_HEIGHT_STD * math.sqrt(time / period))
+        deviation = 0.005  # [m] of the height of level ground
+        if variance > self._floor_variance + deviation * deviation:
+            self._kalman.settle_height(deviation * math.sqrt(time / period))
 
     def update(self, fresh: bool, period: float) -> None:
         """Find the normal of the ground; level ground measures the error of the tilt.
@@ -93,12 +88,12 @@ class GroundPlane:
                 wheels.set_normal(*UP)
         if not fresh:
             return
-        self._looks += 1
-        self._since_look += period
-        if self._looks >= TILT_INTERVAL:
-            self._kalman.settle_tilt(self._since_look)
-            self._looks = 0
-            self._since_look = 0.0
+        self._samples += 1
+        self._elapsed += period
+        if self._samples >= 10:  # errors of grounds and IMUs last longer
+            self._kalman.settle_tilt(self._elapsed)
+            self._samples = 0
+            self._elapsed = 0.0
             if found:
                 self._measure_tilt()
 

@@ -4,29 +4,8 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
-SPACING = 0.02
-"""Distance of the samples of a track [m]."""
-
-TRACK_OFFSET, TRACK_NEARNESS = 0.05, 0.03
-"""How far a wheel may be beside a track that it follows, and from a sample where it begins to [m]."""
-
-SKIPPED_SAMPLES = 8
-"""Newest samples of its own track that a wheel does not follow: it has just left them."""
-
-LEADING = 0.01
-"""Weight of a wheel that leads onto a floor that may end there; that of one that follows a track is 1."""
-
-TRACK_SMALLNESS = 5e-4
-"""How far a wheel that leaves a floor may be off it while it still counts as on it [m]."""
-
-TRACK_STILLNESS = 1e-3
-"""Speed below which no wheel leads [m/s]."""
-
-TRACK_TOLERANCE = 0.008
+FLOOR_TOLERANCE = 0.008
 """How far a wheel may be above or below a floor and still be on it [m]: twice what floors are uneven (DIN 18202)."""
-
-TRACK_FLATNESS, TRACK_UNEVENNESS = 0.2, 0.003
-"""Way on ground that is even within the second number [m] after which it is a floor."""
 
 
 @part
@@ -39,9 +18,10 @@ def squared_distance(tracks, track, sample, x, y):
 @part
 def find_track(tracks, heads, wheel, x, y, followed):
     """Let a wheel follow the track of the sample that is nearest to it."""
-    nearest = TRACK_NEARNESS * TRACK_NEARNESS
+    largest_distance = 0.03  # [m] from a sample, where it begins to follow
+    nearest = largest_distance * largest_distance
     for track in range(len(tracks)):
-        newest = heads[track] - (SKIPPED_SAMPLES if track == wheel else 0)
+        newest = heads[track] - (8 if track == wheel else 0)  # it has just left the newest of its own
         for sample in range(max(0, heads[track] - tracks.shape[1]), newest - 1):
             square = squared_distance(tracks, track, sample, x, y)
             if square < nearest:
@@ -56,6 +36,7 @@ def height_on_track(tracks, heads, wheel, x, y, slope, followed):
     track = followed[wheel, 0]
     sample = followed[wheel, 1]
     size = tracks.shape[1]
+    largest_offset = 0.05  # [m] beside the track, and between its samples
     for _ in range(size):
         if track < 0 or sample < max(0, heads[track] - size) or sample + 1 >= heads[track]:
             break
@@ -64,35 +45,36 @@ def height_on_track(tracks, heads, wheel, x, y, slope, followed):
         along = other[0] - one[0]
         across = other[1] - one[1]
         square = along * along + across * across
-        if square > TRACK_OFFSET * TRACK_OFFSET or square == 0.0:
+        if square > largest_offset * largest_offset or square == 0.0:
             break
-        share = ((x - one[0]) * along + (y - one[1]) * across) / square
-        if share < 0.0 or share > 1.0:
-            sample += 1 if share > 1.0 else -1
+        ratio = ((x - one[0]) * along + (y - one[1]) * across) / square
+        if ratio < 0.0 or ratio > 1.0:
+            sample += 1 if ratio > 1.0 else -1
             continue
-        off_x = x - one[0] - share * along
-        off_y = y - one[1] - share * across
-        if off_x * off_x + off_y * off_y > TRACK_OFFSET * TRACK_OFFSET:
+        off_x = x - one[0] - ratio * along
+        off_y = y - one[1] - ratio * across
+        if off_x * off_x + off_y * off_y > largest_offset * largest_offset:
             break
         followed[wheel, 1] = sample
-        return one[2] + share * (other[2] - one[2]) + slope[0] * off_x + slope[1] * off_y
+        return one[2] + ratio * (other[2] - one[2]) + slope[0] * off_x + slope[1] * off_y
     followed[wheel, 0] = -1
     return math.nan
 
 
 @part
-def leads(arm, x, y, velocity, turn, before):
+def leads(arm, x, y, velocity, yaw_rate, before):
     """Return whether a wheel leads the others, 1, or follows them, -1; `before` while it stands."""
-    u = velocity[0] - turn * arm[1]
-    v = velocity[1] + turn * arm[0]
+    u = velocity[0] - yaw_rate * arm[1]
+    v = velocity[1] + yaw_rate * arm[0]
     length = math.sqrt((u * u + v * v) * (x * x + y * y))
-    if u * u + v * v > TRACK_STILLNESS * TRACK_STILLNESS and length > 0.0:
+    rest_speed = 1e-3  # [m/s] below which no wheel leads
+    if u * u + v * v > rest_speed * rest_speed and length > 0.0:
         return (u * x + v * y) / length
     return before
 
 
 def _missing_height(
-    arms, normal, radii, position, heading, weights, velocity, turn, cycle, floor, tracks, heads, followed, leading,
+    arms, normal, radii, position, heading, weights, velocity, yaw_rate, cycle, floor, tracks, heads, followed, leading,
     places,
 ):  # fmt: skip
     """Write the lowest points of the wheels as `places`; return how far the base is below the map [m], NaN: unknown."""
@@ -111,7 +93,7 @@ def _missing_height(
         (-cosine * normal[0] + sine * normal[1]) / normal[2],
         (-sine * normal[0] - cosine * normal[1]) / normal[2],
     )
-    missing = weight = 0.0
+    missing = total_weight = 0.0
     for i in range(count):
         x = arms[i, 0] + radii[i] * normal[0]
         y = arms[i, 1] + radii[i] * normal[1]
@@ -121,21 +103,22 @@ def _missing_height(
         if weights[i] <= 0.0:
             followed[i, 0] = -1
             continue
-        leading[i] = leads(arms[i], arms[i, 0] - x0, arms[i, 1] - y0, velocity, turn, leading[i])
+        leading[i] = leads(arms[i], arms[i, 0] - x0, arms[i, 1] - y0, velocity, yaw_rate, leading[i])
         if followed[i, 0] < 0 and cycle % count == i:
             find_track(tracks, heads, i, places[i, 0], places[i, 1], followed)
         height = math.nan
-        share = 1.0
+        weight = 1.0
         if followed[i, 0] >= 0:
             height = height_on_track(tracks, heads, i, places[i, 0], places[i, 1], slope, followed)
         if math.isnan(height):
-            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > TRACK_TOLERANCE:
+            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > FLOOR_TOLERANCE:
                 continue
             height = floor[0]
-            share = LEADING + (0.5 - 0.5 * leading[i]) ** 2
-        missing += share * (height - places[i, 2])
-        weight += share
-    return missing / weight if weight > 0.0 else math.nan
+            # one that leads may be where the floor ends: it weighs a hundredth of one that follows a track
+            weight = 0.01 + (0.5 - 0.5 * leading[i]) ** 2
+        missing += weight * (height - places[i, 2])
+        total_weight += weight
+    return missing / total_weight if total_weight > 0.0 else math.nan
 
 
 @part
@@ -145,7 +128,7 @@ def end_floor(tracks, heads, risen, wheel):
     later = math.inf
     for sample in range(heads[wheel] - 1, max(0, heads[wheel] - size) - 1, -1):
         off = risen[wheel, sample % size]
-        if abs(off) < TRACK_SMALLNESS or abs(off) > later:
+        if abs(off) < 5e-4 or abs(off) > later:  # within half a millimetre it still counts as on the floor
             break
         tracks[wheel, sample % size, 2] += off
         risen[wheel, sample % size] = 0.0
@@ -165,6 +148,7 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
     highest = -1e9
     mean = 0.0
     distance = 0.0
+    spacing = 0.02  # [m] from one sample of a track to the next
     for i in range(count):
         if weights[i] <= 0.0:
             continue
@@ -175,10 +159,10 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
         lowest = min(lowest, z)
         highest = max(highest, z)
         mean = mean + z
-        level = not math.isnan(floor[0]) and abs(z - floor[0]) <= TRACK_TOLERANCE
+        level = not math.isnan(floor[0]) and abs(z - floor[0]) <= FLOOR_TOLERANCE
         on_floor += level
-        square = SPACING * SPACING if heads[i] == 0 else squared_distance(tracks, i, heads[i] - 1, x, y)
-        if square < SPACING * SPACING:
+        square = spacing * spacing if heads[i] == 0 else squared_distance(tracks, i, heads[i] - 1, x, y)
+        if square < spacing * spacing:
             continue
         distance = max(distance, math.sqrt(square))
         off = z - floor[0] if level else 0.0
@@ -192,11 +176,11 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
         if on_floor == 0:
             floor[0] = math.nan
             floor[1] = 0.0
-    elif touching < 3 or highest - lowest > TRACK_UNEVENNESS:
+    elif touching < 3 or highest - lowest > 0.003:  # [m] of even ground
         floor[1] = 0.0
     else:
         floor[1] += distance
-        if floor[1] > TRACK_FLATNESS:
+        if floor[1] > 0.2:  # [m] of the way on even ground
             floor[0] = mean / touching
     return on_floor > 0 and on_floor == touching
 
@@ -204,12 +188,11 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
 _F = "float64"
-_I = "int64[:, ::1]"
 _T = "float64[:, :, ::1]"
 _N = "int64[::1]"
 
 missing_height = cached(
-    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, {_I}, {_V}, {_M})",
+    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, int64[:, ::1], {_V}, {_M})",
     _missing_height,
 )
 note = cached(f"boolean({_M}, {_F}, {_V}, {_V}, {_T}, {_M}, {_N})", _note)

@@ -6,9 +6,6 @@ import numpy as np
 
 from solfer.components.odometry import height_kernel as kernel
 
-TRACK_SAMPLES = 256
-"""Samples of a track: 5 m; older ones are dropped."""
-
 
 class HeightMap:
     """Heights of the ground where wheels have rolled, and of the floor on which they are.
@@ -16,7 +13,7 @@ class HeightMap:
     A wheel that rolls where another one has been knows its height, and so that of the base: the wheels that lead find
     an edge between two slopes, and those behind carry the base over it. On a floor all wheels are equally high. A wheel
     that leads may be where the floor ends: the more it does the less it counts, and not at all where it is further than
-    `TOLERANCE` from the floor.
+    8 mm from the floor.
 
     Args:
         radii: Radii of the wheels, shape (k,) [m].
@@ -29,8 +26,9 @@ class HeightMap:
         count = len(radii)
         self._radii = radii
         self._cycle = 0
-        self._tracks = np.zeros((count, TRACK_SAMPLES, 3))
-        self._risen = np.zeros((count, TRACK_SAMPLES))
+        samples = 256  # of a track: 5 m; older ones are dropped
+        self._tracks = np.zeros((count, samples, 3))
+        self._risen = np.zeros((count, samples))
         self._heads = np.zeros(count, dtype=np.int64)
         self._followed = np.zeros((count, 2), dtype=np.int64)
         self._leading = np.zeros(count)
@@ -66,7 +64,7 @@ class HeightMap:
         weights: np.ndarray,
         *,
         velocity: np.ndarray,
-        turn: float,
+        yaw_rate: float,
     ) -> float:
         """Return how far the base is below the height that the map has for it [m]; NaN where it has none.
 
@@ -77,12 +75,12 @@ class HeightMap:
             heading: Heading [rad].
             weights: Weights of the wheels, shape (k,); those of zero are left out.
             velocity: Velocity of the base in the heading frame, shape (3,) [m/s].
-            turn: Turn about the vertical [rad/s].
+            yaw_rate: Yaw rate [rad/s].
         """
         self._cycle += 1
         return float(
             kernel.missing_height(
-                arms, normal, self._radii, position, heading, weights, velocity, turn, self._cycle, self._floor,
+                arms, normal, self._radii, position, heading, weights, velocity, yaw_rate, self._cycle, self._floor,
                 self._tracks, self._heads, self._followed, self._leading, self._places,
             )
         )  # fmt: skip

@@ -9,17 +9,20 @@ from solfer.components.odometry.stamps import StampCheck
 from solfer.model.state import State
 from solfer.numerics.base_chart import BaseChart
 
-IMU_SAMPLES_LAG = 0.03
+LONGEST_LAG = 0.03
 """Longest time for which joints wait for what the IMU measures at their time [s]."""
-
-IMU_SAMPLES_KEPT_COUNT = 0.1
-"""Time for which samples of the IMU are kept, for others that come late [s]."""
 
 CAPACITY = 256
 """Samples that are kept of each sensor: half a second of an IMU at 500 Hz."""
 
-ANGLES, RATES, IMU_SAMPLES_TURN_LIMIT = slice(0, 3), slice(3, 6), slice(6, 9)
-"""Numbers of a sample of the IMU: angles of the base, their rates, and the integral of the rates."""
+ANGLES = slice(0, 3)
+"""Numbers of a sample of the IMU: angles of the base [rad]."""
+
+RATES = slice(3, 6)
+"""Rates of the angles [rad/s]."""
+
+INTEGRALS = slice(6, 9)
+"""Integrals of the rates [rad]."""
 
 
 class ImuSamples:
@@ -66,7 +69,7 @@ class ImuSamples:
                 continue
             history.copy(index, samples.rows[row, :6])
             for later in range(max(row, 1), samples.count):
-                samples.rows[later, IMU_SAMPLES_TURN_LIMIT] = self._turned_at(later - 1, later, 1.0)
+                samples.rows[later, INTEGRALS] = self._turned_at(later - 1, later, 1.0)
 
     def turned_since(self, time: float) -> np.ndarray | None:
         """Return how the base has turned since the measurement of a time [s], in its axes; None: not known."""
@@ -97,13 +100,13 @@ class ImuSamples:
         first = samples.rows[before]
         second = samples.rows[after]
         span = float(samples.stamps[after] - samples.stamps[before])
-        share = (time - float(samples.stamps[before])) / span if span else 0.0
+        fraction = (time - float(samples.stamps[before])) / span if span else 0.0
         self._angles_before[:] = self._angles
         for axis in range(3):
-            turn = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
-            self._angles[axis] = first[axis] + share * turn
+            change = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
+            self._angles[axis] = first[axis] + fraction * change
         state.position[3:6] = self._angles
-        turned = self._turned_at(before, after, share)
+        turned = self._turned_at(before, after, fraction)
         passed = time - self.measured_at
         if not passed > 0.0:
             state.velocity[3:6] = first[RATES]
@@ -114,18 +117,17 @@ class ImuSamples:
             state.velocity[3:6] = (turned_by - 2.0 * math.pi * np.round(turned_by / (2.0 * math.pi))) / passed
         self._turned[:] = turned
         self.measured_at = time
-        samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - IMU_SAMPLES_KEPT_COUNT)) - 1))
+        kept_time = 0.1  # [s] for measurements of the joints that come late
+        samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - kept_time)) - 1))
         return True
 
-    def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
-        """Return the integral of the rates at a share of the time from one sample to the next, shape (3,) [rad]."""
+    def _turned_at(self, before: int, after: int, fraction: float) -> np.ndarray:
+        """Return the integral of the rates at a fraction of the time from one sample to the next, shape (3,) [rad]."""
         samples = self._samples
         first = samples.rows[before]
         second = samples.rows[after]
         span = samples.stamps[after] - samples.stamps[before]
-        if span > IMU_SAMPLES_LAG:  # too long for rates: angles do not drift in it
-            turn = second[ANGLES] - first[ANGLES]
-            return first[IMU_SAMPLES_TURN_LIMIT] + share * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
-        return first[IMU_SAMPLES_TURN_LIMIT] + share * span * (
-            first[RATES] + 0.5 * share * (second[RATES] - first[RATES])
-        )
+        if span > LONGEST_LAG:  # too long for rates: angles do not drift in it
+            change = second[ANGLES] - first[ANGLES]
+            return first[INTEGRALS] + fraction * (change - 2.0 * math.pi * np.round(change / (2.0 * math.pi)))
+        return first[INTEGRALS] + fraction * span * (first[RATES] + 0.5 * fraction * (second[RATES] - first[RATES]))

@@ -6,45 +6,33 @@ from typing import NamedTuple
 import numpy as np
 
 from solfer.components.odometry import kalman_kernel as kernel
-from solfer.components.odometry.kalman_kernel import (
-    GYRO_BIAS,
-    SCRUB,
-    SLOPE,
-    STATE_HEADING,
-    STATE_RADIUS,
-    STATE_TILT,
-    STATE_VELOCITY,
-)
-
-SLIDE = 3e-3
-"""Standard deviation of the way after a metre, by slip that lasts, before it is estimated [m/sqrt(m)]."""
+from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, RADIUS, SCRUB, SLOPE, TILT, VELOCITY
 
 TILT_TIME_CONSTANT = 30.0
 """Time constant of the error of the tilt that an IMU measures [s]."""
 
-KALMAN_REST_ERROR = 1e-3
-"""Standard deviation of the velocity of a robot at rest at the start [m/s]."""
+FLOOR_DEVIATION = math.radians(0.2)
+"""Standard deviation of a level floor from the plane under four wheels [rad] (DIN 18202: 4 mm within 1 m)."""
 
-KALMAN_UNEVENNESS, PATCH = math.radians(0.2), 0.1
-"""Standard deviation of a level floor from the plane under four wheels [rad] (DIN 18202: 4 mm within 1 m), and the way
-after which it is another one [m]."""
+FLOOR_LENGTH = 0.1
+"""Distance after which the floor is another one [m]."""
 
-SCRUB_SHARE, SCRUB_TIME = 0.0005, 1.0
-"""Standard deviation of the turn by which wheels scrub for each metre that they roll [rad/m], and its time [s]."""
+SCRUB_TIME = 1.0
+"""Time constant of the yaw rate by which wheels scrub [s]."""
 
-PLANE = 3e-4
-"""Standard deviation of the turn of the plane through contacts, by encoders [rad]."""
+PLANE_DEVIATION = 3e-4
+"""Standard deviation of the tilt of the plane through contacts, by encoders [rad]."""
 
 
 class ImuSample(NamedTuple):
     """What a sample of the IMU measures of the tilt.
 
     Attributes:
-        turn: Turn of H since the sample before that `lean` has followed [rad].
+        yaw: Yaw of H since the sample before, which `follow_tilt` has followed [rad].
         time: Time that the sample covers [s]; 0: there is none.
     """
 
-    turn: float = 0.0
+    yaw: float = 0.0
     time: float = 0.0
 
 
@@ -92,7 +80,7 @@ class WheelInertialFilter:
     | scrubbing c [rad/s] | 11 | | Gauss-Markov, in proportion to what wheels roll |
     | error of the IMU's tilt t [rad] | 12-13 | H | Gauss-Markov about 0 |
     | slope of the floor g [rad] | 14-15 | H | Gauss-Markov of the way |
-    | share e by which each radius is too large | 16... | | constant |
+    | ratio e by which each radius is too large | 16... | | constant |
 
     With the rate u of the gyroscope about the vertical, which covers the time s of an interval T, a wheel at r measures
 
@@ -121,7 +109,7 @@ class WheelInertialFilter:
         axes: Rotation from B to H, shape (3, 3); live, to be written before each prediction.
         rolling: Probability that each wheel rolls and does not slip, shape (k,); live.
         innovations: Innovation of each wheel's velocity, shape (k, 3) [m/s]; live.
-        slide: Variance of the way after a metre by wheels that slide [m^2/m].
+        slide: Variance of the position after a metre by wheels that slide [m^2/m].
     """
 
     def __init__(
@@ -135,21 +123,20 @@ class WheelInertialFilter:
         radius: float,
         tilt: float = 0.0,
     ):
-        size = STATE_RADIUS + count
+        size = RADIUS + count
         self._variances = FilterVariances(
             acceleration**2, noise**2, bias**2, walk=walk**2, radius=radius**2, tilt=tilt**2
         )
         self.covariance = np.zeros((size, size))
         self.state = np.zeros(size)
-        self.correction = self.state[: STATE_HEADING + 1]
-        self.velocity = self.state[STATE_VELOCITY:GYRO_BIAS]
-        self.tilt = self.state[STATE_TILT:SLOPE]
+        self.correction = self.state[: HEADING + 1]
+        self.velocity = self.state[VELOCITY:GYRO_BIAS]
+        self.tilt = self.state[TILT:SLOPE]
         self.axes = np.eye(3)
         self._vertical = self.axes[2]
         self._bias_of_base = self.state[GYRO_BIAS : GYRO_BIAS + 3]
         self.rolling = np.ones(count)
         self.innovations = np.zeros((count, 3))
-        self.slide = SLIDE**2
         self._rows = np.zeros((count, 3, size))
         self._buffers = FilterBuffers(*np.zeros((3, size, size)))
         self.start()
@@ -158,24 +145,24 @@ class WheelInertialFilter:
         """Begin at rest, at a pose that is known but for its tilt."""
         self.state[:] = 0.0
         self.rolling[:] = 1.0
-        self.slide = SLIDE**2
+        self.slide = 3e-3**2  # before slip that lasts is estimated
         given = self._variances
         variances = np.zeros(len(self.state))
-        variances[STATE_VELOCITY:GYRO_BIAS] = KALMAN_REST_ERROR**2
+        variances[VELOCITY:GYRO_BIAS] = 1e-3**2  # [m^2/s^2] of a robot at rest
         variances[GYRO_BIAS : GYRO_BIAS + 3] = given.bias
-        variances[STATE_RADIUS:] = given.radius
+        variances[RADIUS:] = given.radius
         if given.tilt:
-            variances[STATE_TILT:SLOPE] = given.tilt
-            variances[SLOPE:STATE_RADIUS] = KALMAN_UNEVENNESS**2
+            variances[TILT:SLOPE] = given.tilt
+            variances[SLOPE:RADIUS] = FLOOR_DEVIATION**2
         self.covariance[:] = np.diag(variances)
 
     def place(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set position and heading to known values with variances [m^2, rad^2]."""
-        self.covariance[: STATE_HEADING + 1] = 0.0
-        self.covariance[:, : STATE_HEADING + 1] = 0.0
+        self.covariance[: HEADING + 1] = 0.0
+        self.covariance[:, : HEADING + 1] = 0.0
         self.covariance[0, 0] = x
         self.covariance[1, 1] = y
-        self.covariance[STATE_HEADING, STATE_HEADING] = heading
+        self.covariance[HEADING, HEADING] = heading
 
     @property
     def biases(self) -> np.ndarray:
@@ -199,7 +186,7 @@ class WheelInertialFilter:
 
     def predict(
         self,
-        turn: float,
+        yaw: float,
         period: float,
         rolled: float = 0.0,
         shaken: float = 0.0,
@@ -211,44 +198,45 @@ class WheelInertialFilter:
         """Propagate velocity and errors of the sensors over an interval.
 
         Args:
-            turn: Turn of H [rad].
+            yaw: Yaw of H [rad].
             period: Length of the interval [s].
-            rolled: Way that wheels roll [m].
+            rolled: Distance that wheels roll [m].
             shaken: Variance of what the gyroscope misses between its samples [rad^2/s^2].
             arm: From the base's origin to the mean of the contacts in H, shape (3,) [m]; None: straight above it.
             heading: Heading [rad].
             sample: Sample of the IMU in the interval.
         """
-        tilt_turn, imu_time = sample
+        tilt_yaw, imu_time = sample
         given = self._variances
         scrub = -math.expm1(-period / SCRUB_TIME)
-        slope = -math.expm1(-rolled / PATCH)
+        slope = -math.expm1(-rolled / FLOOR_LENGTH)
         estimates_tilt = given.tilt > 0.0 and imu_time > 0.0
+        # scrubbing yaws the base by 0.5 mrad for each metre that wheels roll
         variances = (
             given.acceleration * period * period,
-            (SCRUB_SHARE * rolled / period) ** 2 * scrub * (2.0 - scrub),
+            (5e-4 * rolled / period) ** 2 * scrub * (2.0 - scrub),
             given.noise / period + shaken,
             given.noise * imu_time + shaken * imu_time * imu_time,
-            KALMAN_UNEVENNESS**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
+            FLOOR_DEVIATION**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
         )
         kernel.predict(
-            self.covariance, self.state, self.axes, _ORIGIN if arm is None else arm, heading, (turn, tilt_turn),
+            self.covariance, self.state, self.axes, _ORIGIN if arm is None else arm, heading, (yaw, tilt_yaw),
             imu_time if estimates_tilt else 0.0, (1.0 - scrub, 1.0 - slope if estimates_tilt else 1.0), variances,
             *self._buffers,
         )  # fmt: skip
 
-    def lean(self, turn: float, x: float, y: float) -> None:
-        """Let the tilt's error follow what the IMU's orientation turns more than its gyroscope.
+    def follow_tilt(self, yaw: float, x: float, y: float) -> None:
+        """Let the tilt's error follow what the IMU's orientation rotates more than its gyroscope.
 
         Args:
-            turn: Turn of H [rad].
+            yaw: Yaw of H [rad].
             x: That difference about the axis x of H [rad].
             y: The same about y [rad].
         """
         if not self._variances.tilt:
             return
-        cosine = math.cos(turn)
-        sine = math.sin(turn)
+        cosine = math.cos(yaw)
+        sine = math.sin(yaw)
         a, b = self.tilt.tolist()
         self.tilt[0] = cosine * a + sine * b + x
         self.tilt[1] = cosine * b - sine * a + y
@@ -257,7 +245,7 @@ class WheelInertialFilter:
         """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
         if self._variances.tilt:
             variance = 2.0 * TILT_TIME_CONSTANT / time * self._variances.tilt
-            for which in (STATE_TILT, STATE_TILT + 1):
+            for which in (TILT, TILT + 1):
                 kernel.measure(self.covariance, self.state, which, 0.0, variance, self._buffers.half)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
@@ -274,7 +262,7 @@ class WheelInertialFilter:
             Whether it passes for level ground.
         """
         return not self._variances.tilt or bool(
-            kernel.level(self.covariance, self.state, x, y, PLANE**2, self._buffers.half)
+            kernel.level(self.covariance, self.state, x, y, PLANE_DEVIATION**2, self._buffers.half)
         )
 
     def allow_scrubbing(self, variance: float) -> None:
@@ -286,7 +274,7 @@ class WheelInertialFilter:
         speeds: np.ndarray,
         arms: np.ndarray,
         rate: float,
-        share: float,
+        covered: float,
         *,
         variances: np.ndarray,
         inliers: np.ndarray,
@@ -297,12 +285,12 @@ class WheelInertialFilter:
             speeds: w, in H, shape (k, 3) [m/s].
             arms: r, from the base's origin, in H, shape (k, 3) [m].
             rate: u s / T [rad/s].
-            share: s / T.
+            covered: s / T.
             variances: Variances of w, shape (k,) [m^2/s^2].
             inliers: Which wheels count, shape (k,); those that more likely slip are taken out.
         """
         kernel.correct(
-            self.covariance, self.state, self._rows, speeds, arms, rate, share, self._vertical, variances, inliers,
+            self.covariance, self.state, self._rows, speeds, arms, rate, covered, self._vertical, variances, inliers,
             self.rolling, self.innovations, self._buffers.half,
         )  # fmt: skip
 
@@ -313,7 +301,7 @@ class WheelInertialFilter:
             heading: Heading in its middle [rad].
             period: Its length T [s].
             imu_time: Time s of it that the gyroscope covers [s].
-            unknown: Variance of the turn besides [rad^2].
+            unknown: Variance of the yaw besides [rad^2].
         """
         x, y, _ = self.velocity.tolist()
         variances = (self.slide * math.hypot(x, y) * period, unknown, self._variances.walk * period)
@@ -335,7 +323,7 @@ class WheelInertialFilter:
             heading: Heading [rad].
             arm: From the base's origin to the ground point in H, shape (3,) [m].
             period: Interval for which the angular velocity is a mean [s].
-            pose: Of position and turns, shape (6, 6) [m, rad].
+            pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
         kernel.write_covariances(self.covariance, heading, arm, self._variances.noise / period, pose, twist)

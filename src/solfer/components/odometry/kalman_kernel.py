@@ -5,18 +5,41 @@ import math
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.dense import DENSE, cholesky, forward
 
-STATE_POSITION = 0
-STATE_HEADING = 3
-STATE_VELOCITY = 4
-GYRO_BIAS = 7
-GYRO_NOISE, SCRUB, STATE_TILT, SLOPE, STATE_RADIUS = 10, 11, 12, 14, 16
-"""First index of each part of the state."""
+POSITION = 0
+"""Index of the position in the state, the first of its numbers."""
 
-STATE_GATE = 4.0
+HEADING = 3
+"""Index of the heading."""
+
+VELOCITY = 4
+"""Index of the velocity, as of the position."""
+
+GYRO_BIAS = 7
+"""Index of the bias of the gyroscope."""
+
+GYRO_NOISE = 10
+"""Index of its noise in this interval."""
+
+SCRUB = 11
+"""Index of the yaw rate by scrubbing."""
+
+TILT = 12
+"""Index of the error of the IMU's tilt."""
+
+SLOPE = 14
+"""Index of the slope of the floor."""
+
+RADIUS = 16
+"""Index of the errors of the radii, the last part."""
+
+OUTLIER_GATE = 4.0
 """Standard deviations beyond which a scalar measurement is an outlier."""
 
-SLIP_PRIOR, SLIP_DENSITY = 0.02, 1.0 / 4.0**3
-"""Prior probability that a wheel slips, and density of its velocity then [s^3/m^3]."""
+SLIP_PRIOR = 0.02
+"""Prior probability that a wheel slips."""
+
+SLIP_DENSITY = 1.0 / 4.0**3
+"""Density of the velocity of a wheel that slips [s^3/m^3]."""
 
 
 @part
@@ -41,7 +64,7 @@ def set_rotation(transition, first, angle):
 
 @part
 def tilt_moves(arm, heading, axis, out):
-    """Write how far the ground point goes in the world for a small turn about an axis (0 or 1) of H: R (e x arm)."""
+    """Write how far the ground point goes in the world by a small rotation about an axis (0, 1) of H: R (e x arm)."""
     cosine = math.cos(heading)
     sine = math.sin(heading)
     x, y = (0.0, -arm[2]) if axis == 0 else (arm[2], 0.0)
@@ -51,14 +74,14 @@ def tilt_moves(arm, heading, axis, out):
 
 
 @part
-def set_process(transition, axes, arm, heading, turn, tilt_turn, imu_time, scrub_keep, slope_keep, moves):
+def set_process(transition, axes, arm, heading, yaw, tilt_yaw, imu_time, scrub_keep, slope_keep, moves):
     """Write the Jacobian of the process up to the wheels' measurement.
 
-    A bias that errs turns the tilt wrongly for the time of the IMU's samples, and moves the base by that turn.
+    A bias that errs turns the tilt wrongly for the time of the IMU's samples, and moves the base by that rotation.
     """
     set_identity(transition)
-    set_rotation(transition, STATE_VELOCITY, turn)
-    set_rotation(transition, SLOPE, turn)
+    set_rotation(transition, VELOCITY, yaw)
+    set_rotation(transition, SLOPE, yaw)
     for row in range(2):
         for column in range(2):
             transition[SLOPE + row, SLOPE + column] *= slope_keep
@@ -66,14 +89,14 @@ def set_process(transition, axes, arm, heading, turn, tilt_turn, imu_time, scrub
     transition[SCRUB, SCRUB] = scrub_keep
     if imu_time == 0.0:
         return
-    set_rotation(transition, STATE_TILT, tilt_turn)
+    set_rotation(transition, TILT, tilt_yaw)
     for axis in range(2):
         tilt_moves(arm, heading, axis, moves)
         for column in range(3):
             wrong = imu_time * axes[axis, column]
-            transition[STATE_TILT + axis, GYRO_BIAS + column] = wrong
+            transition[TILT + axis, GYRO_BIAS + column] = wrong
             for row in range(3):
-                transition[STATE_POSITION + row, GYRO_BIAS + column] += moves[row] * wrong
+                transition[POSITION + row, GYRO_BIAS + column] += moves[row] * wrong
 
 
 @part
@@ -84,54 +107,54 @@ def set_pose_process(transition, axis, heading, velocity, period, imu_time):
     x = velocity[0]
     y = velocity[1]
     set_identity(transition)
-    transition[STATE_POSITION, STATE_HEADING] = -(sine * x + cosine * y) * period
-    transition[STATE_POSITION + 1, STATE_HEADING] = (cosine * x - sine * y) * period
-    transition[STATE_POSITION, STATE_VELOCITY] = cosine * period
-    transition[STATE_POSITION, STATE_VELOCITY + 1] = -sine * period
-    transition[STATE_POSITION + 1, STATE_VELOCITY] = sine * period
-    transition[STATE_POSITION + 1, STATE_VELOCITY + 1] = cosine * period
-    transition[STATE_POSITION + 2, STATE_VELOCITY + 2] = period
-    transition[STATE_POSITION + 2, STATE_TILT] = -y * period
-    transition[STATE_POSITION + 2, STATE_TILT + 1] = x * period
+    transition[POSITION, HEADING] = -(sine * x + cosine * y) * period
+    transition[POSITION + 1, HEADING] = (cosine * x - sine * y) * period
+    transition[POSITION, VELOCITY] = cosine * period
+    transition[POSITION, VELOCITY + 1] = -sine * period
+    transition[POSITION + 1, VELOCITY] = sine * period
+    transition[POSITION + 1, VELOCITY + 1] = cosine * period
+    transition[POSITION + 2, VELOCITY + 2] = period
+    transition[POSITION + 2, TILT] = -y * period
+    transition[POSITION + 2, TILT + 1] = x * period
     for column in range(3):
-        transition[STATE_HEADING, GYRO_BIAS + column] = -imu_time * axis[column]
-    transition[STATE_HEADING, GYRO_NOISE] = -imu_time
-    if imu_time == 0.0:  # the turn is that of the wheels
-        transition[STATE_HEADING, SCRUB] = -period
+        transition[HEADING, GYRO_BIAS + column] = -imu_time * axis[column]
+    transition[HEADING, GYRO_NOISE] = -imu_time
+    if imu_time == 0.0:  # the yaw is that of the wheels
+        transition[HEADING, SCRUB] = -period
 
 
 @part
-def turn_rate(state, axis, rate, share):
-    """Return the turn about the vertical without bias and noise of the gyroscope [rad/s]."""
+def yaw_rate(state, axis, rate, covered):
+    """Return the yaw rate without bias and noise of the gyroscope [rad/s]."""
     bias = axis[0] * state[GYRO_BIAS] + axis[1] * state[GYRO_BIAS + 1] + axis[2] * state[GYRO_BIAS + 2]
-    return rate - share * (bias + state[GYRO_NOISE])
+    return rate - covered * (bias + state[GYRO_NOISE])
 
 
 @part
-def wheel_velocity(state, wheel, arm, axis, rate, share, out):
-    """Write the velocity that a wheel measures: (1 - e) (v + (turn + scrub) z x r)."""
-    turn = turn_rate(state, axis, rate, share)
-    if share > 0.0:
-        turn += state[SCRUB]
-    grown = 1.0 - state[STATE_RADIUS + wheel]
-    out[0] = grown * (state[STATE_VELOCITY] - turn * arm[1])
-    out[1] = grown * (state[STATE_VELOCITY + 1] + turn * arm[0])
-    out[2] = grown * state[STATE_VELOCITY + 2]
+def wheel_velocity(state, wheel, arm, axis, rate, covered, out):
+    """Write the velocity that a wheel measures: (1 - e) (v + (yaw rate + scrub) z x r)."""
+    rate_about_z = yaw_rate(state, axis, rate, covered)
+    if covered > 0.0:
+        rate_about_z += state[SCRUB]
+    grown = 1.0 - state[RADIUS + wheel]
+    out[0] = grown * (state[VELOCITY] - rate_about_z * arm[1])
+    out[1] = grown * (state[VELOCITY + 1] + rate_about_z * arm[0])
+    out[2] = grown * state[VELOCITY + 2]
 
 
 @part
-def set_wheel_rows(rows, wheel, arm, axis, share, expected):
+def set_wheel_rows(rows, wheel, arm, axis, covered, expected):
     """Write the Jacobian of `wheel_velocity`, which is `expected`; radii are those that the configuration has."""
     for i in range(3):
-        rows[i, STATE_VELOCITY + i] = 1.0
-        rows[i, STATE_RADIUS + wheel] = -expected[i]
+        rows[i, VELOCITY + i] = 1.0
+        rows[i, RADIUS + wheel] = -expected[i]
     for column in range(3):
-        rows[0, GYRO_BIAS + column] = share * axis[column] * arm[1]
-        rows[1, GYRO_BIAS + column] = -share * axis[column] * arm[0]
-    rows[0, GYRO_NOISE] = share * arm[1]
-    rows[1, GYRO_NOISE] = -share * arm[0]
-    rows[0, SCRUB] = -arm[1] if share > 0.0 else 0.0
-    rows[1, SCRUB] = arm[0] if share > 0.0 else 0.0
+        rows[0, GYRO_BIAS + column] = covered * axis[column] * arm[1]
+        rows[1, GYRO_BIAS + column] = -covered * axis[column] * arm[0]
+    rows[0, GYRO_NOISE] = covered * arm[1]
+    rows[1, GYRO_NOISE] = -covered * arm[0]
+    rows[0, SCRUB] = -arm[1] if covered > 0.0 else 0.0
+    rows[1, SCRUB] = arm[0] if covered > 0.0 else 0.0
 
 
 @part
@@ -163,7 +186,7 @@ def apply_gain(covariance, state, innovation, variance, mapped, gain, first):
     """
     size = len(state)
     for i in range(size):
-        gain[i] = mapped[i] / variance if first <= i < STATE_RADIUS else 0.0
+        gain[i] = mapped[i] / variance if first <= i < RADIUS else 0.0
         state[i] += gain[i] * innovation
     for i in range(size):
         for k in range(i + 1):
@@ -199,7 +222,7 @@ def update_sum(covariance, state, one, other, measured, variance, mapped, gain, 
         for i in range(size):
             mapped[i] += covariance[other, i]
     variance += mapped[one] + (mapped[other] if other >= 0 else 0.0)
-    if innovation * innovation > STATE_GATE * STATE_GATE * variance:
+    if innovation * innovation > OUTLIER_GATE * OUTLIER_GATE * variance:
         return False
     apply_gain(covariance, state, innovation, variance, mapped, gain, first)
     return True
@@ -237,28 +260,28 @@ def likelihood(covariance, rows, innovation, variance, spread, mapped):
 def _predict(covariance, state, axes, arm, heading, angles, imu_time, keeps, variances, transition, noise, half):
     """Propagate up to the wheels' measurement.
 
-    `angles` are those by which the axes of velocity and tilt turn [rad]; `keeps` the shares that scrubbing and slopes
-    keep; `variances` those of velocity, scrubbing, gyroscope, tilt and slopes. The tilt itself follows in `lean`.
+    `angles` are those by which the axes of velocity and tilt turn [rad]; `keeps` the ratios that scrubbing and slopes
+    keep; `variances` those of velocity, scrubbing, gyroscope, tilt and slopes. `follow_tilt` changes the tilt itself.
     """
     scrub_keep, slope_keep = keeps
     moves = half[0]
     set_process(transition, axes, arm, heading, angles[0], angles[1], imu_time, scrub_keep, slope_keep, moves)
     noise[:] = 0.0
     for axis in range(3):
-        noise[STATE_VELOCITY + axis, STATE_VELOCITY + axis] = variances[0]
+        noise[VELOCITY + axis, VELOCITY + axis] = variances[0]
     noise[SCRUB, SCRUB] = variances[1]
     noise[GYRO_NOISE, GYRO_NOISE] = variances[2]
     for axis in range(2):
         noise[SLOPE + axis, SLOPE + axis] = variances[4]
         if imu_time > 0.0:
             tilt_moves(arm, heading, axis, moves)
-            noise[STATE_TILT + axis, STATE_TILT + axis] += variances[3]
+            noise[TILT + axis, TILT + axis] += variances[3]
             for row in range(3):
-                noise[STATE_POSITION + row, STATE_TILT + axis] += variances[3] * moves[row]
-                noise[STATE_TILT + axis, STATE_POSITION + row] += variances[3] * moves[row]
+                noise[POSITION + row, TILT + axis] += variances[3] * moves[row]
+                noise[TILT + axis, POSITION + row] += variances[3] * moves[row]
                 for column in range(3):
-                    noise[STATE_POSITION + row, STATE_POSITION + column] += variances[3] * moves[row] * moves[column]
-    for first in (STATE_VELOCITY, SLOPE):
+                    noise[POSITION + row, POSITION + column] += variances[3] * moves[row] * moves[column]
+    for first in (VELOCITY, SLOPE):
         a = state[first]
         b = state[first + 1]
         state[first] = transition[first, first] * a + transition[first, first + 1] * b
@@ -269,7 +292,7 @@ def _predict(covariance, state, axes, arm, heading, angles, imu_time, keeps, var
 
 
 def _correct(
-    covariance, state, rows, speeds, arms, rate, share, axis, variances, inliers, rolling, innovations, half
+    covariance, state, rows, speeds, arms, rate, covered, axis, variances, inliers, rolling, innovations, half
 ):  # fmt: skip
     """Correct the state by the velocities that wheels measure [m/s], of inliers that more likely roll than slip."""
     count = len(speeds)
@@ -279,8 +302,8 @@ def _correct(
     expected = half[6]
     likely = 0
     for wheel in range(count):
-        wheel_velocity(state, wheel, arms[wheel], axis, rate, share, expected)
-        set_wheel_rows(rows[wheel], wheel, arms[wheel], axis, share, expected)
+        wheel_velocity(state, wheel, arms[wheel], axis, rate, covered, expected)
+        set_wheel_rows(rows[wheel], wheel, arms[wheel], axis, covered, expected)
         for i in range(3):
             innovations[wheel, i] = speeds[wheel, i] - expected[i]
         density = likelihood(covariance, rows[wheel], innovations[wheel], variances[wheel], spread, mapped)
@@ -292,21 +315,21 @@ def _correct(
             inliers[wheel] = False
         if inliers[wheel]:
             for i in range(3):
-                wheel_velocity(state, wheel, arms[wheel], axis, rate, share, expected)
+                wheel_velocity(state, wheel, arms[wheel], axis, rate, covered, expected)
                 innovation = speeds[wheel, i] - expected[i]
                 # what wheels contradict each other by is more than radii: no position follows from it
-                update(covariance, state, rows[wheel, i], innovation, variances[wheel], mapped, gain, STATE_HEADING)
+                update(covariance, state, rows[wheel, i], innovation, variances[wheel], mapped, gain, HEADING)
         elif rolling[wheel] > 0.5:
             rolling[wheel] = 0.5
 
 
 def _integrate(covariance, axis, heading, velocity, period, imu_time, variances, transition, noise, half):
-    """Propagate the pose; variances are those of slip along x and y, of the turn, and of the biases."""
+    """Propagate the pose; variances are those of slip along x and y, of the yaw, and of the biases."""
     set_pose_process(transition, axis, heading, velocity, period, imu_time)
     noise[:] = 0.0
-    noise[STATE_POSITION, STATE_POSITION] = variances[0]
-    noise[STATE_POSITION + 1, STATE_POSITION + 1] = variances[0]
-    noise[STATE_HEADING, STATE_HEADING] = variances[1]
+    noise[POSITION, POSITION] = variances[0]
+    noise[POSITION + 1, POSITION + 1] = variances[0]
+    noise[HEADING, HEADING] = variances[1]
     for column in range(GYRO_BIAS, GYRO_BIAS + 3):
         noise[column, column] = variances[2]
     propagate(covariance, transition, noise, half)
@@ -314,13 +337,13 @@ def _integrate(covariance, axis, heading, velocity, period, imu_time, variances,
 
 def _level(covariance, state, about_x, about_y, variance, half):
     """Measure tilt plus slope about x and y [rad] by the plane through the contacts; return whether both pass."""
-    passes = update_sum(covariance, state, STATE_TILT, SLOPE, about_x, variance, half[0], half[1], 0)
-    return update_sum(covariance, state, STATE_TILT + 1, SLOPE + 1, about_y, variance, half[0], half[1], 0) and passes
+    passes = update_sum(covariance, state, TILT, SLOPE, about_x, variance, half[0], half[1], 0)
+    return update_sum(covariance, state, TILT + 1, SLOPE + 1, about_y, variance, half[0], half[1], 0) and passes
 
 
 def _measure(covariance, state, which, measured, variance, half):
     """Measure one number of the state; position is not corrected."""
-    return update_sum(covariance, state, which, -1, measured, variance, half[0], half[1], STATE_HEADING)
+    return update_sum(covariance, state, which, -1, measured, variance, half[0], half[1], HEADING)
 
 
 def _condition(covariance, which, variance, half):
@@ -343,18 +366,18 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
     sine = math.sin(heading)
     pose[:] = 0.0
     twist[:] = 0.0
-    for i in range(STATE_HEADING + 1):
+    for i in range(HEADING + 1):
         a = i if i < 3 else 5
-        for j in range(STATE_HEADING + 1):
+        for j in range(HEADING + 1):
             pose[a, j if j < 3 else 5] = errors[i, j]
         # the tilt's error is subtracted
-        x = -errors[i, STATE_TILT]
-        y = -errors[i, STATE_TILT + 1]
+        x = -errors[i, TILT]
+        y = -errors[i, TILT + 1]
         pose[a, 3], pose[a, 4] = cosine * x - sine * y, sine * x + cosine * y
         pose[3, a], pose[4, a] = pose[a, 3], pose[a, 4]
-    xx = errors[STATE_TILT, STATE_TILT]
-    xy = errors[STATE_TILT, STATE_TILT + 1]
-    yy = errors[STATE_TILT + 1, STATE_TILT + 1]
+    xx = errors[TILT, TILT]
+    xy = errors[TILT, TILT + 1]
+    yy = errors[TILT + 1, TILT + 1]
     pose[3, 3] = cosine * cosine * xx - 2.0 * cosine * sine * xy + sine * sine * yy
     pose[4, 4] = sine * sine * xx + 2.0 * cosine * sine * xy + cosine * cosine * yy
     pose[3, 4] = cosine * sine * (xx - yy) + (cosine * cosine - sine * sine) * xy
@@ -370,21 +393,21 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
         a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
         for j in range(3):
             c, d = (0.0, -arm[2]) if j == 0 else (arm[2], 0.0) if j == 1 else (-arm[1], arm[0])
-            twist[i, j] = errors[STATE_VELOCITY + i, STATE_VELOCITY + j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
+            twist[i, j] = errors[VELOCITY + i, VELOCITY + j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
 
 
 _F = "float64"
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
-_T = "float64[:, :, ::1]"
-_B = "boolean[::1]"
 _PAIR = "UniTuple(float64, 2)"
 
 predict = cached(
     f"void({_M}, {_V}, {_M}, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5), {_M}, {_M}, {_M})", _predict
 )
 correct = cached(
-    f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, {_B}, {_V}, {_M}, {_M})", _correct, sources=[DENSE]
+    f"void({_M}, {_V}, float64[:, :, ::1], {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, boolean[::1], {_V}, {_M}, {_M})",
+    _correct,
+    sources=[DENSE],
 )
 integrate = cached(f"void({_M}, {_V}, {_F}, {_V}, {_F}, {_F}, UniTuple(float64, 3), {_M}, {_M}, {_M})", _integrate)
 level = cached(f"boolean({_M}, {_V}, {_F}, {_F}, {_F}, {_M})", _level)

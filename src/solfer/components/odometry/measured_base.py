@@ -66,13 +66,13 @@ class MeasuredBase:
         self.angular[:] = about_vertical(angular, -self.heading)
 
     def subtract_tilt(self, x: float, y: float) -> None:
-        """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn lacks it."""
+        """Subtract an error of the tilt, rotations about x and y of the heading frame [rad]; the next lacks it."""
         cosine = math.cos(self.heading)
         sine = math.sin(self.heading)
         x, y = cosine * x - sine * y, sine * x + cosine * y
         half = 0.5 * math.hypot(x, y)
-        share = 0.5 * math.sin(half) / half if half else 0.5
-        self.rotation = rotation_from_quaternion((-share * x, -share * y, 0.0, math.cos(half))) @ self.rotation
+        factor = 0.5 * math.sin(half) / half if half else 0.5
+        self.rotation = rotation_from_quaternion((-factor * x, -factor * y, 0.0, math.cos(half))) @ self.rotation
         self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from solfer.interfaces.geometry import Header, Pose, Turn, Vector
 
-ZEROS = (0.0,) * 36
-
 
 @dataclass(frozen=True)
 class SetBase:
@@ -26,10 +24,10 @@ class SetBase:
 
 @dataclass(frozen=True)
 class UncertainPose:
-    """A pose, and the covariance of x, y, z [m] and of turns about the axes of the world [rad], row by row."""
+    """A pose, and the covariance of x, y, z [m] and of rotations about the axes of the world [rad], row by row."""
 
     pose: Pose = field(default_factory=Pose)
-    covariance: tuple[float, ...] = ZEROS
+    covariance: tuple[float, ...] = (0.0,) * 36
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ class PoseCovariances:
         command: The desired State, which gets both as interfaces more.
 
     Attributes:
-        pose: Covariance of position and turns in world axes, shape (6, 6) [m, rad]; live.
+        pose: Covariance of position and rotations in world axes, shape (6, 6) [m, rad]; live.
         deviations: Standard deviations of the pose, shape (6,) [m, rad], as of the last `find_deviations`; live.
     """
 
@@ -23,13 +23,13 @@ class PoseCovariances:
         self.deviations = np.zeros(6)
         self._variances = np.einsum("ii->i", self.pose)
         self._heading_twist, self._half, self._axes = np.zeros((3, 6, 6))
-        self._turn = np.zeros((3, 3))
+        self._heading_rotation = np.zeros((3, 3))
 
     def write(self, law: FilteredOdometry, rotation: np.ndarray) -> None:
         """Write the covariances; that of the twist in the axes of the base with a rotation, shape (3, 3)."""
         law.write_covariance(self.pose, self._heading_twist)
-        filter_kernel.turn_rotation(rotation, -law.heading, self._turn)
-        self._axes[:3, :3] = self._axes[3:, 3:] = self._turn
+        filter_kernel.turn_rotation(rotation, -law.heading, self._heading_rotation)
+        self._axes[:3, :3] = self._axes[3:, 3:] = self._heading_rotation
         np.matmul(self._axes.T, self._heading_twist, out=self._half)
         np.matmul(self._half, self._axes, out=self._twist)
 

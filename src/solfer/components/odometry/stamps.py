@@ -4,16 +4,11 @@ import math
 
 from solfer.transport.stamp_faults import StampFault
 
-FOREIGN = 0.1
-"""Largest difference of the newest stamps of two sensors that both send [s]."""
-
-STAMP_KINDS = ("zero", "of another clock", "older than the estimate")
-
 
 class StampCheck:
     """Refuses stamps that no sample can have, and counts them by what is wrong with them.
 
-    Whether they go on as the arrivals of their messages do is judged by the pipes, see `SenderClock`. A stamp and an
+    Whether they go on as the arrivals of their messages do is decided by the pipes, see `SenderClock`. A stamp and an
     arrival need not be of one clock: only stamps show whether two sensors share one.
 
     Args:
@@ -21,8 +16,8 @@ class StampCheck:
         offset: Time by which the stamps are behind those of the reference [s].
 
     Attributes:
-        refused: How many stamps of each of the `STAMP_KINDS` were refused.
-        complaint: What was wrong last, and the publisher; empty: nothing since it was emptied.
+        refused: How many stamps were refused, by what was wrong with them.
+        warning: What was wrong last, and the publisher; empty: nothing since it was emptied.
         first: The first stamp that was accepted [s].
         newest: Latest stamp that was accepted [s].
         before: The same when this cycle began [s].
@@ -32,8 +27,8 @@ class StampCheck:
     def __init__(self, reference: "StampCheck | None" = None, offset: float = 0.0) -> None:
         self._reference = reference
         self._offset = offset
-        self.refused = dict.fromkeys(STAMP_KINDS, 0)
-        self.complaint = ""
+        self.refused = dict.fromkeys(("zero", "of another clock", "older than the estimate"), 0)
+        self.warning = ""
         self.start()
 
     def start(self) -> None:
@@ -46,7 +41,7 @@ class StampCheck:
         self.before = self.newest
 
     def accepts(self, stamp: float, arrival: float, after: float, sender: str) -> bool:
-        """Judge a stamp.
+        """Check a stamp.
 
         Args:
             stamp: The stamp [s].
@@ -79,12 +74,13 @@ class StampCheck:
         # in the first cycle comes all that was sent while the plugin was made
         first = reference.first if math.isnan(reference.before) else reference.before
         passed = max(arrival - reference.arrival, 0.0)
-        if first - FOREIGN <= stamp <= reference.newest + passed + FOREIGN:
+        tolerance = 0.1  # [s] between the newest stamps of two sensors that both send
+        if first - tolerance <= stamp <= reference.newest + passed + tolerance:
             self._apart.since = math.nan
             return True
         return False
 
     def _refuse(self, kind: str, sender: str) -> bool:
         self.refused[kind] += 1
-        self.complaint = f"a stamp of {sender or 'an unknown publisher'} is {kind}"
+        self.warning = f"a stamp of {sender or 'an unknown publisher'} is {kind}"
         return False

@@ -4,17 +4,14 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.imu_samples import CAPACITY, IMU_SAMPLES_LAG, ImuSamples
+from solfer.components.odometry.imu_samples import CAPACITY, LONGEST_LAG, ImuSamples
 from solfer.components.odometry.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.stamps import StampCheck
 from solfer.numerics.base_chart import BaseChart
 from solfer.robot import Robot
 
-IMU_LEAD = 0.1
+LONGEST_EXTRAPOLATION = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
-
-IMU_MOTION_SPEED = 0.05
-"""Speed above which joints that stay where they were measure nothing: they are frozen [rad/s]."""
 
 
 class _JointSamples:
@@ -52,15 +49,15 @@ class _JointSamples:
         """Return whether joints that move, all positions and then all velocities, are where they were before."""
         if row.tobytes() != self.before.tobytes():  # a tenth of the time of a comparison by numpy
             return False
-        return float(np.abs(row[len(row) // 2 :]).max()) > IMU_MOTION_SPEED
+        return float(np.abs(row[len(row) // 2 :]).max()) > 0.05  # [rad/s]
 
 
 class Streams:
     """Measurements of joints and base, each of one time, from two streams of messages.
 
     Each message of the joints is a measurement at its stamp. What the IMU measured then lies between its samples before
-    and after; joints wait for the latter, for `LAG` at most. A sensor that is silent is no measurement. Where the State
-    has no histories of both, what it has in each cycle is a measurement of that cycle.
+    and after; joints wait for the latter, for `LONGEST_LAG` at most. A sensor that is silent is no measurement. Where
+    the State has no histories of both, what it has in each cycle is a measurement of that cycle.
 
     Args:
         robot: The Robot. Measurements are written into its State, one after the other.
@@ -142,7 +139,7 @@ class Streams:
             return False
         time = float(waiting.stamps[0])
         is_covered = self._samples.newest >= time
-        if not is_covered and self._waited < IMU_SAMPLES_LAG and waiting.newest - time < IMU_SAMPLES_LAG:
+        if not is_covered and self._waited < LONGEST_LAG and waiting.newest - time < LONGEST_LAG:
             return False
         self.elapsed = self._period if math.isnan(self._time) else time - self._time
         self._time = time
@@ -160,7 +157,7 @@ class Streams:
         state = self._robot.state
         state.position[6:], state.velocity[6:] = self._measurements.newest
         self.ahead = min(
-            max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, IMU_LEAD
+            max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, LONGEST_EXTRAPOLATION
         )
 
     def turned_since(self) -> np.ndarray | None:
@@ -180,7 +177,7 @@ class Streams:
         self._waited += self._period
         measurements = self._measurements
         if measurements.is_frozen(measurements.newest.ravel()):
-            self.ahead = min(self._waited, IMU_LEAD)
+            self.ahead = min(self._waited, LONGEST_EXTRAPOLATION)
             return False
         state = self._robot.state
         base = [state.position[3:6].tolist(), state.velocity[3:6].tolist()]

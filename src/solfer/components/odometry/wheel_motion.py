@@ -15,7 +15,7 @@ class WheelMotion:
     Attributes:
         wheels: See above.
         step: Step of each joint, shape (n,) [rad].
-        displacements: Displacement of the base by each wheel, without a turn about the vertical, shape (k, 3) [m].
+        displacements: Displacement of the base by each wheel, without a yaw, shape (k, 3) [m].
         speeds: These by time, shape (k, 3) [m/s].
         arms: From the base's origin to the contacts, mean of both measurements, shape (k, 3) [m].
         arm: Mean of these, shape (3,) [m].
@@ -55,7 +55,7 @@ class WheelMotion:
             self.weights[:] = 1.0
 
     def measure(self, turned: np.ndarray) -> None:
-        """Compute the displacements by a turn of the base, shape (3,) [rad]."""
+        """Compute the displacements by a rotation of the base, shape (3,) [rad]."""
         wheels = self.wheels
         filter_kernel.measure_displacements(
             wheels.jacobian, self._jacobian_before, wheels.arms, self._arms_before, self.step, turned,

@@ -11,8 +11,6 @@ from solfer.points import Handler, make_contact
 from solfer.points.contact.contacts import RollingContact
 from solfer.robot import Robot
 
-LEVEL_AXLE = 1.0 - 1e-9
-
 
 class _Ground:
     """The plane on which wheels roll.
@@ -35,11 +33,11 @@ class _Ground:
         length = math.sqrt(x * x + y * y + z * z)
         self.normal[:] = x / length, y / length, z / length
         was_level = self.is_level
-        self.is_level = bool(self.normal[2] >= LEVEL_AXLE)
+        self.is_level = bool(self.normal[2] >= 1.0 - 1e-9)
         if self.is_level and not was_level:
             self._tilt(self.normal)
 
-    def turn(self, cosine: float, sine: float) -> None:
+    def rotate(self, cosine: float, sine: float) -> None:
         """Let the contacts have the normal, turned about the vertical."""
         if not self.is_level:
             x, y, z = self.normal.tolist()
@@ -138,7 +136,7 @@ class Wheels:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)
         sine = math.sin(heading)
-        self._ground.turn(cosine, sine)
+        self._ground.rotate(cosine, sine)
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
         places = self._contacts.value.reshape(-1, 3)

@@ -9,9 +9,6 @@ from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.errors import ComponentError, UnknownName
 from solfer.robot import Robot
 
-BALANCE_PRESSURE = 0.2
-"""Share of the robot's weight that contacts have to carry for their centre of pressure to count."""
-
 
 class BalanceMeasure:
     """Measures polygon and legs, seen from the heading of the base at its place.
@@ -63,7 +60,7 @@ class BalanceMeasure:
         robot = self._robot
         if self._by_pressure:
             pressed = sum(max(float(robot.contacts[wheel.name].force[2]), 0.0) for wheel in self._wheels.contacts)
-            if pressed >= BALANCE_PRESSURE * self._weight:
+            if pressed >= 0.2 * self._weight:
                 return robot.center_of_pressure.value
         return robot.center_of_mass.value
 

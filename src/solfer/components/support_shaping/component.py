@@ -15,20 +15,11 @@ from solfer.interfaces.declaration import LiveParameter, TopicIn, TopicOut
 from solfer.interfaces.support import SupportMargins
 from solfer.robot import Robot
 
-STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)
-"""Tasks of the original."""
-
 WHEEL_SIZES = ("margins", "workspaces")
 """Tags of distances of each wheel."""
 
 SHAPING = ("margin_gain", "workspace_gain", "horizon", "recovery", "reactive_margin")
 """Tags of how these are kept."""
-
-CORNERS = 3
-"""Fewest wheels of a support polygon."""
-
-QUICKER = 5.0
-"""Gain of the steering in a reaction, by its other one."""
 
 
 class SupportShaping(WheeledMotion):
@@ -56,11 +47,11 @@ class SupportShaping(WheeledMotion):
     def __init__(self, robot: Robot, tags: SupportShapingTags, name: str = "support_shaping"):
         super().__init__(robot, tags, name)
         count = len(self.wheels.links)
-        if count < CORNERS:
+        if count < 3:
             raise ComponentError(
-                f"a support polygon of {count} wheels", where=tags.where("track"), expected=f"{CORNERS} or more"
+                f"a support polygon of {count} wheels", where=tags.where("track"), expected="3 or more"
             )
-        needed = STACK if tags.is_original else (BASE, VERTICES)
+        needed = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER) if tags.is_original else (BASE, VERTICES)
         if missing := [task for task in needed if task not in self.tasks.rows]:
             raise ComponentError(
                 f"no {', '.join(missing)} among the tasks", where=tags.where("IK"), expected=", ".join(needed)
@@ -147,7 +138,7 @@ class SupportShaping(WheeledMotion):
         """See `WheeledMotion._find_errors`: wheels steer faster under a robot that is pushed."""
         super()._find_errors()
         if self.shaping.reaction.is_active and STEERING in self.tasks.rows:
-            self.tasks.rates.error[self.tasks.rows[STEERING]] *= QUICKER
+            self.tasks.rates.error[self.tasks.rows[STEERING]] *= 5.0
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive what `wheeled_motion` does, and publish `<name>/support_margins`."""
@@ -158,7 +149,7 @@ class SupportShaping(WheeledMotion):
         )
 
     def _published_pace(self) -> float:
-        return super()._published_pace() * self.shaping.governor.share
+        return super()._published_pace() * self.shaping.governor.ratio
 
     def start_log(self, logger: Any) -> None:
         """Declare margins and distances, too, and what is left of their limits."""
@@ -172,5 +163,5 @@ class SupportShaping(WheeledMotion):
         logger.add("margins", polygon.margins, edges, "m")
         logger.add("workspaces", polygon.distances, links, "m")
         logger.add("reserves", self.shaping.governor.reserves, list(report.names), "m")
-        logger.add("share", report.share, ["share"])
+        logger.add("share", report.ratio, ["share"])
         logger.add("reaction", report.reaction, list("xy"), "m/s", "world")

@@ -8,13 +8,7 @@ import numpy as np
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.numerics.solvers.qp import QpSolver
 
-MISSED_SHARE, MISSED_TIME = 0.5, 1.0
-"""Share of the way back to a limit that has to be missed, and for how long [s], before the limit counts as lost."""
-
-GOVERNOR_DECAY_RATE, GOVERNOR_RECOVERY_RATE, GOVERNOR_LOWEST_SPEED = 2.0, 1.0, 0.2
-"""How fast the share of the motion falls and rises [1/s], and the least one where it only slows down."""
-
-GOVERNOR_SMALLNESS = 1e-6
+VELOCITY_TOLERANCE = 1e-6
 """Difference of velocities that changes nothing [m/s]."""
 
 
@@ -76,8 +70,8 @@ class SupportGovernor:
         with   M u + s_m >= max(-(m - limit) / T, ...),   e u - s_l <= (limit - l) / T,   |u| <= largest speed
 
     A margin that is too small grows with at most `recovery`, a leg that is too long gets shorter likewise. Where a
-    limit does not come back within PATIENCE, all that are exceeded then are infeasible until they are kept again:
-    nothing brings them back, they only get no worse, and the share of the desired motion falls. Where the program
+    limit does not come back within a second, all that are exceeded then are infeasible until they are kept again:
+    nothing brings them back, they only get no worse, and the ratio of the desired motion falls. Where the program
     cannot be solved the vertices hold.
 
     Args:
@@ -95,7 +89,7 @@ class SupportGovernor:
         velocities: Velocities of the vertices, shape (count, 2) [m/s]; live.
         active: The limits that changed a velocity, shape (2 count,); live.
         infeasible: The limits that are exceeded and could not be brought back, shape (2 count,); live.
-        share: Share of the desired velocities that goes on.
+        ratio: Ratio of the desired velocities that goes on.
     """
 
     def __init__(
@@ -112,7 +106,7 @@ class SupportGovernor:
         count = len(margins)
         self.limits = np.array((margins, workspaces))
         self.speed = speed
-        self._least = 0.0 if holds else GOVERNOR_LOWEST_SPEED
+        self._lowest = 0.0 if holds else 0.2
         self.velocities = np.zeros((count, 2))
         self._desired, self._reached, self._missed = np.zeros((3, 2 * count))
         self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
@@ -146,7 +140,7 @@ class SupportGovernor:
 
     def start(self) -> None:
         """Begin with the whole motion."""
-        self.share = 1.0
+        self.ratio = 1.0
         self.active[:] = False
         self.infeasible[:] = False
         self._missed[:] = 0.0
@@ -159,7 +153,7 @@ class SupportGovernor:
             desired: Velocities that are desired of the vertices there, shape (count, 3) [m/s].
         """
         count = len(desired)
-        np.multiply(desired[:, :2], self.share, out=self._desired.reshape(count, 2))
+        np.multiply(desired[:, :2], self.ratio, out=self._desired.reshape(count, 2))
         self._rows.update(polygon, self.infeasible)
         np.dot(self._matrix, self._desired, out=self._reached)
         if (self._reached >= self._rows.demand).all():
@@ -168,8 +162,8 @@ class SupportGovernor:
             self._missed[:] = 0.0
         else:
             self._solve()
-        step = self._period * (-GOVERNOR_DECAY_RATE if self.infeasible.any() else GOVERNOR_RECOVERY_RATE)
-        self.share = min(max(self.share + step, self._least), 1.0)
+        step = self._period * (-2.0 if self.infeasible.any() else 1.0)  # [1/s]
+        self.ratio = min(max(self.ratio + step, self._lowest), 1.0)
 
     def _solve(self) -> None:
         problem = self._solver.problem
@@ -190,11 +184,12 @@ class SupportGovernor:
             return
         self.velocities.ravel()[:] = x[:size]
         np.dot(self._matrix, x[:size], out=self._reached)
-        np.less(self._reached, demand + GOVERNOR_SMALLNESS, out=self.active)
-        is_missed = (x[size:] > MISSED_SHARE * demand) & (demand > GOVERNOR_SMALLNESS)
+        np.less(self._reached, demand + VELOCITY_TOLERANCE, out=self.active)
+        # half of the way back is missed
+        is_missed = (x[size:] > 0.5 * demand) & (demand > VELOCITY_TOLERANCE)
         np.add(self._missed, self._period, out=self._missed)
         self._missed[~is_missed] = 0.0
-        if self._missed.max() > MISSED_TIME:
+        if self._missed.max() > 1.0:  # [s]
             np.less(self.reserves, 0.0, out=self.infeasible)
 
 
@@ -217,8 +212,14 @@ class Reaction:
         is_active: Whether it moves the polygon.
     """
 
-    GAIN, ACCELERATION, BRAKING = 60.0, 12.0, 1.0
-    """Acceleration for what is missing [1/s2], its largest value, and that of coming to rest [m/s2]."""
+    GAIN = 60.0
+    """Acceleration for what is missing [1/s2]."""
+
+    ACCELERATION = 12.0
+    """Largest acceleration [m/s2]."""
+
+    BRAKING = 1.0
+    """Acceleration of coming to rest [m/s2]."""
 
     def __init__(self, count: int, margin: float, speed: float):
         self.margin = margin
@@ -261,18 +262,18 @@ class Reaction:
             ay = ay - missing * ny
         size = self.GAIN * math.hypot(ax, ay)
         if size > 0.0:
-            share = self.GAIN * min(1.0, self.ACCELERATION / size) * period
-            vx = vx + share * ax
-            vy = vy + share * ay
+            ratio = self.GAIN * min(1.0, self.ACCELERATION / size) * period
+            vx = vx + ratio * ax
+            vy = vy + ratio * ay
         else:
             speed = math.hypot(vx, vy)
-            share = max(0.0, 1.0 - self.BRAKING * period / speed) if speed > 0.0 else 0.0
-            vx = share * vx
-            vy = share * vy
+            ratio = max(0.0, 1.0 - self.BRAKING * period / speed) if speed > 0.0 else 0.0
+            vx = ratio * vx
+            vy = ratio * vy
         speed = math.hypot(vx, vy)
         if speed > self._speed:
             vx = vx * self._speed / speed
             vy = vy * self._speed / speed
         self.velocity = (vx, vy)
-        self.is_active = speed > GOVERNOR_SMALLNESS
+        self.is_active = speed > VELOCITY_TOLERANCE
         return self.velocity

@@ -12,12 +12,6 @@ from solfer.numerics.solvers.qp import QpSolver, Solution
 from solfer.points import SpatialPoint
 from solfer.robot import Robot
 
-WHEELS_DAMPING, JOINTS_DAMPING = 5e-6, 1e-7
-"""Weights of angular velocities of the wheels (and what else the constraints count), and of joint velocities."""
-
-CAMBER_RATE = 1e-5
-"""How far the rate of a wheel's camber may be from its present one [rad/s]."""
-
 
 class RollingWheels:
     """Vertices of wheels that roll, their polygon, and what moves them.
@@ -166,7 +160,9 @@ class JointProgram:
         size = len(self._moved)
         self._write_torques(force)
         problem.inequality_matrix[self._cambers, :size] = camber[:, moved]
-        problem.lower[self._cambers], problem.upper[self._cambers] = rates - CAMBER_RATE, rates + CAMBER_RATE
+        tolerance = 1e-5  # [rad/s] by which the rate of a camber may differ from its present one
+        problem.lower[self._cambers] = rates - tolerance
+        problem.upper[self._cambers] = rates + tolerance
         self._write_soft()
         solution = self.solver.solve()
         self.velocity[:] = 0.0
@@ -189,8 +185,8 @@ class JointProgram:
             counted.append(self._pelvis.jacobian[:2, moved])
             counted.extend(point.jacobian[:2, moved] for point in self.wheels.centers)
         rows = np.concatenate(counted)
-        hessian[:size, :size] = rolling.T @ rolling + WHEELS_DAMPING * (rows.T @ rows)
-        hessian[np.arange(size), np.arange(size)] += JOINTS_DAMPING
+        hessian[:size, :size] = rolling.T @ rolling + 5e-6 * (rows.T @ rows)
+        hessian[np.arange(size), np.arange(size)] += 1e-7
 
     def _write_equalities(self, contacts: np.ndarray, before: np.ndarray, base: np.ndarray) -> None:
         problem = self.solver.problem

@@ -6,19 +6,16 @@ from solfer.components.support_shaping.joint_program import JointProgram, Rollin
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.kernel import find_soft
-from solfer.components.wheeled_motion.original.kernel import ROUNDED
+from solfer.components.wheeled_motion.original.kernel import ROUNDED_PI
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CONSTRAINTS, SOFT, STEERING, VERTICES
+from solfer.components.wheeled_motion.tags import ANGLE_ERRORS, BASE, CAMBER, CONSTRAINTS, STEERING, VERTICES
 from solfer.components.wheeled_motion.tasks import DrivingTasks
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.dynamics import BIAS
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.robot import Robot
 from solfer.tasks.task import DAMPING_COLUMN
-
-VERTEX_MOTION_SPEED = 1e-4
-"""Speed of a vertex from which its reference moves [m/s]."""
 
 
 class WorldVertices:
@@ -52,7 +49,7 @@ class WorldVertices:
         """Move references along the directions of rolling, shape (count, 2), by velocities of the vertices [m/s]."""
         along = (velocities * directions).sum(axis=1)
         for index in range(len(along)):
-            if np.hypot(*velocities[index]) > VERTEX_MOTION_SPEED:
+            if np.hypot(*velocities[index]) > 1e-4:  # [m/s]
                 self.references[index] += period * along[index] * directions[index]
 
     def see(self, places: np.ndarray, directions: np.ndarray, jacobians: np.ndarray) -> None:
@@ -148,7 +145,7 @@ class OriginalShaping:
         self._keep_jacobians()
         self._move_vertices(step)
         error = tasks.rates.error
-        find_soft(steering.measured, self._aims, ROUNDED, SOFT[STEERING], error[tasks.rows[STEERING]])
+        find_soft(steering.measured, self._aims, ROUNDED_PI, ANGLE_ERRORS[STEERING], error[tasks.rows[STEERING]])
         np.multiply(tasks.gain, error, out=stack.velocity)
         velocity = tasks.descent.update(stack.jacobian, stack.velocity, stack.numbers[:, DAMPING_COLUMN])
         self._joints.move(velocity, step)

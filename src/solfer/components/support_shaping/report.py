@@ -12,9 +12,6 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
-REPORT_RATE = 20.0
-"""Messages in a second [Hz]."""
-
 
 class MarginsReport:
     """Publishes what is left of each limit, and warns where that is little.
@@ -27,7 +24,7 @@ class MarginsReport:
 
     Attributes:
         names: Names of the limits.
-        share: Share of the desired velocities with which the motion goes on, shape (1,); live.
+        ratio: Ratio of the desired velocities with which the motion goes on, shape (1,); live.
         reaction: Velocity of the polygon under a robot that is pushed: x, y in the world, shape (2,) [m/s]; live.
     """
 
@@ -37,13 +34,13 @@ class MarginsReport:
         self._governor = governor
         self._throttle = Throttle(log)
         self._left = self._between = 1
-        self.share = np.ones(1)
+        self.ratio = np.ones(1)
         self.reaction = np.zeros(2)
         self.start(edges)
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz]."""
-        self._left = self._between = max(round(rate / REPORT_RATE), 1)
+        self._left = self._between = max(round(rate / 20.0), 1)  # at 20 Hz
 
     def start(self, edges: Sequence[tuple[int, int]]) -> None:
         """Begin with edges of the polygon between wheels."""
@@ -63,7 +60,7 @@ class MarginsReport:
                 self._throttle.warning(self._keys[name], text, self._name, name, -reserve, does)
             elif reserve < tags.warn_below:
                 self._throttle.warning(name, "%s: %.3f m are left of '%s'", self._name, reserve, name)
-        self.share[0] = governor.share
+        self.ratio[0] = governor.ratio
 
     def collect(self) -> SupportMargins | None:
         """Return what is to be published after this cycle; None: nothing."""
@@ -83,6 +80,6 @@ class MarginsReport:
             tuple(governor.reserves.tolist()),
             active=tuple(names[governor.active].tolist()),
             infeasible=tuple(names[governor.infeasible].tolist()),
-            share=governor.share,
+            share=governor.ratio,
             reaction=tuple(self.reaction.tolist()),
         )

@@ -40,9 +40,9 @@ def rolling_map(axis: np.ndarray, spin: np.ndarray, ring: float, tube: float, pe
     along, scale, turning = _parts(axis)
     offset = -ring * scale * (_UP - along) - tube * _UP
     across = np.outer(axis, _UP @ skew(spin))
-    lean = 0.5 * scale**2 * np.outer(_UP - along, _UP)
-    change = scale**2 * (2.0 * np.eye(3) - 3.0 * lean) @ turning * (_UP @ skew(along) @ spin)
-    change += 2.0 * lean @ skew(spin) @ turning + skew(lean @ turning @ spin)
+    tilt = 0.5 * scale**2 * np.outer(_UP - along, _UP)
+    change = scale**2 * (2.0 * np.eye(3) - 3.0 * tilt) @ turning * (_UP @ skew(along) @ spin)
+    change += 2.0 * tilt @ skew(spin) @ turning + skew(tilt @ turning @ spin)
     change -= skew(across @ axis) + across @ skew(axis)
     found = vertex_map(axis, ring) + skew(offset)
     found[:, 2] = ring * scale * period * change[:, 2]

@@ -10,9 +10,6 @@ from solfer.components.wheeled_motion.references import KeptVelocities, Referenc
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.robot import Robot
 
-POLYGON_TOP_SPEED = 1.5
-"""Largest speed of the polygon under a robot that is pushed [m/s]."""
-
 
 class FootprintShaping:
     """Changes what is desired of base and vertices in a cycle, so that limits are kept.
@@ -49,7 +46,7 @@ class FootprintShaping:
             speed=tags.vertex_speed,
             holds=tags.infeasible == "hold",
         )
-        self.reaction = Reaction(count, tags.reactive_margin, POLYGON_TOP_SPEED)
+        self.reaction = Reaction(count, tags.reactive_margin, 1.5)  # [m/s]
         self.report = MarginsReport(name, wheels.links, self.governor, edges=self.measure.polygon.edges)
 
     def start(self) -> None:
@@ -67,8 +64,8 @@ class FootprintShaping:
         self.measure.update()
         governor.update(self.measure.polygon, references.vertex_velocity)
         references.vertex_velocity[:, :2] = governor.velocities
-        references.velocity *= governor.share
-        references.turn[2] *= governor.share
+        references.velocity *= governor.ratio
+        references.angular[2] *= governor.ratio
         if tags.reactive:
             self._react(step)
         self.report.warn(tags)

@@ -9,21 +9,8 @@ from solfer.interfaces.trajectories import JointTolerance, JointTrajectory, Traj
 from solfer.numerics.rotations import whole_turns
 from solfer.numerics.via_points import ViaPoints
 
-TRAJECTORY_POINTS = 1000
-"""Points of a trajectory; checking more would take too long between two cycles."""
-
-LATEST_BEGIN = 60.0
-"""Longest time until a trajectory begins [s]; one that begins later has a stamp of another clock."""
-
-_TRAJECTORY_SLACK = 1e-6
-"""Relative slack of limits, for numbers that were printed and read again."""
-
-
-TRAJECTORY_REACH_TOLERANCE = 1e-2
-"""How far joints may be from the end of a trajectory whose points have all passed, so that it is complete [rad, m]."""
-
-_INSTANT = 1e-3
-"""Duration of a motion that stays where it is [s]."""
+_SLACK = 1e-6
+"""Slack of limits, for numbers that were printed and read again."""
 
 
 class StaleTrajectory(ComponentError):
@@ -35,10 +22,10 @@ class TrajectoryCheck:
 
     Args:
         joints: Names of the joints that may be moved.
-        lower: Their least positions, shape (n,) [rad, m].
-        upper: Their largest positions.
+        lower: Their lower limits of position, shape (n,) [rad, m].
+        upper: Their upper limits.
         speed: Their velocity limits [rad/s, m/s].
-        turns: Turns of those that are continuous, 0 of the others [rad].
+        turns: Revolution of those that are continuous, 0 of the others [rad].
     """
 
     def __init__(
@@ -75,10 +62,11 @@ class TrajectoryCheck:
         """
         stamp = trajectory.header.stamp
         elapsed = now - stamp if stamp else 0.0
-        if not elapsed >= -LATEST_BEGIN:
+        longest_wait = 60.0  # [s]; a later one has a stamp of another clock
+        if not elapsed >= -longest_wait:
             raise ComponentError(
                 f"the trajectory is stamped {stamp:.3f} s, and now it is {now:.3f} s",
-                expected=f"a stamp by this clock, at most {LATEST_BEGIN:g} s ahead, or 0",
+                expected=f"a stamp by this clock, at most {longest_wait:g} s ahead, or 0",
             )
         return elapsed
 
@@ -94,8 +82,8 @@ class TrajectoryCheck:
     ) -> ViaPoints:
         """Make the motion of a trajectory from the state in which it begins; points that have passed are left out.
 
-        The whole trajectory of a continuous joint is on the turn on which its first point that is left is nearest to
-        where the joint is desired, as in ros_control's joint_trajectory_controller. If all points have passed, and
+        The whole trajectory of a continuous joint is on the revolution on which its first point that is left is nearest
+        to where the joint is desired, as in ros_control's joint_trajectory_controller. If all points have passed, and
         joints at rest are at the last one, they stay where they are desired.
 
         Args:
@@ -122,13 +110,13 @@ class TrajectoryCheck:
             rows[0] += whole_turns(start - first, self._turns[places])
         if not left.any():
             last = rows[0]
-            reached = last is not None and np.abs(last[-1] - measured).max() <= TRAJECTORY_REACH_TOLERANCE
-            if not reached or np.abs(velocity).max() > _TRAJECTORY_SLACK:
+            reached = last is not None and np.abs(last[-1] - measured).max() <= 1e-2  # [rad, m]
+            if not reached or np.abs(velocity).max() > _SLACK:
                 raise StaleTrajectory(
                     f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
                     expected="a point in the future, or joints that are there already, at rest",
                 )
-            return ViaPoints(np.array([elapsed, elapsed + _INSTANT]), np.vstack([start, start]))
+            return ViaPoints(np.array([elapsed, elapsed + 1e-3]), np.vstack([start, start]))
         starts = (start, velocity, np.zeros_like(start))
         positions, velocities, accelerations = (
             None if row is None else np.vstack([first, row[left]]) for row, first in zip(rows, starts, strict=True)
@@ -138,7 +126,7 @@ class TrajectoryCheck:
                 "points without positions, or with accelerations and without velocities",
                 expected="positions; with velocities; with both and accelerations",
             )
-        if velocities is not None and np.abs(velocities[-1]).max() > _TRAJECTORY_SLACK:
+        if velocities is not None and np.abs(velocities[-1]).max() > _SLACK:
             index = int(np.abs(velocities[-1]).argmax())
             raise ComponentError(
                 f"joint '{trajectory.joint_names[index]}' moves at {velocities[-1, index]:.6g} rad/s at the last point",
@@ -177,8 +165,9 @@ class TrajectoryCheck:
 
     @staticmethod
     def _times(points: Sequence[TrajectoryPoint]) -> np.ndarray:
-        if len(points) > TRAJECTORY_POINTS:
-            raise ComponentError(f"a trajectory of {len(points)} points", expected=f"{TRAJECTORY_POINTS} at most")
+        largest = 1000  # checking more would take too long between two cycles
+        if len(points) > largest:
+            raise ComponentError(f"a trajectory of {len(points)} points", expected=f"{largest} at most")
         times = np.array([point.time_from_start for point in points], dtype=float)
         if not np.isfinite(times).all():
             raise NotFinite("a time of the trajectory is not a finite number")
@@ -215,13 +204,9 @@ class TrajectoryCheck:
         lowest, highest, fastest = motion.extremes()
         lower = np.minimum(self._lower[places], start)
         upper = np.maximum(self._upper[places], start)
-        self._require(
-            places, lowest, lambda value, index: value >= lower[index] - _TRAJECTORY_SLACK, what="position", unit="rad"
-        )
-        self._require(
-            places, highest, lambda value, index: value <= upper[index] + _TRAJECTORY_SLACK, what="position", unit="rad"
-        )
-        limits = self._speed[places] * (1.0 + _TRAJECTORY_SLACK)
+        self._require(places, lowest, lambda value, index: value >= lower[index] - _SLACK, what="position", unit="rad")
+        self._require(places, highest, lambda value, index: value <= upper[index] + _SLACK, what="position", unit="rad")
+        limits = self._speed[places] * (1.0 + _SLACK)
         self._require(places, fastest, lambda value, index: value <= limits[index], what="speed", unit="rad/s")
 
     def _require(

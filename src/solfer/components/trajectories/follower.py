@@ -23,9 +23,6 @@ from solfer.numerics.rotations import whole_turns
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot
 
-MOST_WAITING = 1000
-"""Trajectories that may wait for their stamps."""
-
 
 @dataclass(frozen=True)
 class _Limits:
@@ -46,7 +43,7 @@ class _Deviation:
     Attributes:
         desired, speed: Where they are desired, and how fast, shape (m,) [rad, m] and [rad/s, m/s]; written.
         actual, turning: Where they were measured, and how fast.
-        turn: Turns after which they are where they were, shape (m,) [rad].
+        revolution: Angles after which they are where they were, shape (m,) [rad].
     """
 
     def __init__(self, robot: Robot, dofs: np.ndarray):
@@ -57,7 +54,7 @@ class _Deviation:
         self._state = robot.state
         self._dofs = dofs
         self.desired, self.speed, self.actual, self.turning = (np.zeros(len(dofs)) for _ in range(4))
-        self.turn = robot.turns[dofs]
+        self.revolution = robot.turns[dofs]
         self._displacements = np.zeros((1, len(dofs)))
         self._away = self._error = self._displacements[0]
         self._slip = np.zeros(len(dofs))
@@ -73,7 +70,7 @@ class _Deviation:
         self.measure()
         np.subtract(self.desired, self.actual, out=self._away)
         np.subtract(self.speed, self.turning, out=self._slip)
-        self._shorten(self._displacements, self.turn)
+        self._shorten(self._displacements, self.revolution)
         for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
             np.abs(error, out=error)
             np.greater(error, tolerance, out=self._beyond)
@@ -158,7 +155,7 @@ class TrajectoryFollower:
         self._outcome: Outcome | None = None
 
     def begin(self, trajectory: JointTrajectory, now: float, goal: FollowGoal | None = None) -> None:
-        """Let a trajectory wait for its turn, see `take_turn`; nothing changes if any part of it is wrong.
+        """Let a trajectory wait for its stamp, see `take_over`; nothing changes if any part of it is wrong.
 
         It replaces those that wait: from its stamp on those of the same joints, and all of others.
 
@@ -180,9 +177,10 @@ class TrajectoryFollower:
         start = elapsed if trajectory.points[-1].time_from_start == 0.0 else max(elapsed, 0.0)
         begins = self._clock + start - elapsed
         kept = [each for each in self.waiting if each.names == names and each.begins < begins]
-        if len(kept) == MOST_WAITING:
+        capacity = 1000
+        if len(kept) == capacity:
             raise ComponentError(
-                f"{MOST_WAITING} trajectories wait for their stamps", expected="fewer, or stamps less far ahead"
+                f"{capacity} trajectories wait for their stamps", expected="fewer, or stamps less far ahead"
             )
         position, velocity = self._after(start - elapsed, kept)
         motion = self._check.motion(
@@ -202,7 +200,7 @@ class TrajectoryFollower:
             self._abort("another trajectory has taken over")
         self.waiting = deque((*kept, course))
 
-    def take_turn(self, period: float) -> tuple[np.ndarray, np.ndarray] | None:
+    def take_over(self, period: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Let a trajectory take over that begins within some time [s].
 
         Returns:
@@ -267,7 +265,7 @@ class TrajectoryFollower:
         desired = self._position[course.places]
         speed = self._velocity[course.places]
         away = desired - deviation.actual
-        away -= whole_turns(away, deviation.turn)
+        away -= whole_turns(away, deviation.revolution)
         return FollowFeedback(
             course.names,
             _point(desired, speed, time),

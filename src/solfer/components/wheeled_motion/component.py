@@ -10,14 +10,14 @@ from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.inputs import ReferenceInputs
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.log import WheelsLog
-from solfer.components.wheeled_motion.original.kernel import ROUNDED, ROUNDED_TURN
+from solfer.components.wheeled_motion.original.kernel import ROUNDED_PI, ROUNDED_TWO_PI
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.delay import ClockDelay
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
 from solfer.components.wheeled_motion.references import References, about_z
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import LIFTING_TIMEOUT, Lifting, MotionGuard, SupportPolygon, WeightShift
+from solfer.components.wheeled_motion.support import Lifting, MotionGuard, SupportPolygon, WeightShift
 from solfer.components.wheeled_motion.tags import (
     CAMBER,
     CASTER,
@@ -44,9 +44,6 @@ LIMITS = (
     *("support_margin", "lift_margin"),
 )
 """Tags of limits that change together: speeds, accelerations, corrections, margins."""
-
-HOLD_PACE = 0.02
-"""Pace below which joints and bounds hold the robot where it is."""
 
 
 class WheeledMotion(Component):
@@ -176,8 +173,8 @@ class WheeledMotion(Component):
         self.targets.limit(speeds, accelerations)
         self._pace.limit(speeds, accelerations[0])
         self.tasks.limit(speeds, accelerations, values[6:9])
-        least, self._lifting.margin = values[9:]
-        self._guard.leave(least)
+        margin, self._lifting.margin = values[9:]
+        self._guard.set_required_margin(margin)
 
     def _take_across(self, gain: np.ndarray) -> None:
         if self.received.straight is None:
@@ -208,7 +205,7 @@ class WheeledMotion(Component):
         references.camber[:] = wheels.points[TASK_POINTS[CAMBER]].value
         references.caster[:] = wheels.points[TASK_POINTS[CASTER]].value
         if self.tags.is_original:
-            references.caster[references.caster <= -ROUNDED] += ROUNDED_TURN - 2.0 * ROUNDED
+            references.caster[references.caster <= -ROUNDED_PI] += ROUNDED_TWO_PI - 2.0 * ROUNDED_PI
 
     def update(self) -> None:
         """Compute one cycle."""
@@ -252,7 +249,7 @@ class WheeledMotion(Component):
         """Shorten a motion that may not go on, and log why where it comes to rest."""
         last = self.tasks.descent.last
         guard = self._guard
-        if guard.update(self.references.pace, last >= 0, step) and self._pace.held < HOLD_PACE:
+        if guard.update(self.references.pace, last >= 0, step) and self._pace.held < 0.02:  # nearly at rest
             guard.warn(self.name, self.model.dofs[last])
 
     def move_world(self, move: PlanarMove) -> None:
@@ -276,7 +273,7 @@ class WheeledMotion(Component):
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive velocities of the base on `cmd_vel` and `wheels_state`, places and velocities on `wheels_support`.
 
-        On `pace` it publishes with which share of these velocities the motion goes on: none while it does not work.
+        On `pace` it publishes with which ratio of these velocities the motion goes on: none while it does not work.
         """
         return (
             TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, handler=self.drive.receive, stream="velocities"),
@@ -308,7 +305,7 @@ class WheeledMotion(Component):
                 LiftContacts,
                 reply=LiftReply,
                 handler=self._lifting.lift,
-                timeout=LIFTING_TIMEOUT,
+                timeout=Lifting.TIMEOUT,
             ),
             Service(
                 "get_reference", "solfer/GetReference", GetReference, reply=ReferenceReply, handler=self.get_reference
@@ -337,7 +334,7 @@ class WheeledMotion(Component):
         self._log.measure()
 
     def _published_pace(self) -> float:
-        """Return the share of the received velocities with which the motion goes on."""
+        """Return the ratio of the received velocities with which the motion goes on."""
         if self.references.waits:
             return 0.0
-        return self.references.pace * self.received.share * self._delay.share * self.drive.progress
+        return self.references.pace * self.received.ratio * self._delay.ratio * self.drive.progress

@@ -7,19 +7,10 @@ import numpy as np
 
 from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, follow
 from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.targets import TARGETS_PATIENCE, check
+from solfer.components.wheeled_motion.targets import STREAM_TIMEOUT, check
 from solfer.errors import ComponentError, NotFinite
 from solfer.interfaces.geometry import Vector
 from solfer.numerics.planar_move import PlanarMove
-
-DRIVE_LATENESS = 0.1
-"""Time of acceleration beyond which a first velocity is one in the middle of a motion [s]."""
-
-SPIKE = 0.01
-"""Share of a velocity that the base may do below which it is a fault of the sender: the one before goes on."""
-
-DRIVE_REACH_TOLERANCE = 0.99
-"""Share of such a velocity at which the drive has reached it."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +51,8 @@ class Drive:
 
     Attributes:
         is_active: Whether it drives.
-        share: Share of the newest velocity that is not larger than it may be.
-        progress: Share of that which it has reached, where it began in the middle of a motion, as after a restart: the
+        ratio: Factor that scales the newest velocity to its limits, 1 within them.
+        progress: Ratio of that which it has reached, where it began in the middle of a motion, as after a restart: the
             rest of the way would be lost to the sender. Else 1.
     """
 
@@ -77,13 +68,13 @@ class Drive:
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
-        self._state[:], self._state[BEFORE], self.is_active, self.share = 0.0, math.nan, False, 1.0
+        self._state[:], self._state[BEFORE], self.is_active, self.ratio = 0.0, math.nan, False, 1.0
         self.progress = 1.0
 
     @property
     def is_abandoned(self) -> bool:
         """Whether it brakes since no velocity comes any more, though the last one was to go on."""
-        return self.is_active and self._state[AGE] > TARGETS_PATIENCE and bool(self._state[:IN_WORLD].any())
+        return self.is_active and self._state[AGE] > STREAM_TIMEOUT and bool(self._state[:IN_WORLD].any())
 
     def displace(self, move: PlanarMove) -> None:
         """Go on as seen from the base, whose estimate has jumped."""
@@ -116,52 +107,53 @@ class Drive:
         if message.cm:
             references.caster[:] = message.cm
 
-    def _take(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
+    def _take(self, velocity: tuple[float, float, float], yaw_rate: float, where: str, in_world: bool) -> None:
         """Take over a velocity."""
-        desired = *velocity, turn
+        desired = *velocity, yaw_rate
         if not all(map(math.isfinite, desired)):
             raise NotFinite(f"a velocity of {desired}", where=where, expected="finite numbers")
         speed, turn_speed = self._speeds
-        share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
-        if share < SPIKE:
-            times = 1.0 / max(share, 1e-300)  # which may be 0
+        ratio = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(yaw_rate), 1e-12))
+        if ratio < 0.01:  # a fault of the sender: the velocity before goes on
+            times = 1.0 / max(ratio, 1e-300)  # which may be 0
             raise ComponentError(
                 f"a velocity of {desired}, which is {times:.3g} times what the base may do",
                 where=where,
                 expected=f"{speed:g} m/s and {turn_speed:g} rad/s at most",
             )
-        self.share = share
-        self._state[:BEFORE] = *velocity, turn, in_world, 0.0
+        self.ratio = ratio
+        self._state[:BEFORE] = *velocity, yaw_rate, in_world, 0.0
         if not self.is_active:
-            change, turn_change = self._limits
-            is_late = math.hypot(*velocity) > DRIVE_LATENESS * change or abs(turn) > DRIVE_LATENESS * turn_change
+            change, yaw_change = self._limits
+            # a first velocity that takes longer than 0.1 s to reach is one in the middle of a motion
+            is_late = math.hypot(*velocity) > 0.1 * change or abs(yaw_rate) > 0.1 * yaw_change
             self.progress = 0.0 if is_late else 1.0
         self.is_active = True
 
-    def update(self, references: References, heading: float, share: float, passed: float) -> None:
+    def update(self, references: References, heading: float, ratio: float, passed: float) -> None:
         """Write the velocity of this cycle to the references.
 
         Args:
             references: The desired motion.
             heading: Of the base [rad].
-            share: Share of the newest velocity that counts, no larger than `self.share`.
+            ratio: Factor of the newest velocity, no larger than `self.ratio`.
             passed: Time since the cycle before [s].
         """
         if not self.is_active:
             return
-        change, turn_change = self._limits
-        given = self._state, references.velocity, references.turn, heading, share
-        if follow(*given, passed, TARGETS_PATIENCE, change * passed, turn_change * passed):
+        change, yaw_change = self._limits
+        given = self._state, references.velocity, references.angular, heading, ratio
+        if follow(*given, passed, STREAM_TIMEOUT, change * passed, yaw_change * passed):
             self.start()
         elif self.progress < 1.0:
-            self._measure_progress(references, share)
+            self._measure_progress(references, ratio)
 
-    def _measure_progress(self, references: References, share: float) -> None:
-        """Compare velocity and turn with a share of those that were sent."""
-        x, y, z, turn = self._state[:IN_WORLD].tolist()
+    def _measure_progress(self, references: References, ratio: float) -> None:
+        """Compare velocity and yaw rate with those that were sent, times a ratio."""
+        x, y, z, yaw_rate = self._state[:IN_WORLD].tolist()
         progress = 1.0
-        if speed := share * math.hypot(x, y, z):
+        if speed := ratio * math.hypot(x, y, z):
             progress = math.hypot(*references.velocity.tolist()) / speed
-        if rate := share * abs(turn):
-            progress = min(progress, abs(references.turn.item(2)) / rate)
-        self.progress = 1.0 if progress > DRIVE_REACH_TOLERANCE else progress
+        if rate := ratio * abs(yaw_rate):
+            progress = min(progress, abs(references.angular.item(2)) / rate)
+        self.progress = 1.0 if progress > 0.99 else progress

@@ -6,7 +6,7 @@ from solfer.components.wheeled_motion.drive import Drive
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.support.straight import StraightAhead
 from solfer.components.wheeled_motion.tags import DrivingTags
-from solfer.components.wheeled_motion.targets import TARGETS_PATIENCE, Targets
+from solfer.components.wheeled_motion.targets import STREAM_TIMEOUT, Targets
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.interfaces.support import BASE_PORT
 from solfer.throttle import Throttle
@@ -40,9 +40,9 @@ class ReferenceInputs:
         self._throttle = Throttle(log)
 
     @property
-    def share(self) -> float:
-        """Share of the velocities of others that is not larger than it may be: one of base and vertices."""
-        return min(self.drive.share, self.targets.share)
+    def ratio(self) -> float:
+        """Factor that scales the velocities of others to their limits: one of base and vertices."""
+        return min(self.drive.ratio, self.targets.ratio)
 
     @property
     def are_abandoned(self) -> bool:
@@ -86,10 +86,10 @@ class ReferenceInputs:
         if were_abandoned:
             what = "position" if self.targets.are_places_abandoned else "velocity"
             self._throttle.warning(
-                "silence", "%s: no %s for %.2f s, it comes to rest", self._name, what, TARGETS_PATIENCE
+                "silence", "%s: no %s for %.2f s, it comes to rest", self._name, what, STREAM_TIMEOUT
             )
-        self.drive.update(self._references, self._wheels.offsets.heading, self.share, passed)
-        self.targets.update(self._references, self.share, passed)
+        self.drive.update(self._references, self._wheels.offsets.heading, self.ratio, passed)
+        self.targets.update(self._references, self.ratio, passed)
         return were_abandoned and not self.are_abandoned and not self._references.waits
 
     def leave_out(self) -> None:

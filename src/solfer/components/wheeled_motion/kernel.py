@@ -6,49 +6,53 @@ from pathlib import Path
 import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
-from solfer.components.wheeled_motion.original.kernel import ORIGINAL_HALF_TURN, ORIGINAL_REST_ERROR, merge, nearest
+from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, REST_ERROR, merge, nearest
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
-STEERING_SMALLNESS, AWAKE, STEERING_PERSISTENT = 2.5e-3, 4e-3, 0.3
-"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is desired [m], after the
-third number [s]: an estimate of the base that is late for a moment would turn wheels on the spot, and they the base."""
+REST_DISTANCE = 2.5e-3
+"""Error of a vertex that its wheel rests with, where no motion is desired [m]."""
 
-LONGER, SPARE = 0.35, 0.1
-"""By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
-range another way has to end [rad]."""
+WAKE_DISTANCE = 4e-3
+"""Error of a vertex that lets its wheel steer again [m]."""
 
-STANDING_SHARE, STEERING_TURN_SHARE = 0.15, 0.1
-"""Share of `turn_correction` of a base that is not to turn, and of the rate at which it is to turn: a gyroscope with a
-wrong scale or sign cannot turn the robot much faster than commanded."""
+WAKE_TIME = 0.3
+"""Time for which that error has to last [s]: an estimate of the base that is late for a moment would turn wheels on the
+spot, and they the base."""
 
-STEERING_LEAD = 4.0
+EXTRA_ANGLE = 0.35
+"""By how much more than a quarter of a revolution a wheel goes on the way that it has begun [rad]."""
+
+END_MARGIN = 0.1
+"""How far from the end of its range another way has to end [rad]."""
+
+LEAD_CYCLES = 4.0
 """Cycles before the end of its range at which a wheel begins the other way."""
 
-PACE, LIMITS, HEADING, WAITS = range(4)
-"""Numbers of the references."""
+PACE, LIMIT_RATIO, HEADING, WAITS = range(4)
+"""Indices of the numbers of the references."""
 
-VELOCITY, TURN, PLACE = range(3)
+VELOCITY, ANGULAR, PLACE = range(3)
 """Rows of what is desired of the base."""
 
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
 """Rows of what is known of steered wheels."""
 
-_IMPROVED = ("across", "rate", "rests")
-
 TUNED = ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
 """Numbers of the original's law of steering."""
 
-LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *TUNED, "period")])
+LAW = np.dtype([(name, np.float64) for name in ("across", "rate", "rests", *TUNED, "period")])
 """Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
-_MERGED = ("motion", "motion_speed", "error", "error_speed")
-_KEPT = ("rest", "turn_left", "desired", "turn")
-
-WHEEL_DTYPE = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
+WHEEL_DTYPE = np.dtype(
+    [
+        *((name, np.float64) for name in ("angle", "aim", "motion", "motion_speed", "error", "error_speed")),
+        *((name, np.float64) for name in ("rest", "rotation_left", "desired", "rate")),
+    ]
+)
 """State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
 [rad, m/s]; whether it rests, 1 or less as its error persists, how far it has to turn [rad], the desired direction of
-its contact point, and its rate."""
+its contact point, and the rate of that direction [rad/s]."""
 
 WHEELS_DTYPE = np.dtype(
     [
@@ -69,7 +73,10 @@ WHEELS_DTYPE = np.dtype(
         *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
         # rates by which errors go away, and desired rates
-        *((name, np.int64) for name in ("steering_rows", "aims", "most", "error", "gain", "rates", "away", "forward")),
+        *(
+            (name, np.int64)
+            for name in ("steering_rows", "aims", "largest_errors", "error", "gain", "rates", "away", "forward")
+        ),
         *((name, np.float64) for name in ("half", "furthest")),
         # largest speeds and accelerations of corrections, and largest speeds of corrections and motions together
         *((f"{name}_correction", np.float64) for name in ("base", "turn", "vertex")),
@@ -91,15 +98,15 @@ def _wrapped(angle, period):
 
 
 @part
-def _turn(wheel, wx, wy, period):
+def _find_rate(wheel, wx, wy, period):
     """Find how fast the desired direction of a vertex turns; one that jumps to the opposite one does not."""
     if wx == 0.0 and wy == 0.0:
-        wheel.turn = 0.0
+        wheel.rate = 0.0
         wheel.desired = math.nan
         return
     desired = math.atan2(wy, wx)
     # of a vertex that has just been at rest nothing is known
-    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(desired - wheel.desired, ORIGINAL_HALF_TURN) / period
+    wheel.rate = 0.0 if math.isnan(wheel.desired) else _wrapped(desired - wheel.desired, HALF_REVOLUTION) / period
     wheel.desired = desired
 
 
@@ -107,17 +114,17 @@ def _turn(wheel, wx, wy, period):
 def _keep(wheel, law, wx, wy, ex, ey):
     """Steer so that the vertex stays with its reference; see `Steering`."""
     distance = math.hypot(ex, ey)
-    _turn(wheel, wx, wy, law.period)
+    _find_rate(wheel, wx, wy, law.period)
     if wx != 0.0 or wy != 0.0:
         wheel.rest = 0.0
-    elif distance < (AWAKE if wheel.rest > 0.0 else STEERING_SMALLNESS):
+    elif distance < (WAKE_DISTANCE if wheel.rest > 0.0 else REST_DISTANCE):
         wheel.rest = 1.0
     else:
-        wheel.rest = max(wheel.rest - law.period / STEERING_PERSISTENT, 0.0)
+        wheel.rest = max(wheel.rest - law.period / WAKE_TIME, 0.0)
     if wheel.rest > 0.0:
         wheel.aim = wheel.angle
         return
-    gain = law.across * (1.0 - ORIGINAL_REST_ERROR / distance) if distance > ORIGINAL_REST_ERROR else 0.0
+    gain = law.across * (1.0 - REST_ERROR / distance) if distance > REST_ERROR else 0.0
     x = wx + gain * ex
     y = wy + gain * ey
     wheel.aim = nearest(math.atan2(y, x), wheel.angle)
@@ -144,12 +151,12 @@ def _steer(start):
     numbers = vector_at(memory.numbers, 4)
     heading = vector_at(memory.base, 1)[0]
     period = law.period
-    share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
-    turn = share * matrix_at(memory.motion, 3, 3)[TURN][2]
+    ratio = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMIT_RATIO]
+    yaw_rate = ratio * matrix_at(memory.motion, 3, 3)[ANGULAR][2]
     cos = math.cos(heading)
     sin = math.sin(heading)
-    vx = share * (cos * motion[0] + sin * motion[1])
-    vy = share * (cos * motion[1] - sin * motion[0])
+    vx = ratio * (cos * motion[0] + sin * motion[1])
+    vy = ratio * (cos * motion[1] - sin * motion[0])
     dx = pose[0] - before[0]
     dy = pose[1] - before[1]
     mx = (cos * dx + sin * dy) / period
@@ -166,8 +173,8 @@ def _steer(start):
         py = places[index, 1] - sy
         ex = errors[index, 0]
         ey = errors[index, 1]
-        wx = vx - py * turn + share * velocities[index, 0]
-        wy = vy + px * turn + share * velocities[index, 1]
+        wx = vx - py * yaw_rate + ratio * velocities[index, 0]
+        wy = vy + px * yaw_rate + ratio * velocities[index, 1]
         if law.across != 0.0:
             _keep(wheel, law, wx, wy, ex, ey)
         else:
@@ -178,7 +185,7 @@ def _steer(start):
             # it points where it does, and nothing waits for it
             angle = steered[MEASURED, index] - heading
             wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
-            wheel.motion_speed = wheel.error_speed = wheel.turn = steered[SPEEDS, index] = 0.0
+            wheel.motion_speed = wheel.error_speed = wheel.rate = steered[SPEEDS, index] = 0.0
             if memory.of_steering >= 0:
                 vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
         steered[ANGLES, index], steered[AIMS, index] = wheel.angle + heading, wheel.aim
@@ -206,7 +213,7 @@ def _find_base(place, pose, desired_place, desired_orientation, error):
 
 @part
 def _find_soft(angles, desired, half, most, error):
-    """Write the errors of angles of any number of half turns; references that are farther than `most` follow."""
+    """Write the errors of angles of any number of half revolutions; references that are farther than `most` follow."""
     for index in range(len(angles)):
         away = _wrapped(desired[index] - angles[index], half)
         error[index] = min(max(away, -most), most)
@@ -214,8 +221,8 @@ def _find_soft(angles, desired, half, most, error):
 
 
 @part
-def _choose_turns(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
-    """Write desired directions of wheels, by the shorter turn whose end is within the range of the steering joint.
+def _choose_rotations(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
+    """Write desired directions of wheels, by the shorter rotation whose end is within the range of the steering joint.
 
     The way goes from where the joint is measured, as the wheel is; its commanded position may be elsewhere, and has to
     be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its
@@ -223,25 +230,25 @@ def _choose_turns(wheels, angles, desired, rows, turning, measured, position, ve
     """
     for index in range(len(angles)):
         dof = turning[index]
-        turn_left = wheels[index].turn_left
+        rotation_left = wheels[index].rotation_left
         row = rows[index, dof]
         place = measured[dof]
-        turn_left += _wrapped(desired[index] - angles[index] - turn_left, ORIGINAL_HALF_TURN)
+        rotation_left += _wrapped(desired[index] - angles[index] - rotation_left, HALF_REVOLUTION)
         further = position[dof] + velocity[dof] * ahead
-        end = place + turn_left * row
+        end = place + rotation_left * row
         is_inside = lower[dof] < end < upper[dof]
         is_next_inside = lower[dof] < further < upper[dof]
         # what leaves the range shows which of the two others is the way back
-        toward = (further - position[dof]) * row if is_inside and not is_next_inside else turn_left
-        other = turn_left - math.copysign(ORIGINAL_HALF_TURN, toward)
+        toward = (further - position[dof]) * row if is_inside and not is_next_inside else rotation_left
+        other = rotation_left - math.copysign(HALF_REVOLUTION, toward)
         other_end = place + other * row
         is_inside = is_inside and is_next_inside
-        is_long = abs(turn_left) > ORIGINAL_HALF_TURN / 2.0 + LONGER
-        if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
-            turn_left = other
-        wheels[index].turn_left = turn_left
-        # half a turn away is not to be taken for no way at all
-        desired[index] = angles[index] + min(max(turn_left, -most), most)
+        is_long = abs(rotation_left) > HALF_REVOLUTION / 2.0 + EXTRA_ANGLE
+        if (is_long or not is_inside) and lower[dof] + END_MARGIN < other_end < upper[dof] - END_MARGIN:
+            rotation_left = other
+        wheels[index].rotation_left = rotation_left
+        # half a revolution away is not to be taken for no way at all
+        desired[index] = angles[index] + min(max(rotation_left, -most), most)
 
 
 def _find_errors(start):
@@ -255,7 +262,7 @@ def _find_errors(start):
     dofs = memory.dofs
     half = memory.half
     error = vector_at(memory.error, memory.rows)
-    most = vector_at(memory.most, 3)
+    largest_errors = vector_at(memory.largest_errors, 3)
     if memory.of_base >= 0:
         _find_base(
             vector_at(memory.place, 3),
@@ -279,20 +286,20 @@ def _find_errors(start):
             turning = indices_at(memory.turning_dofs, count)
             position = vector_at(memory.position, dofs)
             velocity = vector_at(memory.velocity, dofs)
-            ahead = STEERING_LEAD * _law_at(memory.law).period
+            ahead = LEAD_CYCLES * _law_at(memory.law).period
             wheels = _states_at(memory.wheels, count)
             angles = steered[MEASURED]
             given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
-            _choose_turns(*given, lower, upper, most[0], ahead)
-        _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
+            _choose_rotations(*given, lower, upper, largest_errors[0], ahead)
+        _find_soft(steered[MEASURED], desired, half, largest_errors[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles = vector_at(memory.camber, count)
         desired = vector_at(memory.desired_camber, count)
-        _find_soft(angles, desired, half, most[1], error[memory.of_camber :])
+        _find_soft(angles, desired, half, largest_errors[1], error[memory.of_camber :])
     if memory.of_caster >= 0:
         angles = vector_at(memory.caster, count)
         desired = vector_at(memory.desired_caster, count)
-        _find_soft(angles, desired, half, most[2], error[memory.of_caster :])
+        _find_soft(angles, desired, half, largest_errors[2], error[memory.of_caster :])
 
 
 def _find_soft_alone(angles, desired, half, most, error):
@@ -304,7 +311,7 @@ def _find_soft_alone(angles, desired, half, most, error):
 def _feed_forward(memory, forward):
     """Write the desired rates of base, steering and vertices."""
     count = memory.count
-    turning = matrix_at(memory.motion, 3, 3)[TURN]
+    turning = matrix_at(memory.motion, 3, 3)[ANGULAR]
     if memory.of_base >= 0:
         motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
         for k in range(3):
@@ -365,17 +372,17 @@ def _turn_ahead(memory, rates, gain, pace):
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
     wheels = _states_at(memory.wheels, memory.count)
-    most = vector_at(memory.most, 1)[0]
+    largest_error = vector_at(memory.largest_errors, 1)[0]
     error = vector_at(memory.error, memory.rows)
-    with_base = pace * matrix_at(memory.motion, 3, 3)[TURN][2]
+    with_base = pace * matrix_at(memory.motion, 3, 3)[ANGULAR][2]
     for index in range(memory.count):
         row = memory.of_steering + index
-        if abs(error[row]) < (1.0 - 1e-9) * most:
-            limit = most * gain[row]
-            rates[row] = min(max(rates[row] + wheels[index].turn, -limit), limit)
+        if abs(error[row]) < (1.0 - 1e-9) * largest_error:
+            limit = largest_error * gain[row]
+            rates[row] = min(max(rates[row] + wheels[index].rate, -limit), limit)
         if memory.lower:
-            least, largest = _room(memory, index)
-            rates[row] = min(max(rates[row], least + with_base), largest + with_base)
+            lower, upper = _room(memory, index)
+            rates[row] = min(max(rates[row], lower + with_base), upper + with_base)
 
 
 @part
@@ -427,11 +434,9 @@ def _find_rates(start, is_paced, feeds_forward):
         if memory.of_base >= 0:
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration
+            # a gyroscope with a wrong scale or sign cannot turn the robot much faster than commanded
             turn_most = memory.turn_correction
-            turn_most = min(
-                turn_most,
-                STANDING_SHARE * turn_most + STEERING_TURN_SHARE * abs(matrix_at(memory.motion, 3, 3)[TURN][2]),
-            )
+            turn_most = min(turn_most, 0.15 * turn_most + 0.1 * abs(matrix_at(memory.motion, 3, 3)[ANGULAR][2]))
             _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
             _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:

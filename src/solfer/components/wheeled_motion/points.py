@@ -58,13 +58,13 @@ class WheelAngles(CompiledPoint, abc.ABC):
 
 
 class Camber(WheelAngles):
-    """Camber of wheels [rad]: how far a wheel's plane leans against the ground's normal, -asin(axle's z)."""
+    """Camber of wheels [rad]: how far a wheel's plane is tilted against the ground's normal, -asin(axle's z)."""
 
     kernel = camber
 
 
 class Caster(WheelAngles):
-    """Caster of wheels [rad]: how far the axis of steering leans against the ground's normal, about the axle.
+    """Caster of wheels [rad]: how far the axis of steering is tilted against the ground's normal, about the axle.
 
     With the axis u of steering, z of the link that carries the wheel, the axle n and the normal z of the ground:
     atan2(z.(n x u), z.u).
@@ -109,9 +109,9 @@ class BasePose(CompiledPoint):
 class RollingOffsets(CompiledPoint):
     """Distances of the wheels' vertices behind their references along the rolling directions [m], negative.
 
-    A vertex p has the reference r in the frame of the base's heading: with the turn R about z by the heading and the
-    base's place b, the offset is x.((p - b) - R r), where x is the direction of rolling. What is across x is a matter
-    of steering. The Jacobian is that of a frame that turns with the heading, at the reference.
+    A vertex p has the reference r in the frame of the base's heading: with the rotation R about z by the heading and
+    the base's place b, the offset is x.((p - b) - R r), where x is the direction of rolling. What is across x is a
+    matter of steering. The Jacobian is that of a frame that turns with the heading, at the reference.
 
     The vertex of a wheel that is lifted is free: its offsets across x and upwards count, too. There are rows along x
     for all wheels, then across it, then upwards; the latter two are zero for wheels on the ground.

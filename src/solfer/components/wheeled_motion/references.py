@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import HEADING, LIMITS, PACE, WAITS
+from solfer.components.wheeled_motion.kernel import HEADING, LIMIT_RATIO, PACE, WAITS
 from solfer.components.wheeled_motion.pace.kernel import step
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import quaternion_product
@@ -18,7 +18,7 @@ class References:
 
     Attributes:
         velocity: Velocity of the base in the world, shape (3,) [m/s].
-        turn: Angular velocity of the base (x, y, z), of which z is the rate of the heading, shape (3,) [rad/s].
+        angular: Angular velocity of the base (x, y, z), of which z is the rate of the heading, shape (3,) [rad/s].
         vertex_velocity: Velocities of the vertices in the frame of the heading, shape (count, 3) [m/s].
         position: Position of the base in the world, shape (3,) [m].
         orientation: Orientation of the base, quaternion (x, y, z, w).
@@ -27,27 +27,27 @@ class References:
         caster: Caster of the wheels, shape (count,) [rad].
         tilt: Orientation of the base as seen from its heading, quaternion.
         lifted: Which wheels do not carry the robot, shape (count,).
-        motion: Velocity, turn and position, shape (3, 3).
+        motion: Velocity, angular velocity and position, shape (3, 3).
         places: Velocities of the vertices, and vertices, shape (2, count, 3).
         orientations: Orientation and tilt, shape (2, 4).
-        numbers: Pace, share of the limits, heading, and whether velocities wait, shape (4,).
+        numbers: Pace, factor by the limits, heading, and whether velocities wait, shape (4,).
     """
 
     def __init__(self, count: int):
         self.motion = np.zeros((3, 3))
         self.places = np.zeros((2, count, 3))
-        self.velocity, self.turn, self.position = self.motion
+        self.velocity, self.angular, self.position = self.motion
         self.vertex_velocity, self.vertices = self.places
         self.camber, self.caster = np.zeros((2, count))
         self.numbers = np.zeros(4)
         self.lifted = np.zeros(count, dtype=bool)
         self.orientations = np.zeros((2, 4))
         self.orientation, self.tilt = self.orientations
-        self.orientations[:, 3] = self.numbers[PACE] = self.numbers[LIMITS] = 1.0
+        self.orientations[:, 3] = self.numbers[PACE] = self.numbers[LIMIT_RATIO] = 1.0
 
     @property
     def pace(self) -> float:
-        """Share of the velocities with which they go on."""
+        """Factor of the velocities with which they go on."""
         return float(self.numbers[PACE])
 
     @pace.setter
@@ -56,8 +56,8 @@ class References:
 
     @property
     def limits(self) -> float:
-        """Share of them that is not larger than it may be."""
-        return float(self.numbers[LIMITS])
+        """Factor that scales them to their limits."""
+        return float(self.numbers[LIMIT_RATIO])
 
     @property
     def heading(self) -> float:
@@ -80,7 +80,7 @@ class References:
     def start(self, position: np.ndarray, heading: float, orientation: np.ndarray) -> None:
         """Begin with a base at rest, at a position [m], a heading [rad] and an orientation (quaternion)."""
         self.velocity[:] = 0.0
-        self.turn[:] = 0.0
+        self.angular[:] = 0.0
         self.vertex_velocity[:] = 0.0
         self.position[:] = position
         self.numbers[:3] = (1.0, 1.0, heading)
@@ -117,25 +117,25 @@ class KeptVelocities:
 
     Attributes:
         base: Velocity of the base, shape (3,) [m/s].
-        turn: Rate of its heading [rad/s].
+        yaw_rate: Rate of its heading [rad/s].
         vertices: Velocities of the vertices, shape (count, 3) [m/s].
     """
 
     def __init__(self, count: int):
         self.base = np.zeros(3)
-        self.turn = 0.0
+        self.yaw_rate = 0.0
         self.vertices = np.zeros((count, 3))
 
     def keep(self, references: References) -> None:
         """Keep what is desired now."""
         self.base[:] = references.velocity
-        self.turn = float(references.turn[2])
+        self.yaw_rate = float(references.angular[2])
         self.vertices[:] = references.vertex_velocity
 
     def restore(self, references: References) -> None:
         """Let it be desired again."""
         references.velocity[:] = self.base
-        references.turn[2] = self.turn
+        references.angular[2] = self.yaw_rate
         references.vertex_velocity[:] = self.vertices
 
 
@@ -154,5 +154,5 @@ def seen_from(heading: float, x: float, y: float) -> tuple[float, float]:
 
 
 def about_z(angle: float) -> tuple[float, float, float, float]:
-    """Return the quaternion of a turn about z [rad]."""
+    """Return the quaternion of a rotation about z [rad]."""
     return 0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0)

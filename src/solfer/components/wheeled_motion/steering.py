@@ -6,7 +6,7 @@ from solfer.components.wheeled_motion.kernel import LAW, TUNED, WHEEL_DTYPE
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 
-STEERING_RELAXATION = 1e-3
+RELAXATION_LENGTH = 1e-3
 """Way within which a wheel's direction follows that of its vertex, where errors across it count [m]."""
 
 
@@ -16,12 +16,12 @@ class Steering:
     With a gain of errors across the wheels, a wheel has to roll so that its vertex stays with its reference: in the
     direction of v + K (1 - d / |e|) e with the desired velocity v of the vertex, its error e and the gain K,
     where |e| is larger than d = 2 mm, and of v where it is not. The slower that is, the slower it is followed: within
-    the way of STEERING_RELAXATION. A wheel that is to be still rests where its error is small, until it is larger.
+    the way of `RELAXATION_LENGTH`. A wheel that is to be still rests where its error is small, until it is larger.
 
     Without it, two directions are merged, each low-passed the more, the slower what points there is: that of the wheel
     in the desired motion of the base, about its instantaneous centre of rotation, and that of its vertex' error. Each
-    is turned by half a turn, and its speed changes sign, where it is farther from the last direction of the wheel than
-    a quarter of a turn and 10 degrees. In the original program it is called `reactif`.
+    is turned by half a revolution, and its speed changes sign, where it is farther from the last direction of the wheel
+    than a quarter of a revolution and 10 degrees. In the original program it is called `reactif`.
 
     Args:
         tuning: Gains and margins.
@@ -32,19 +32,19 @@ class Steering:
 
     Attributes:
         angles: Directions in which wheels are to roll in the world, shape (count,) [rad]; live.
-        aims: Where to wheels aim, seen from the heading, shape (count,) [rad]; live.
+        aims: Where wheels aim, seen from the heading, shape (count,) [rad]; live.
         speeds: Speeds of the vertices in the desired motion, shape (count,) [m/s]; live.
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
         steered: These four, shape (4, count).
         law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
-        wheels: State of all wheels there, records WHEEL, shape (count,).
+        wheels: State of all wheels there, records `WHEEL_DTYPE`, shape (count,).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
 
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         self._given = period
         self._step = period
-        self.law = np.array((across, period / STEERING_RELAXATION, rests, *self.numbers(tuning), period), dtype=LAW)
+        self.law = np.array((across, period / RELAXATION_LENGTH, rests, *self.numbers(tuning), period), dtype=LAW)
         self.wheels = np.zeros(count, WHEEL_DTYPE)
         self.before = np.zeros(3)
         self.steered = np.zeros((4, count))
@@ -64,7 +64,7 @@ class Steering:
         """Set the time since the cycle before [s]."""
         if step != self._step:
             self._step = step
-            self.law["rate"] = step / STEERING_RELAXATION
+            self.law["rate"] = step / RELAXATION_LENGTH
             self.law["period"] = step
 
     def measure(self, directions: np.ndarray) -> None:
@@ -87,10 +87,10 @@ class Steering:
         """
         self.before[:2] = place
         self.before[2] = heading
-        self.wheels["turn_left"] = 0.0
+        self.wheels["rotation_left"] = 0.0
         if angles is not None:
             self.wheels[:] = np.zeros((), WHEEL_DTYPE)
             for direction in ("angle", "aim", "motion", "error"):
                 np.subtract(angles, heading, out=self.wheels[direction])
         self.wheels["desired"] = np.nan
-        self.wheels["turn"] = 0.0
+        self.wheels["rate"] = 0.0

@@ -19,31 +19,28 @@ VERTICES = "CONTACT_POINTS"
 CAMBER = "CAMBER"
 CASTER = "CASTER"
 
-SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
+ANGLE_ERRORS = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
 
-SOFT_PACED = 0.2
-"""That of the steering with `pace`, where the motion waits for its wheels [rad]."""
+PACED_STEERING_ERROR = 0.2
+"""Largest error of the steering with `pace`, where the motion waits for its wheels [rad]."""
 
 TASK_POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
 """Points of the component, by the tasks that they belong to."""
-
-IMPROVED = ("rest", "across", "pace")
-"""Tags of the improved law alone."""
 
 _TASK_OTHERS = "only `support_shaping` and `NwheelsZMPII` read it"
 _UNREAD = "nothing reads it, in the original neither"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
 Limit = Annotated[float, Field(gt=0.0, le=100.0)]
-Share = Annotated[float, Field(ge=0.0, le=1e3)]
+Factor = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
 class SteeringRecord(Record):
     """How wheels steer."""
 
-    icm: Share = Field(default=1.0, **LIVE, description="gain of the direction by the motion of the base")
-    sp: Share = Field(default=0.05, **LIVE, description="gain of the direction by the error of the wheel's vertex")
+    icm: Factor = Field(default=1.0, **LIVE, description="gain of the direction by the motion of the base")
+    sp: Factor = Field(default=0.05, **LIVE, description="gain of the direction by the error of the wheel's vertex")
     damp_icm: Margin = Field(
         default=2e-4, **LIVE, description="way in a cycle below which the first one counts less [m]"
     )
@@ -51,7 +48,7 @@ class SteeringRecord(Record):
         default=8e-4, **LIVE, description="way in a cycle below which the second one counts less [m]"
     )
     damp: Margin = Field(default=4e-4, **LIVE, description="the same of both together [m]")
-    tracking: Share = Field(default=1.0, **LIVE, description="speed for an error of the vertex [1/s]")
+    tracking: Factor = Field(default=1.0, **LIVE, description="speed for an error of the vertex [1/s]")
 
 
 class DrivingTags(OriginalTaskTags):
@@ -165,7 +162,7 @@ class DrivingTags(OriginalTaskTags):
     @model_validator(mode="after")
     def _check_law(self) -> "DrivingTags":
         """Raise a ValueError where a tag of the improved law is given that the original does not have."""
-        if self.is_original and (given := [tag for tag in IMPROVED if tag in self.model_fields_set]):
+        if self.is_original and (given := [tag for tag in ("rest", "across", "pace") if tag in self.model_fields_set]):
             raise ValueError(f"`law: original` with {', '.join(f'`{tag}`' for tag in given)}: it has none of these")
         return self
 

@@ -15,16 +15,13 @@ from solfer.interfaces.support import BASE_PORT, LEAD, VELOCITIES_PORT, VERTICES
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import FURTHEST_TARGET
 
-TARGETS_PATIENCE = 0.55
+STREAM_TIMEOUT = 0.55
 """Time after the last velocity, or the last place of a stream, when what it drives begins to stop [s]."""
-
-STREAM_JUMPS = (0.3, 0.5, 0.3)
-"""Distances between two places of a stream from which on one is a mistake: of base, heading, vertices [m, rad, m]."""
 
 
 @dataclass(frozen=True)
 class WheelsSupport:
-    """A `solfer/WheelsSupport`: x, y, z of each vertex in turn, seen from the heading of the base.
+    """A `solfer/WheelsSupport`: x, y, z of each vertex after the other, seen from the heading of the base.
 
     Attributes:
         position: Places [m]; empty: not given.
@@ -52,11 +49,11 @@ class Stream:
     @property
     def is_abandoned(self) -> bool:
         """Whether no more places come, though the last ones moved."""
-        return self.is_followed and self.is_moving and self.age > TARGETS_PATIENCE
+        return self.is_followed and self.is_moving and self.age > STREAM_TIMEOUT
 
     def note(self, step: float) -> None:
         """Take over a place that is so far from the one before [m or rad]."""
-        self.is_moving = self.is_followed and self.age <= TARGETS_PATIENCE and step > 0.0
+        self.is_moving = self.is_followed and self.age <= STREAM_TIMEOUT and step > 0.0
         self.age = 0.0
         self.is_followed = True
 
@@ -65,7 +62,7 @@ class Targets:
     """Lets references go to desired places, with limited speed and acceleration.
 
     A reference goes towards its place with the distance e by e / LEAD, as far as speeds and accelerations allow, by one
-    share for base, heading and vertices. So places that are ahead of a motion by the way of the time LEAD are followed
+    ratio for base, heading and vertices. So places that are ahead of a motion by the way of the time LEAD are followed
     without a lag, and while the pace holds the motion up its direction is known.
 
     Vertices follow places or velocities, whichever came last; the base follows a pose, as far as nothing else drives
@@ -79,7 +76,7 @@ class Targets:
     Attributes:
         ports: What the component receives by pipes: the pose `base` in the world, `vertices` and `vertex_velocities`
             seen from the heading of the base.
-        share: Share of the newest velocities, and of those to the newest places, that is not larger than it may be.
+        ratio: Factor that scales the newest velocities, or those to the newest places, to their limits.
     """
 
     def __init__(self, count: int, speeds: tuple[float, float, float], accelerations: tuple[float, float, float]):
@@ -110,7 +107,7 @@ class Targets:
     @property
     def is_abandoned(self) -> bool:
         """Whether base or vertices brake since nothing comes any more, though the last ones were to go on."""
-        return self.are_places_abandoned or (TARGETS_PATIENCE < self._age < math.inf and bool(self._desired.any()))
+        return self.are_places_abandoned or (STREAM_TIMEOUT < self._age < math.inf and bool(self._desired.any()))
 
     @property
     def are_places_abandoned(self) -> bool:
@@ -121,7 +118,7 @@ class Targets:
         """Begin without targets."""
         self._base, self._vertices = Stream(), Stream()
         self._age = math.inf
-        self.share = 1.0
+        self.ratio = 1.0
 
     def read(self) -> str:
         """Take over what the ports have received; return what is wrong with it, empty if nothing is."""
@@ -164,18 +161,18 @@ class Targets:
         self._places[1, 2] = move.turn_angle(self._places[1, 2])
         self._places[2:, 2] += move.rise
 
-    def update(self, references: References, share: float, passed: float) -> None:
+    def update(self, references: References, ratio: float, passed: float) -> None:
         """Write the velocities of this cycle to the references.
 
         Args:
             references: The desired motion.
-            share: Share of the received velocities that counts.
+            ratio: Factor of the received velocities.
             passed: Time since the cycle before [s].
         """
         if self._base.is_followed or self._vertices.is_followed:
             self._approach(references, passed)
         if self._age != math.inf:
-            self._drive_vertices(references, share, passed)
+            self._drive_vertices(references, ratio, passed)
 
     def _approach(self, references: References, passed: float) -> None:
         """Go to places from where the references are; what is abandoned comes to rest."""
@@ -186,37 +183,37 @@ class Targets:
         np.subtract(places[2:], references.vertices, out=errors[2:])
         # how high a wheel on the ground is, the ground says
         np.copyto(errors[2:, 2], 0.0, where=~references.lifted)
-        moving = references.velocity, references.turn, references.vertex_velocity
+        moving = references.velocity, references.angular, references.vertex_velocity
         if self._base.is_abandoned:
             errors[:2] = 0.0
         if self._vertices.is_abandoned:
             errors[2:] = 0.0
         first = 0 if self._base.is_followed else 2
         last = 2 + self._vertices.is_followed * self._count
-        self.share = approach(errors, self._limits, *moving, first, last, LEAD, passed)
+        self.ratio = approach(errors, self._limits, *moving, first, last, LEAD, passed)
         for stream, rates in ((self._base, moving[:2]), (self._vertices, moving[2:])):
             stream.age += passed
             if stream.is_abandoned and not any(rate.any() for rate in rates):
                 stream.is_followed = False
-                self.share = 1.0
+                self.ratio = 1.0
 
-    def _drive_vertices(self, references: References, share: float, passed: float) -> None:
+    def _drive_vertices(self, references: References, ratio: float, passed: float) -> None:
         """Follow velocities; without new ones come to rest."""
         self._age += passed
         velocity = references.vertex_velocity
         most = self._limits[2, 1] * passed
-        np.multiply(self._desired, share, out=self._change)
+        np.multiply(self._desired, ratio, out=self._change)
         np.subtract(self._change, velocity, out=self._change)
-        if self._age > TARGETS_PATIENCE:
+        if self._age > STREAM_TIMEOUT:
             np.negative(velocity, out=self._change)
         for change in self._change:
             size = math.sqrt(float(change.dot(change)))
             if size > most:
                 change *= most / size
         velocity += self._change
-        if self._age > TARGETS_PATIENCE and not velocity.any():
+        if self._age > STREAM_TIMEOUT and not velocity.any():
             self._age = math.inf
-            self.share = 1.0
+            self.ratio = 1.0
 
     def _aim_base(self, pose: np.ndarray) -> str:
         """Take over a desired pose, of whose orientation the heading counts; return what is wrong with it."""
@@ -224,14 +221,14 @@ class Targets:
             return f"'{BASE_PORT}' has a quaternion that has not the length 1"
         heading = heading_of(pose)
         step = float(np.linalg.norm(pose[:3] - self._places[0]))
-        turn = abs(math.remainder(heading - self._places[1, 2], math.tau))
+        yaw = abs(math.remainder(heading - self._places[1, 2], math.tau))
         if (
             self._base.is_moving
-            and self._base.age <= TARGETS_PATIENCE
-            and (step > STREAM_JUMPS[0] or turn > STREAM_JUMPS[1])
+            and self._base.age <= STREAM_TIMEOUT
+            and (step > 0.3 or yaw > 0.5)  # [m, rad] from which on a place is a mistake
         ):
-            return f"'{BASE_PORT}' jumps by {step:.2f} m and {turn:.2f} rad"
-        self._base.note(step + turn)
+            return f"'{BASE_PORT}' jumps by {step:.2f} m and {yaw:.2f} rad"
+        self._base.note(step + yaw)
         self._places[0] = pose[:3]
         self._places[1, 2] = heading
         return ""
@@ -239,7 +236,7 @@ class Targets:
     def _aim_vertices(self, places: np.ndarray) -> str:
         """Take over desired places of the vertices, z for lifted ones only; return what is wrong with them."""
         step = float(np.linalg.norm(places - self._places[2:], axis=1).max())
-        if self._vertices.is_moving and self._vertices.age <= TARGETS_PATIENCE and step > STREAM_JUMPS[2]:
+        if self._vertices.is_moving and self._vertices.age <= STREAM_TIMEOUT and step > 0.3:
             return f"'{VERTICES_PORT}' jump by {step:.2f} m"
         self._age = math.inf
         self._vertices.note(step)
@@ -250,7 +247,7 @@ class Targets:
         """Take over desired velocities of the vertices."""
         self._desired[:] = velocities
         fastest = max(math.hypot(*velocity) for velocity in self._desired.tolist())
-        self.share = min(1.0, float(self._limits[2, 0]) / max(fastest, 1e-12))
+        self.ratio = min(1.0, float(self._limits[2, 0]) / max(fastest, 1e-12))
         self._age, self._vertices = 0.0, Stream()
 
 

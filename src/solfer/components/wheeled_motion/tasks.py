@@ -6,17 +6,17 @@ import numpy as np
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.kernel import WHEELS_DTYPE, find_errors, find_rates, steer
-from solfer.components.wheeled_motion.original.kernel import ORIGINAL_HALF_TURN, ROUNDED
+from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, ROUNDED_PI
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import TaskRates
 from solfer.components.wheeled_motion.tags import (
+    ANGLE_ERRORS,
     BASE,
     CAMBER,
     CASTER,
     CONSTRAINTS,
-    SOFT,
-    SOFT_PACED,
+    PACED_STEERING_ERROR,
     STEERING,
     TASK_POINTS,
     VERTICES,
@@ -125,13 +125,19 @@ class DrivingTasks:
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*TASK_POINTS.items(), (STEERING, "steering"))},
             steering_rows=self.stack.jacobian[self.rows[STEERING]] if STEERING in first else 0,
             aims=self.aims,
-            most=np.array([SOFT_PACED if tags.is_paced else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
+            largest_errors=np.array(
+                [
+                    PACED_STEERING_ERROR if tags.is_paced else ANGLE_ERRORS[STEERING],
+                    ANGLE_ERRORS[CAMBER],
+                    ANGLE_ERRORS[CASTER],
+                ]
+            ),
             error=self.rates.error,
             gain=self.gain,
             rates=self.stack.velocity,
             away=self.rates.away,
             forward=self.rates.forward,
-            half=ORIGINAL_HALF_TURN if self._feeds_forward else ROUNDED,
+            half=HALF_REVOLUTION if self._feeds_forward else ROUNDED_PI,
         )
         self.limit(tags.speeds, tags.accelerations, (tags.correction, tags.turn_correction, tags.furthest))
 

@@ -12,9 +12,6 @@ from solfer.numerics.planar_move import PlanarMove
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.robot import Robot
 
-PARALLEL = 0.7
-"""Cosine of the angle between a joint's axis and the axle below it from which on the joint bends a leg."""
-
 
 class DrivenWheels:
     """The wheels that a component drives on, and the points of its tasks.
@@ -149,7 +146,8 @@ def steered_by(robot: Robot, tags: DrivingTags, wheel: ContactRecord) -> int:
     joint = robot.description.links[carrier].parent
     if joint in robot.dofs:
         axle = _carried_axle(robot, tags, carrier, link=wheel.end_frame, axle=_axle(tags, wheel))
-        if abs(float(axle.dot(robot.description.joints[joint].axis))) < PARALLEL:
+        # the joint bends the leg if its axis and the axle are nearly parallel
+        if abs(float(axle.dot(robot.description.joints[joint].axis))) < 0.7:
             return robot.dof(joint)
     raise ComponentError(
         f"nothing steers the wheel '{wheel.end_frame}'",

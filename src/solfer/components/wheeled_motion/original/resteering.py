@@ -1,14 +1,11 @@
-"""Wheels that have reached the end of their steering turn back by half a turn or more."""
+"""Wheels that have reached the end of their steering turn back by nearly half a revolution."""
 
 import math
 
 import numpy as np
 
-BEYOND, RESTEERING_CYCLES = 0.005, 20
-"""How far a command has to be beyond a limit [rad], and for how many cycles in a row, before the wheel turns back."""
-
-RESTEERING_STEP, RESTEERING_MAXIMUM = math.radians(5.0), 2.8
-"""How far it turns in each cycle, and altogether at least [rad]."""
+STEP_ANGLE = math.radians(5.0)
+"""How far a wheel turns back in each cycle [rad]."""
 
 
 class Resteering:
@@ -35,20 +32,21 @@ class Resteering:
     def update(self, measured: np.ndarray, commanded: np.ndarray) -> None:
         """Write what joints are to do that turn back; both have shape (m,) [rad]."""
         for index, (state, command) in enumerate(zip(measured.tolist(), commanded.tolist(), strict=True)):
-            if self.sides[index] and abs(state - self._starts[index]) >= RESTEERING_MAXIMUM:
+            if self.sides[index] and abs(state - self._starts[index]) >= 2.8:  # [rad] altogether
                 self.sides[index] = 0.0
             if not self.sides[index]:
                 self._watch(index, state, command)
             if self.sides[index]:
-                commanded[index] = state + self.sides[index] * RESTEERING_STEP
+                commanded[index] = state + self.sides[index] * STEP_ANGLE
 
     def _watch(self, index: int, state: float, command: float) -> None:
         lower = self._lower[index]
         upper = self._upper[index]
-        is_low = command < lower - BEYOND and state < lower + BEYOND
-        is_high = command > upper + BEYOND and state > upper - BEYOND
+        tolerance = 0.005  # [rad] by which a command has to be beyond the limit
+        is_low = command < lower - tolerance and state < lower + tolerance
+        is_high = command > upper + tolerance and state > upper - tolerance
         self._counts[index] = self._counts[index] + 1 if is_low or is_high else 0
-        if self._counts[index] >= RESTEERING_CYCLES:
+        if self._counts[index] >= 20:  # cycles in a row
             self.sides[index] = 1.0 if is_low else -1.0
             self._starts[index] = state
             self._counts[index] = 0

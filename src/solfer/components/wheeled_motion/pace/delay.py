@@ -1,9 +1,6 @@
 """How far a motion is behind the clock, and how it makes up for that."""
 
-MAKE_UP = 0.2
-"""Others slow down in this time for what a motion is behind the clock [s]: cycles that were too late, a slow robot."""
-
-ROLLED = 0.3
+ROLLING_TIMEOUT = 0.3
 """Longest time for which wheels roll on as they were commanded last [s]: then the lower level stops them."""
 
 
@@ -11,7 +8,7 @@ class ClockDelay:
     """How far the motion is behind the clock.
 
     Attributes:
-        share: Share of the received velocities with which others go on while the motion makes up for it, from 0 to 1.
+        ratio: Ratio of the received velocities with which others go on while the motion makes up for it, from 0 to 1.
     """
 
     def __init__(self) -> None:
@@ -20,7 +17,7 @@ class ClockDelay:
     def start(self) -> None:
         """Begin on time."""
         self._behind = 0.0
-        self.share = 1.0
+        self.ratio = 1.0
 
     def advance(self, step: float, passed: float, lost: float) -> float:
         """Take over the times of a cycle.
@@ -34,8 +31,9 @@ class ClockDelay:
             For how much longer than `step` wheels have rolled on since the cycle before [s]. The pace makes up for the
             rest of a gap.
         """
-        rolled = max(step, min(passed, ROLLED))
+        rolled = max(step, min(passed, ROLLING_TIMEOUT))
         self._behind += passed + lost - rolled
-        self.share = max(0.0, 1.0 - self._behind / MAKE_UP)
-        self._behind -= (1.0 - self.share) * (passed + lost)
+        # others slow down for what the motion is behind the clock: at 0.2 s they wait
+        self.ratio = max(0.0, 1.0 - self._behind / 0.2)
+        self._behind -= (1.0 - self.ratio) * (passed + lost)
         return rolled - step

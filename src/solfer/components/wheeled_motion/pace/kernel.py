@@ -1,4 +1,4 @@
-"""How motions go on, compiled: the share of what is desired, where references come to, and velocities of others."""
+"""How motions go on, compiled: the ratio of what is desired, where references come to, and velocities of others."""
 
 import math
 
@@ -7,27 +7,15 @@ import numpy as np
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import matrix_at, record_at, vector_at
 
-SIDEWAYS = 4e-3
+LATERAL_SPEED = 4e-3
 """Speed across a wheel with which its vertex may leave its way [m/s]."""
 
-PACE_DECAY_RATE, PACE_RECOVERY_RATE = 8.0, 1.0
-"""How fast the pace falls and rises where joints are at their bounds [1/s]."""
+PACE, LIMIT_RATIO, HEADING = range(3)
+"""Indices of the numbers of the references."""
 
-RISING, BRAKING_FACTOR, STARTING_FACTOR = 2.0, 4.0, 3.0
-"""By how much more than `acceleration` vertices go on and brake by the pace, and start where more is desired."""
-
-PACE_LOWEST_SPEED, PACE_ARRIVAL_DISTANCE = 4e-3, 1e-9
-"""Speed with which the rest of a way to a place is gone [m/s, rad/s], and the distance that is none [m, rad]."""
-
-PACE, LIMITS, HEADING = range(3)
-"""Numbers of the references."""
-
-AIMS, SPEEDS_ROW, MEASURED_ROW = 1, 2, 3
-"""Rows of what is known of steered wheels."""
-
-VALUE, MOST, HELD, SHARE, SPEED = range(5)
-"""State of the pace: see `solfer.components.wheeled_motion.pace.path.PathPace`; the share by itself, and the fastest
-vertex at it [m/s]."""
+VALUE, LIMITED, HELD, FOLLOWED, SPEED = range(5)
+"""State of the pace, see `solfer.components.wheeled_motion.pace.path.PathPace`: the pace, the factor by the limits,
+that of joints at their bounds, that which wheels and joints can follow, and the fastest vertex at it [m/s]."""
 
 GOING = np.dtype(
     [
@@ -42,47 +30,52 @@ desired. Then largest speeds, and the largest acceleration of a vertex."""
 
 _going_at = record_at(GOING)
 
-DESIRED_X, DESIRED_Y, DESIRED_Z, DESIRED_TURN, IN_WORLD, AGE, BEFORE = range(7)
+DESIRED_X, DESIRED_Y, DESIRED_Z, DESIRED_YAW_RATE, IN_WORLD, AGE, BEFORE = range(7)
 """State of velocities that others send; see `solfer.components.wheeled_motion.drive.Drive`."""
 
 
 @part
 def _limit(memory, state):
-    """Find the share of what is desired that is not larger than it may be."""
+    """Find the factor that scales what is desired to the limits."""
     motion = matrix_at(memory.motion, 3, 3)
     velocity = motion[0]
-    turn = motion[1]
+    angular = motion[1]
     vertices = matrix_at(memory.vertices, memory.count, 3)
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-    share = memory.base_speed / max(memory.base_speed, speed)
-    share = min(share, memory.turn_speed / max(memory.turn_speed, abs(turn[2])))
+    ratio = memory.base_speed / max(memory.base_speed, speed)
+    ratio = min(ratio, memory.turn_speed / max(memory.turn_speed, abs(angular[2])))
     for index in range(memory.count):
         speed = math.sqrt(vertices[index, 0] ** 2 + vertices[index, 1] ** 2 + vertices[index, 2] ** 2)
-        share = min(share, memory.vertex_speed / max(memory.vertex_speed, speed))
-    state[MOST], state[VALUE] = share, share * state[SHARE]
+        ratio = min(ratio, memory.vertex_speed / max(memory.vertex_speed, speed))
+    state[LIMITED], state[VALUE] = ratio, ratio * state[FOLLOWED]
 
 
 @part
 def _update(memory, state, is_held, most, passed):
-    """Find the share with which wheels and joints can follow."""
+    """Find the ratio with which wheels and joints can follow."""
     steered = matrix_at(memory.steered, 4, memory.count)
+    aims_row = 1
+    speeds_row = 2
+    measured_row = 3
     heading = vector_at(memory.base, 1)[0]
     fastest = 0.0
-    across = SIDEWAYS
+    across = LATERAL_SPEED
     for index in range(memory.count):
-        speed = steered[SPEEDS_ROW, index]
+        speed = steered[speeds_row, index]
         fastest = max(fastest, speed)
-        across = max(across, speed * abs(math.sin(steered[AIMS, index] - steered[MEASURED_ROW, index] + heading)))
-    change = (-PACE_DECAY_RATE if is_held else PACE_RECOVERY_RATE) * passed
-    state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - PACE_DECAY_RATE * passed))
-    share = min(SIDEWAYS / across, state[HELD])
+        across = max(across, speed * abs(math.sin(steered[aims_row, index] - steered[measured_row, index] + heading)))
+    decay_rate = 8.0  # [1/s] where joints are at their bounds; it recovers with 1/s
+    change = (-decay_rate if is_held else 1.0) * passed
+    state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - decay_rate * passed))
+    ratio = min(LATERAL_SPEED / across, state[HELD])
     if fastest > 0.0:
-        before = state[SHARE]
+        before = state[FOLLOWED]
         step = memory.acceleration * passed / fastest
-        least = min(before, state[SPEED] / fastest) - BRAKING_FACTOR * step
-        share = min(max(share, least), before + RISING * step, state[SPEED] / fastest + STARTING_FACTOR * step)
-    state[SHARE], state[SPEED] = share, share * fastest
-    state[VALUE] = share * state[MOST]
+        # vertices go on with twice the acceleration, brake with four times, and start with three times
+        lower = min(before, state[SPEED] / fastest) - 4.0 * step
+        ratio = min(max(ratio, lower), before + 2.0 * step, state[SPEED] / fastest + 3.0 * step)
+    state[FOLLOWED], state[SPEED] = ratio, ratio * fastest
+    state[VALUE] = ratio * state[LIMITED]
 
 
 @part
@@ -98,7 +91,7 @@ def _multiply(a, b, out):
 def _step(numbers, motion, velocities, vertices, orientations, period):
     """Let references go on for a time, at the pace."""
     velocity = motion[0]
-    turn = motion[1]
+    angular = motion[1]
     position = motion[2]
     orientation = orientations[0]
     tilt = orientations[1]
@@ -108,11 +101,11 @@ def _step(numbers, motion, velocities, vertices, orientations, period):
     for index in range(len(vertices)):
         for k in range(3):
             vertices[index, k] += time * velocities[index, k]
-    heading = numbers[HEADING] + time * turn[2]
+    heading = numbers[HEADING] + time * angular[2]
     numbers[HEADING] = heading - 2.0 * math.pi * math.floor(heading / (2.0 * math.pi) + 0.5)
-    if turn[0] != 0.0 or turn[1] != 0.0:
-        roll = 0.5 * time * turn[0]
-        pitch = 0.5 * time * turn[1]
+    if angular[0] != 0.0 or angular[1] != 0.0:
+        roll = 0.5 * time * angular[0]
+        pitch = 0.5 * time * angular[1]
         both = (
             math.sin(roll) * math.cos(pitch),
             math.cos(roll) * math.sin(pitch),
@@ -143,7 +136,7 @@ def _advance(start, is_paced, is_first, is_held, most, passed):
         _limit(memory, state)
         if not is_first:
             _update(memory, state, is_held, most, passed)
-        numbers[LIMITS], numbers[PACE] = state[MOST], state[VALUE]
+        numbers[LIMIT_RATIO], numbers[PACE] = state[LIMITED], state[VALUE]
     both = matrix_at(memory.vertices, 2 * count, 3)
     vertices = both[count:]
     motion = matrix_at(memory.motion, 3, 3)
@@ -156,14 +149,14 @@ def _step_alone(motion, places, orientations, numbers, period):
     _step(numbers, motion, places[0], places[1], orientations, period)
 
 
-def _follow(state, velocity, turn, heading, counted, passed, patience, change, turn_change):
-    """Write the velocity of this cycle that follows a share of one that is sent; return whether it rests for good."""
+def _follow(state, velocity, angular, heading, counted, passed, timeout, change, yaw_change):
+    """Write the velocity of this cycle that follows a ratio of the one sent; return whether it rests for good."""
     state[AGE] += passed
     x = velocity[0]
     y = velocity[1]
     z = velocity[2]
     in_world = state[IN_WORLD] != 0.0
-    is_old = state[AGE] > patience
+    is_old = state[AGE] > timeout
     # what is seen from the heading turns with it, which is no change
     before = 0.0 if in_world else (heading if math.isnan(state[BEFORE]) else state[BEFORE])
     state[BEFORE] = heading
@@ -176,16 +169,16 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
     dy = counts * state[DESIRED_Y] - vy
     dz = counts * state[DESIRED_Z] - z
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
-    share = 1.0 if size <= change else change / size
-    vx = vx + share * dx
-    vy = vy + share * dy
-    z = z + share * dz
-    turn[2] += min(max(counts * state[DESIRED_TURN] - turn[2], -turn_change), turn_change)
+    ratio = 1.0 if size <= change else change / size
+    vx = vx + ratio * dx
+    vy = vy + ratio * dy
+    z = z + ratio * dz
+    angular[2] += min(max(counts * state[DESIRED_YAW_RATE] - angular[2], -yaw_change), yaw_change)
     cos, sin = (1.0, 0.0) if in_world else (math.cos(heading), math.sin(heading))
     velocity[0], velocity[1], velocity[2] = cos * vx - sin * vy, sin * vx + cos * vy, z
-    if is_old and math.sqrt(vx * vx + vy * vy + z * z + turn[2] * turn[2]) < 1e-12:
+    if is_old and math.sqrt(vx * vx + vy * vy + z * z + angular[2] * angular[2]) < 1e-12:
         velocity[:] = 0.0
-        turn[2] = 0.0
+        angular[2] = 0.0
         return True
     return False
 
@@ -193,16 +186,17 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
 @part
 def _gain(distance, lead, passed):
     """Return the velocity for each metre of an error: its last two millimetres take half a second."""
-    return 0.0 if distance < PACE_ARRIVAL_DISTANCE else min(max(1.0 / lead, PACE_LOWEST_SPEED / distance), 1.0 / passed)
+    lowest_speed = 4e-3  # [m/s, rad/s]
+    return 0.0 if distance < 1e-9 else min(max(1.0 / lead, lowest_speed / distance), 1.0 / passed)
 
 
-def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead, passed):
-    """Let velocities go to errors / lead, times one share so that none is larger than it may be; return that share.
+def _approach(errors, limits, velocity, angular, vertex_velocity, first, last, lead, passed):
+    """Let velocities go to errors / lead, times one ratio so that none is larger than it may be; return that ratio.
 
     Rows of the base, of its heading, and of the vertices count from `first` to `last`. No speed is larger than that
     from which its way can be braked.
     """
-    share = 1.0
+    ratio = 1.0
     for index in range(first, last):
         error = errors[index]
         step = 0.5 * limits[index, 1] * passed
@@ -210,20 +204,20 @@ def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead
         most = min(limits[index, 0], math.sqrt(step * step + 2.0 * limits[index, 1] * distance) - step)
         speed = _gain(distance, lead, passed) * distance
         if speed > most:
-            share = min(share, most / speed)
+            ratio = min(ratio, most / speed)
     for index in range(first, last):
-        rate = velocity if index == 0 else turn if index == 1 else vertex_velocity[index - 2]
+        rate = velocity if index == 0 else angular if index == 1 else vertex_velocity[index - 2]
         error = errors[index]
         begin = 2 if index == 1 else 0
         most = limits[index, 1] * passed
-        gain = share * _gain(math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2), lead, passed)
+        gain = ratio * _gain(math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2), lead, passed)
         size = 0.0
         for k in range(begin, 3):
             size += (gain * error[k] - rate[k]) ** 2
-        part_of = 1.0 if size <= most * most else most / math.sqrt(size)
+        fraction = 1.0 if size <= most * most else most / math.sqrt(size)
         for k in range(begin, 3):
-            rate[k] += part_of * (gain * error[k] - rate[k])
-    return share
+            rate[k] += fraction * (gain * error[k] - rate[k])
+    return ratio
 
 
 _VECTOR = "float64[::1]"

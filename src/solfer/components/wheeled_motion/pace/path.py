@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.wheeled_motion.pace.kernel import GOING, HELD, MOST, SHARE, SPEED, VALUE, advance
+from solfer.components.wheeled_motion.pace.kernel import FOLLOWED, GOING, HELD, LIMITED, SPEED, VALUE, advance
 from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
@@ -12,13 +12,13 @@ from solfer.numerics.pointers import Memory
 
 
 class PathPace:
-    """The share of all desired velocities that goes on, from 0 to 1, and the references that go on with it.
+    """The ratio of all desired velocities that goes on, from 0 to 1, and the references that go on with it.
 
     No velocity is larger than it may be. A wheel that does not point to where it aims leaves its way with the speed
     v |sin d|, with the desired speed v of its vertex and the angle d between both: the pace keeps it below
-    SIDEWAYS. It also falls as long as joints at their bounds leave base or vertices slower than desired. Speeds
-    along the path rise with RISING times `acceleration`, and fall with BRAKING times as much; where velocities jump to
-    larger ones, vertices follow with STARTING times the acceleration.
+    4 mm/s. It also falls as long as joints at their bounds leave base or vertices slower than desired. Speeds
+    along the path rise with twice the `acceleration`, and fall with four times; where velocities jump to larger ones,
+    vertices follow with three times the acceleration.
 
     Args:
         speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].
@@ -41,7 +41,7 @@ class PathPace:
     ):
         self.is_found = True
         self._state = np.zeros(5)
-        base, turn, vertex = speeds
+        base, heading, vertex = speeds
         self._memory = Memory(
             GOING,
             count=len(references.lifted),
@@ -54,7 +54,7 @@ class PathPace:
             orientations=references.orientations,
             desired=offsets.reference,
             base_speed=base,
-            turn_speed=turn,
+            turn_speed=heading,
             vertex_speed=vertex,
             acceleration=acceleration,
         )
@@ -74,12 +74,12 @@ class PathPace:
 
     @property
     def held(self) -> float:
-        """Share that joints at their bounds leave."""
+        """Ratio that joints at their bounds leave."""
         return float(self._state[HELD])
 
     def start(self) -> None:
         """Begin without a motion, which could go on in full."""
-        self._state[[VALUE, MOST, HELD, SHARE]] = 1.0
+        self._state[[VALUE, LIMITED, HELD, FOLLOWED]] = 1.0
         self._state[SPEED] = 0.0
 
     def advance(self, is_paced: bool, is_first: bool, is_held: bool, most: float, passed: float) -> None:

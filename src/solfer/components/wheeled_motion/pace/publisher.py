@@ -3,13 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-PUBLISH_PERIOD, PUBLISH_CHANGE = 0.1, 0.02
-"""Longest time between two messages of the pace [s], and by how much it changes before one goes out at once."""
-
 
 @dataclass(frozen=True)
 class MotionPace:
-    """A `std_msgs/Float64`: the share of the received velocities with which the motion goes on, from 0 to 1."""
+    """A `std_msgs/Float64`: the ratio of the received velocities with which the motion goes on, from 0 to 1."""
 
     data: float = 1.0
 
@@ -24,7 +21,7 @@ class PacePublisher:
 
     def __init__(self, pace: Callable[[], float], period: float):
         self._pace = pace
-        self._cycles = max(1, round(PUBLISH_PERIOD / period))
+        self._cycles = max(1, round(0.1 / period))  # [s] between two messages at most
         self._left = 0
         self._published = 1.0
 
@@ -36,7 +33,7 @@ class PacePublisher:
         """Return what is to be published after this cycle; None: nothing."""
         self._left -= 1
         pace = self._pace()
-        if self._left > 0 and abs(pace - self._published) < PUBLISH_CHANGE:
+        if self._left > 0 and abs(pace - self._published) < 0.02:
             return None
         self._left = self._cycles
         self._published = pace

@@ -1,8 +1,8 @@
 """What carries the robot: the support polygon, and wheels that leave it and come back."""
 
 from solfer.components.wheeled_motion.support.guard import MotionGuard, TaskRates
-from solfer.components.wheeled_motion.support.lifting import LIFTING_TIMEOUT, Lifting
+from solfer.components.wheeled_motion.support.lifting import Lifting
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.support.weight import WeightShift
 
-__all__ = ["LIFTING_TIMEOUT", "Lifting", "MotionGuard", "SupportPolygon", "TaskRates", "WeightShift"]
+__all__ = ["Lifting", "MotionGuard", "SupportPolygon", "TaskRates", "WeightShift"]

@@ -1,4 +1,4 @@
-"""Where motions come to rest: the margin of the support polygon, wheels that lean, legs that do not reach farther."""
+"""Where motions come to rest: the margin of the support polygon, wheels that tilt, legs that do not reach farther."""
 
 import logging
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ from solfer.components.wheeled_motion.support.kernel import (
     MARGIN,
     NOTHING,
     POLYGON,
+    REASON,
     STATE_SIZE,
-    WHY,
     hold_back,
 )
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
@@ -23,12 +23,6 @@ from solfer.numerics.pointers import Memory
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
-
-LEAN = 0.5
-"""How far camber and caster may be away from what is desired of them [rad]: steering fails where wheels lean more."""
-
-GUARD_DISTANCE = 0.02
-"""How far vertices may be away from their references along the ways of their wheels [m]: legs do not reach farther."""
 
 
 class TaskRates(NamedTuple):
@@ -81,9 +75,10 @@ class MotionGuard:
         self._throttle = Throttle(log)
         self._names = tuple(legs)
         kinds = (
-            (CAMBER, "camber", "rad", LEAN),
-            (CASTER, "caster", "rad", LEAN),
-            (VERTICES, "vertex", "m", GUARD_DISTANCE),
+            # steering fails where wheels tilt more, and legs do not reach farther along the ways of their wheels
+            (CAMBER, "camber", "rad", 0.5),
+            (CASTER, "caster", "rad", 0.5),
+            (VERTICES, "vertex", "m", 0.02),
         )
         watched = [
             (f"{what} of '{wheel}'", unit, most, rows[task].start + index)
@@ -117,14 +112,14 @@ class MotionGuard:
             legs=np.array(list(legs.values()), dtype=np.int64),
             turning_count=len(turning),
             turning=turning,
-            least=polygon.least,
+            required_margin=polygon.required_margin,
         )
         self._address = self._memory.address
 
-    def leave(self, least: float) -> None:
+    def set_required_margin(self, margin: float) -> None:
         """Set the margin that motions leave [m]."""
-        self.polygon.least = least
-        self._memory.record["least"] = least
+        self.polygon.required_margin = margin
+        self._memory.record["required_margin"] = margin
 
     @property
     def margin(self) -> float:
@@ -134,7 +129,7 @@ class MotionGuard:
     @property
     def why(self) -> str:
         """What holds the motion; empty: nothing."""
-        why = int(self._state[WHY])
+        why = int(self._state[REASON])
         amount = self._state[AMOUNT]
         if why == NOTHING:
             return ""
@@ -160,7 +155,7 @@ class MotionGuard:
         """Shorten joint velocities that would use up the margin; return whether the motion is held.
 
         Args:
-            pace: Share of the desired rates that goes on.
+            pace: Ratio of the desired rates that goes on.
             is_bound: Whether a joint is at its bound.
             passed: Time since the cycle before [s].
         """

@@ -1,4 +1,4 @@
-"""Where motions come to rest, compiled: the support polygon, wheels that lean, legs that do not reach farther."""
+"""Where motions come to rest, compiled: the support polygon, wheels that tilt, legs that do not reach farther."""
 
 import math
 
@@ -7,35 +7,11 @@ import numpy as np
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
 
-HORIZON = 0.25
-"""Time in which a motion may use up what is left of the margin [s]."""
-
-GUARD_TOP_SPEED = 0.4
-"""Speed that no motion has [m/s]: edges that are far enough for it do not count."""
-
-LACK = 1e-3
-"""What velocities may lack of what is desired, where joints are at their bounds [m/s, rad/s]."""
-
-SWIFT, STRAIGHT_SPEED = 0.5, 25.0
-"""Speed of a leg's joint [rad/s], and by the speed of the motion [rad/m], beyond which a leg is nearly straight."""
-
-STEERING_SPEED_SHARE = 0.25
-"""The same by the speed of a joint that steers: wheels that lean and turn move their legs."""
-
-RETRY = 1.0
-"""Time after which a motion that is held tries to go on [s]."""
-
-ASIDE = 0.5
-"""Cosine of the angle to the way that is held, below which another way is free."""
-
-GUARD_WORSENING = 1.1
-"""Share of what held one way that holds another one, too."""
-
 FIRST, SECOND, INSIDE, NORMAL_X, NORMAL_Y, EDGE_SIZE = range(6)
 """Columns of edges: vertices, distance of the centre of mass, normal to the inside; and how many there are."""
 
-MARGIN, WHY, AMOUNT, WORST, AGE, STATE_SIZE = range(6)
-"""State of the guard: margin [m], what holds the motion, by how much, by which share of its bound, since when [s]."""
+MARGIN, REASON, AMOUNT, WORST, AGE, STATE_SIZE = range(6)
+"""State of the guard: margin [m], what holds the motion, by how much, by which ratio to its bound, since when [s]."""
 
 NOTHING, POLYGON, FIRST_ROW = range(3)
 """What holds the motion: nothing, the margin, the first of the rows that are watched; joints of legs follow these."""
@@ -52,7 +28,7 @@ GUARD = np.dtype(
         # rows that are watched, and their bounds; joints of the legs, and those that steer
         *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds")),
         *((name, np.int64) for name in ("leg_count", "legs", "turning_count", "turning")),
-        ("least", np.float64),
+        ("required_margin", np.float64),
     ]
 )
 """What `hold_back` reads and writes, see `solfer.numerics.pointers.Memory`."""
@@ -128,37 +104,39 @@ def _rate(memory, points, edge, velocity):
     b = vector_at(points[second, 0], 2)
     c = vector_at(points[center, 0], 2)
     along = (c[0] - a[0]) * (b[0] - a[0]) + (c[1] - a[1]) * (b[1] - a[1])
-    share = along / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
+    ratio = along / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
     nx = edge[NORMAL_X]
     ny = edge[NORMAL_Y]
     dofs = memory.dofs
     start = _along(points[first, 1], dofs, nx, ny, velocity)
     end = _along(points[second, 1], dofs, nx, ny, velocity)
-    return _along(points[center, 1], dofs, nx, ny, velocity) - start - share * (end - start)
+    return _along(points[center, 1], dofs, nx, ny, velocity) - start - ratio * (end - start)
 
 
 @part
 def _keep_margin(memory, state, velocity):
-    """Find the share of joint velocities with which the margin does not fall below what is left, and the margin."""
+    """Find the ratio of joint velocities with which the margin does not fall below what is left, and the margin."""
     points = indices_at(memory.points, 2 * (memory.count + 1)).reshape((memory.count + 1, 2))
     edges = matrix_at(memory.edges, memory.count, EDGE_SIZE)
     lifted = flags_at(memory.lifted, memory.count)
     order = indices_at(memory.order, memory.count)
-    share = 1.0
+    ratio = 1.0
     is_short = False
     margin = math.inf
+    horizon = 0.25  # [s] in which a motion may use up what is left of the margin
+    top_speed = 0.4  # [m/s] that no motion has: edges that are far enough for it do not count
     for index in range(_find(points, lifted, order, edges)):
         edge = edges[index]
         margin = min(margin, edge[INSIDE])
-        left = edge[INSIDE] - memory.least
-        if left > HORIZON * GUARD_TOP_SPEED:
+        left = edge[INSIDE] - memory.required_margin
+        if left > horizon * top_speed:
             continue
         rate = _rate(memory, points, edge, velocity)
-        if left + HORIZON * share * rate < 0.0:
-            share = max(0.0, -left / (HORIZON * rate)) if rate < 0.0 else 1.0
+        if left + horizon * ratio * rate < 0.0:
+            ratio = max(0.0, -left / (horizon * rate)) if rate < 0.0 else 1.0
             is_short = True
     state[MARGIN] = margin
-    return share, is_short
+    return ratio, is_short
 
 
 @part
@@ -174,12 +152,12 @@ def _lacks(memory, away, forward):
             for k in range(first, first + size):
                 along += away[k] * forward[k]
                 square += forward[k] * forward[k]
-    return along > LACK * math.sqrt(square)
+    return along > 1e-3 * math.sqrt(square)  # [m/s, rad/s]
 
 
 @part
 def _reason(memory, is_short, margin, speed, velocity):
-    """Return what is beyond its bound most, how far it is, and by which share of the bound."""
+    """Return what is beyond its bound most, how far it is, and by which ratio to the bound."""
     why, amount, worst = (POLYGON, margin, 1.0) if is_short else (NOTHING, 0.0, 1.0)
     watched = indices_at(memory.watched, memory.watched_count)
     bounds = vector_at(memory.bounds, memory.watched_count)
@@ -204,7 +182,9 @@ def _reason(memory, is_short, margin, speed, velocity):
     turning = indices_at(memory.turning, memory.turning_count)
     for index in range(memory.turning_count):
         steering = max(steering, abs(velocity[turning[index]]))
-    if fastest > max(SWIFT, STRAIGHT_SPEED * speed, STEERING_SPEED_SHARE * steering):
+    # a leg is nearly straight whose joint is faster than 0.5 rad/s, 25 rad/m by the speed of the motion, and a quarter
+    # of the speed of joints that steer: wheels that tilt and turn move their legs
+    if fastest > max(0.5, 25.0 * speed, 0.25 * steering):
         return FIRST_ROW + memory.watched_count + place, fastest, 1.0
     return NOTHING, 0.0, 0.0
 
@@ -221,22 +201,22 @@ def _guard(memory, state, is_short, forward, pace, velocity, passed):
     size = math.sqrt(size)
     if size == 0.0:
         return False
-    is_other = along < ASIDE * size
+    is_other = along < 0.5 * size  # at an angle of more than 60 degrees to the way that is held
     why, amount, worst = _reason(memory, is_short, state[MARGIN], pace * size, velocity)
-    if why != NOTHING and worst > (GUARD_WORSENING * state[WORST] if state[WHY] != NOTHING and is_other else 0.0):
-        state[WHY] = why
+    if why != NOTHING and worst > (1.1 * state[WORST] if state[REASON] != NOTHING and is_other else 0.0):
+        state[REASON] = why
         state[AMOUNT] = amount
         state[WORST] = worst
         state[AGE] = 0.0
         for k in range(memory.rows):
             held[k] = forward[k] / size
         return True
-    if state[WHY] == NOTHING:
+    if state[REASON] == NOTHING:
         return False
     state[AGE] += passed
-    if state[AGE] > RETRY and why == NOTHING:
-        state[WHY] = state[AMOUNT] = state[WORST] = state[AGE] = 0.0
-    return state[WHY] != NOTHING and not is_other
+    if state[AGE] > 1.0 and why == NOTHING:
+        state[REASON] = state[AMOUNT] = state[WORST] = state[AGE] = 0.0
+    return state[REASON] != NOTHING and not is_other
 
 
 def _hold_back(start, pace, is_bound, passed):
@@ -244,7 +224,7 @@ def _hold_back(start, pace, is_bound, passed):
 
     Args:
         start: Address of a `GUARD`.
-        pace: Share of the desired rates that goes on.
+        pace: Ratio of the desired rates that goes on.
         is_bound: Whether a joint is at its bound.
         passed: Time since the cycle before [s].
     """
@@ -253,11 +233,11 @@ def _hold_back(start, pace, is_bound, passed):
     velocity = vector_at(memory.velocity, memory.dofs)
     forward = vector_at(memory.forward, memory.rows)
     away = vector_at(memory.away, memory.rows)
-    share, is_short = _keep_margin(memory, state, velocity)
-    if share < 1.0:
+    ratio, is_short = _keep_margin(memory, state, velocity)
+    if ratio < 1.0:
         for k in range(memory.dofs):
-            velocity[k] *= share
-    is_bound = (is_bound or share < 1.0) and _lacks(memory, away, forward)
+            velocity[k] *= ratio
+    is_bound = (is_bound or ratio < 1.0) and _lacks(memory, away, forward)
     return _guard(memory, state, is_short, forward, pace, velocity, passed) or is_bound
 
 

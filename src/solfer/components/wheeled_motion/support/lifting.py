@@ -15,33 +15,6 @@ from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.support import LiftContacts, LiftReply
 from solfer.points.contact.contacts import Contact
 
-CARRYING = 3
-"""Fewest wheels that stay on the ground."""
-
-LIFTING_SPEED = 0.06
-"""Speed of wheels that are put down [m/s]."""
-
-TOUCH_SPEED = 0.02
-"""Speed of a wheel near the ground [m/s]."""
-
-LIFTING_NEARNESS = 0.02
-"""How far above the ground a wheel is near it [m]."""
-
-LIFTING_DEPTH_LIMIT = 0.03
-"""How far below where the ground was a wheel looks for it, where forces are measured [m]."""
-
-PUSH = 0.15
-"""Share of the weight of one wheel with which the ground is felt, of the mean of all."""
-
-LIFTING_WORSENING = 0.01
-"""How much less than it was to be the margin may be when a wheel is lifted [m]."""
-
-LIFTING_PATIENCE, LIFTING_ROUNDS = 1.0, 4
-"""Time in which the robot settles with its weight shifted [s], and how often the weight is shifted at most."""
-
-LIFTING_TIMEOUT = 120.0
-"""Longest time until a wheel is lifted, or carries again [s]."""
-
 
 class Phase(enum.Enum):
     """What is done for wheels that are to be lifted or to carry again."""
@@ -74,6 +47,9 @@ class Lifting:
         polygon: As above.
         margin: As above; may be set.
     """
+
+    TIMEOUT = 120.0
+    """Longest time until a wheel is lifted, or carries again [s]."""
 
     def __init__(
         self,
@@ -126,8 +102,8 @@ class Lifting:
             self._give_back(requested, answer)
             return answer
         left = len(lifted) - len({*requested, *np.flatnonzero(lifted).tolist()})
-        if left < CARRYING:
-            raise ComponentError(f"{left} wheels would carry the robot", expected=f"{CARRYING} or more")
+        if left < 3:
+            raise ComponentError(f"{left} wheels would carry the robot", expected="3 or more")
         if not self._wheels.is_whole:
             raise ComponentError(
                 "masses of a part of the robot do not show where its weight is",
@@ -153,7 +129,7 @@ class Lifting:
         if not is_moving:
             return
         references.velocity[:] = 0.0
-        references.turn[:] = 0.0
+        references.angular[:] = 0.0
         references.vertex_velocity[:] = 0.0
         if self.phase is Phase.LOWER:
             self._lower()
@@ -194,7 +170,7 @@ class Lifting:
 
     def _settle(self) -> None:
         """Lift the wheels as soon as the others carry the robot."""
-        x, y = self._lacking(self.margin - LIFTING_WORSENING)
+        x, y = self._lacking(self.margin - 0.01)  # [m] that may be lost meanwhile
         if math.hypot(x, y) < 1e-3:
             for index in self._requested:
                 self._ground[index] = self._wheels.offsets.states[index, 2] - self._plane(index)
@@ -202,10 +178,10 @@ class Lifting:
             self._end("")
             return
         self._waited += self._period
-        if self._waited < LIFTING_PATIENCE:
+        if self._waited < 1.0:  # [s]
             return
         self._rounds += 1
-        if self._rounds < LIFTING_ROUNDS:
+        if self._rounds < 4:
             self._begin_shift()
         else:
             names = ", ".join(self._wheels.contacts[index].name for index in self._requested)
@@ -217,13 +193,16 @@ class Lifting:
         forces = self._wheels.measure_forces()
         feels = bool(np.delete(forces, self._requested).any())
         lost = ""
+        speed_limit = 0.06  # [m/s]
+        near_speed = 0.02  # [m/s] within 2 cm of the ground
         for index in list(self._requested):
             height = float(references.vertices[index, 2]) - self._plane(index) - self._ground[index]
             force = float(forces[index]) * len(forces)
-            if (force > PUSH * float(forces.sum())) if feels else height < 1e-4:
+            # the ground is felt by 15 % of the mean force of the wheels
+            if (force > 0.15 * float(forces.sum())) if feels else height < 1e-4:
                 self._release(index, False)
-            elif height > -LIFTING_DEPTH_LIMIT:
-                speed = LIFTING_SPEED if height > LIFTING_NEARNESS else TOUCH_SPEED
+            elif height > -0.03:  # [m] below where the ground was
+                speed = speed_limit if height > 0.02 else near_speed
                 references.vertex_velocity[index, 2] = -speed if feels else -min(speed, height / self._period)
                 continue
             else:

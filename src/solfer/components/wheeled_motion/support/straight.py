@@ -6,12 +6,9 @@ import numpy as np
 
 from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from
 
-STRAIGHT_SMALLNESS = 1e-6
-"""Velocities that are left out without a warning [m/s, rad/s]."""
-
 
 class StraightAhead:
-    """Removes from the desired velocities what wheels without steering cannot do: motions across them, and turns.
+    """Removes from the desired velocities what wheels without steering cannot do: motions across them, and yaw rates.
 
     Velocities along the wheels and heights stay. The wheels are parallel; the direction of the first one counts.
 
@@ -40,16 +37,16 @@ class StraightAhead:
         footprint = 0.0
         for velocity, is_lifted in zip(references.vertex_velocity, references.lifted.tolist(), strict=True):
             footprint = max(footprint, 0.0 if is_lifted else self._remove(velocity))
-        turn = abs(self._kept.turn)
-        references.turn[2] = 0.0
+        yaw_rate = abs(self._kept.yaw_rate)
+        references.angular[2] = 0.0
         left = [
             text
             for size, text in (
                 (base, f"{base:.3g} m/s sideways"),
-                (turn, f"turns of {turn:.3g} rad/s"),
+                (yaw_rate, f"turns of {yaw_rate:.3g} rad/s"),
                 (footprint, f"footprints that change by {footprint:.3g} m/s to the side"),
             )
-            if size > STRAIGHT_SMALLNESS
+            if size > 1e-6  # [m/s, rad/s]
         ]
         return f"nothing steers {self._wheels}: no {' and no '.join(left)}" if left else ""
 

@@ -9,11 +9,11 @@ from solfer.components.wheeled_motion.references import References, seen_from, t
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.numerics.planar_move import PlanarMove
 
-WEIGHT_SHIFT_SPEED, WEIGHT_SHIFT_ACCELERATION = 0.06, 0.12
-"""Of the base where it shifts the weight [m/s, m/s2]."""
+SHIFT_SPEED = 0.06
+"""Largest speed of the base where it shifts the weight [m/s]."""
 
-WEIGHT_SHIFT_LOWEST_SPEED = 0.05
-"""Least pace by which velocities of vertices make up for the pace."""
+SHIFT_ACCELERATION = 0.12
+"""Largest acceleration of the base there [m/s2]."""
 
 
 class WeightShift:
@@ -69,7 +69,7 @@ class WeightShift:
         """Let vertices stay where they are for a time [s], as fast as the base was commanded to move last."""
         references = self._references
         velocity = self._wheels.pose.jacobian[:2] @ self._joints.velocity
-        back = self._seen(velocity) / max(references.pace, WEIGHT_SHIFT_LOWEST_SPEED)
+        back = self._seen(velocity) / max(references.pace, 0.05)
         references.vertex_velocity[:, :2] = -back
         self._moved += period * references.pace * back
 
@@ -80,11 +80,11 @@ class WeightShift:
         distance = math.hypot(*left)
         if distance < 1e-6:
             return True
-        step = WEIGHT_SHIFT_ACCELERATION * period
+        step = SHIFT_ACCELERATION * period
         self._speed = min(
-            WEIGHT_SHIFT_SPEED,
+            SHIFT_SPEED,
             self._speed + step,
-            max(step, math.sqrt(2.0 * WEIGHT_SHIFT_ACCELERATION * distance) - step),
+            max(step, math.sqrt(2.0 * SHIFT_ACCELERATION * distance) - step),
         )
         speed = min(self._speed, distance / period)
         references.velocity[:2] = left * (speed / distance)
