@@ -8,12 +8,6 @@ from typing import Protocol
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware
 
-LOOKOUT_PERIOD = 1.0
-"""Time between two looks [s]."""
-
-LOOKOUT_PAUSE = 0.002
-"""Time between the reports of two pipes [s]: the loop needs the interpreter meanwhile."""
-
 Reports = Iterable[tuple[str, HealthReport]]
 
 
@@ -44,6 +38,9 @@ class Lookout:
         pipes: Yields the names and the health of the pipes, for each plugin.
     """
 
+    PERIOD = 1.0
+    """Time between two checks [s]."""
+
     def __init__(self, peers: Mapping[str, Looking], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
         self._peers = dict(peers)
         self._middleware = middleware
@@ -59,18 +56,18 @@ class Lookout:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._end.wait(LOOKOUT_PERIOD):
+        while not self._end.wait(self.PERIOD):
             for name, peers in self._peers.items():
                 if not peers.done:
                     peers.look()
                     self._report(name, peers.complaint())
             for part, report in chain.from_iterable(pipes() for pipes in self._pipes):
                 self._middleware.report(part, report.level, report.summary, report.values)
-                if self._end.wait(LOOKOUT_PAUSE):
+                if self._end.wait(0.002):  # the loop needs the interpreter between two reports
                     return
 
-    def _report(self, name: str, complaint: str) -> None:
-        if complaint != self._published[name]:
-            self._published[name] = complaint
-            level = Health.WARNING if complaint else Health.GOOD
-            self._middleware.report(f"{name} pipes", level, complaint or "running", {})
+    def _report(self, name: str, warning: str) -> None:
+        if warning != self._published[name]:
+            self._published[name] = warning
+            level = Health.WARNING if warning else Health.GOOD
+            self._middleware.report(f"{name} pipes", level, warning or "running", {})

@@ -17,10 +17,6 @@ BELLS_SIZE = 4096
 ANY = 0
 """Place of the bell that rings with every other one."""
 
-MAX_INTEGER = 2**63 - 1
-LONGEST_NAMESPACE = 240  # [letters]
-HIDDEN_SUFFIXES = (".lock", ".new")
-
 
 class Namespace:
     """Segments of one robot: a folder `solfer-<name>` with files below it.
@@ -96,7 +92,7 @@ class Namespace:
             present = files.listed(self.path(*names))
         except FileNotFoundError:
             return []
-        return sorted(unquote(file) for file in present if not file.endswith(HIDDEN_SUFFIXES))
+        return sorted(unquote(file) for file in present if not file.endswith((".lock", ".new")))
 
     def bell(self, *names: str) -> "Bell":
         """Return the bell of the segments in a folder."""
@@ -167,14 +163,14 @@ class Bell:
     def ring(self) -> None:
         """Announce that a segment was made or has ended; to be called afterwards."""
         # a number that no other process rings with: adding one would lose a ring if two rang at once
-        self.words[self.place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & MAX_INTEGER
+        self.words[self.place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & (2**63 - 1)
         self.words[ANY] = number
 
 
 def _quoted(name: str) -> str:
     """Quote a name as a file's: without slashes, and none of the names that mean something to the file system."""
     file = quote(name.lstrip("/"), safe="").replace(".", "%2E") or "%"
-    if len(file) > LONGEST_NAMESPACE:
+    if len(file) > 240:  # file systems take 255 bytes, and the lock's name is longer
         raise MiddlewareError(
             f"a name of {len(name)} letters is too long for shared memory: {name[:40]}...", expected="a shorter name"
         )

@@ -18,7 +18,7 @@ from solfer.navigation import (
     WaypointCourse,
     WaypointFollower,
 )
-from solfer.navigation.course import SMOOTHED, MeasuredPose
+from solfer.navigation.course import CORRECTION_TIME, MeasuredPose
 from solfer.scenarios import Player, read_scenario
 
 RATE = 100.0  # [Hz]
@@ -360,7 +360,7 @@ def test_a_base_that_is_located_elsewhere_goes_on_from_there(bus):
     )
     x, y, heading = correction.pose(base.pose, bus.time)
     assert math.dist((x, y), (4.0, 3.0)) < 0.03 and abs(heading) < 0.02
-    assert arrived[0] + 2.0 * SMOOTHED <= bus.time < arrived[0] + 6.0 * SMOOTHED
+    assert arrived[0] + 2.0 * CORRECTION_TIME <= bus.time < arrived[0] + 6.0 * CORRECTION_TIME
 
 
 def test_without_a_localisation_it_stops_and_says_what_is_missing(bus):

@@ -48,7 +48,7 @@ def until(condition):
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch):
-    monkeypatch.setattr(lookout, "LOOKOUT_PERIOD", 0.001)
+    monkeypatch.setattr(lookout.Lookout, "PERIOD", 0.001)
 
 
 def test_each_new_complaint_is_reported_once():
@@ -68,7 +68,7 @@ def test_each_new_complaint_is_reported_once():
 
 
 def test_close_ends_a_lookout_that_still_looks(monkeypatch):
-    monkeypatch.setattr(lookout, "LOOKOUT_PERIOD", WAIT)
+    monkeypatch.setattr(lookout.Lookout, "PERIOD", WAIT)
     peers = Peers("missing", "missing")
     seen = Lookout({"one": peers}, Reports(), ())
     seen.close()

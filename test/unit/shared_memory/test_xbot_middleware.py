@@ -108,24 +108,24 @@ def test_a_full_queue_drops_the_oldest_and_counts(world):
     assert queue.dropped == 197
 
 
-def test_mail_tells_of_messages_that_wait(world):
+def test_pending_reports_messages_that_wait(world):
     """It stays true until all is read, ignores other topics, and sees messages with more joints than before."""
     node, sender = world.node("receiver"), world.node("sender")
     queues = [node.queue(topic, COMMAND) for topic in ("one", "two")]
-    mail = node.mail(queues)
-    assert not mail()
+    pending = node.pending(queues)
+    assert not pending()
     writers = [sender.writer(topic, COMMAND) for topic in ("one", "two", "three")]
     message = JointMessage.empty(("a",), ("position",))
     for _ in range(3):
         for writer, queue in zip(writers, queues, strict=False):
             writer.write(message)
-            assert mail() and mail()
+            assert pending() and pending()
             assert len(queue.drain()) == 1
-            assert not mail()
+            assert not pending()
         writers[2].write(message)  # a topic that nobody waits for
-        assert not mail()
+        assert not pending()
     writers[1].write(JointMessage.empty(("a", "b"), ("position",)))
-    assert mail()
+    assert pending()
 
 
 def test_only_a_reader_gets_an_earlier_message(world):

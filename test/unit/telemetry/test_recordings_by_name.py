@@ -105,7 +105,9 @@ def test_a_file_needs_a_folder(tmp_path):
 
 
 def test_a_file_recorder_waits_for_its_process(monkeypatch, tmp_path, caplog):
-    monkeypatch.setattr(recordings, "_MAIN", "import sys, time; time.sleep(60 * (sys.argv[-2] == 'slow')); sys.exit(3)")
+    monkeypatch.setattr(
+        recordings.FileRecorder, "PROGRAM", "import sys, time; time.sleep(60 * (sys.argv[-2] == 'slow')); sys.exit(3)"
+    )
     monkeypatch.setattr(FileRecorder, "PATIENCE", 30.0)
     recorder = FileRecorder("quick", ("arm", "leg"), tmp_path / "a.mcap", 2.5)
     words = recorder.process.args[3:]
@@ -146,7 +148,7 @@ def test_a_watchdog_looks_until_it_is_lost(tmp_path, monkeypatch):
     with pytest.raises(MiddlewareError, match="the folder is gone"):
         Watchdog(heartbeat, stop, presence=Lost(4)).run(lambda: True)
     assert stop.reason.startswith("the folder is gone (")
-    assert len(slept) == 4 and all(0.0 <= each <= watchdog.WATCHDOG_PERIOD for each in slept)
+    assert len(slept) == 4 and all(0.0 <= each <= watchdog.Watchdog.PERIOD for each in slept)
     looks = iter([True, True, False])
     Watchdog(heartbeat, stop).run(lambda: next(looks))
     assert len(slept) == 6

@@ -18,9 +18,6 @@ from solfer.transport.topics import Topics
 Opened: TypeAlias = dict[str, dict[str, Segment]]
 """Segments by their names, for each topic."""
 
-COMMAND_SUFFIX = "/command"
-"""End of the names of topics of the lower level's controllers."""
-
 
 @dataclass(frozen=True)
 class PublishedTopic:
@@ -61,7 +58,7 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
     """
     found = {}
     for topic in namespace.present(PIPES):
-        if topic.endswith(COMMAND_SUFFIX) or topic in known:
+        if topic.endswith("/command") or topic in known:
             continue
         for message in _living(namespace, PIPES, SENDER_KIND, topic=topic).values():
             found[topic] = PublishedTopic(topic, message)
@@ -90,7 +87,8 @@ class Survey:
     """
 
     def __init__(self, namespace: Namespace):
-        self._namespace, self._bell = namespace, namespace.any_bell()
+        self._namespace = namespace
+        self._bell = namespace.any_bell()
         self._published: Opened = {}
         self._received: Opened = {}
 
@@ -98,7 +96,8 @@ class Survey:
         """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
         if self._bell.rung():
             self._bell.acknowledge()
-            self._published, self._received = self._open(PIPES, SENDER_KIND), self._open(EARS, EAR)
+            self._published = self._open(PIPES, SENDER_KIND)
+            self._received = self._open(EARS, EAR)
         return Topics(*(_beside(node, opened) for opened in (self._published, self._received)))
 
     def _open(self, folder: str, kind: str) -> Opened:

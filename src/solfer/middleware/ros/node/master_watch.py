@@ -12,15 +12,6 @@ from solfer.middleware.ros.node.master import require_master
 
 logger = logging.getLogger(__name__)
 
-MASTER_PERIOD = 1.0
-"""Time between two calls [s]."""
-
-MASTER_PATIENCE = 5.0
-"""Time without an answer after which the master is gone for good [s]."""
-
-FAILED_CALLS = 3
-"""Calls that have to fail in that time: a process that stood still itself has not called often enough."""
-
 
 class MasterWatch:
     """Checks the master's number, and that it knows this node, periodically, in a thread of its own.
@@ -48,8 +39,8 @@ class MasterWatch:
         lost: Callable[[], None] = lambda: None,
         number: Callable[[], int] = require_master,
         known: Callable[[], bool] = lambda: True,
-        period: float = MASTER_PERIOD,
-        patience: float = MASTER_PATIENCE,
+        period: float = 1.0,
+        patience: float = 5.0,
     ):
         self._request = number
         self._known = known
@@ -74,7 +65,7 @@ class MasterWatch:
     def _watch(self) -> None:
         while not self._end.wait(self._period):
             try:
-                loss = self._look()
+                loss = self._check()
             except MiddlewareError as error:
                 loss = self._count(error.what)
             else:
@@ -86,7 +77,7 @@ class MasterWatch:
                 self._lost()
                 return
 
-    def _look(self) -> str:
+    def _check(self) -> str:
         """Describe what is wrong with a master that answers; empty: nothing."""
         if self._request() != self._number:
             return f"another ROS master answers at {rosgraph.get_master_uri()}, which does not know this node"
@@ -103,4 +94,5 @@ class MasterWatch:
             self._since = now
             logger.warning("%s; if that stays so for %g s this node ends", failure, self._patience)
         self._failures += 1
-        return failure if self._failures >= FAILED_CALLS and now - self._since >= self._patience else ""
+        # three failures at least: a process that stood still itself has not called often enough
+        return failure if self._failures >= 3 and now - self._since >= self._patience else ""

@@ -211,7 +211,7 @@ class XbotQueue(Queue):
             self.dropped += sender_segment.end.lost - lost
 
 
-class XbotMail:
+class PendingMessages:
     """Reports whether messages may wait in any of several queues, in one call.
 
     Args:
@@ -223,7 +223,8 @@ class XbotMail:
         self._queues = tuple(queues)
         self._words = bell.words
         self._rung = bell.place
-        self._count, self._ends = -1, tuple[Slot | Ring, ...]()
+        self._count = -1
+        self._ends = tuple[Slot | Ring, ...]()
 
     def __call__(self) -> bool:
         """Return it; true as well if a sender of any topic has started or ended."""
@@ -260,7 +261,9 @@ class XbotWriter(Writer):
     def __init__(
         self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float], *, number: int = 0
     ):
-        self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
+        self.topic = topic
+        self._message = message
+        self._bell = namespace.bell(PIPES, topic)
         self.carries = message
         self._sender = sender
         self._now = now
