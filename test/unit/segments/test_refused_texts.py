@@ -119,11 +119,11 @@ def test_namespaces_say_what_they_refuse(tmp_path):
     """Invalid, damaged, unknown and too long names, at the very limit of what a file system accepts."""
     assert refusal(lambda: Namespace("a b", tmp_path), "") == ("invalid namespace name 'a b'", "letters, digits, _ . -")
     (tmp_path / "solfer-bad").mkdir(mode=0o700)
-    bells = tmp_path / "solfer-bad" / "bells"
-    bells.write_bytes(b"123")
-    bells.chmod(0o600)
-    assert refusal(lambda: Namespace("bad", tmp_path), bells) == (
-        "the file does not hold solfer's bells: 3 bytes",
+    numbers = tmp_path / "solfer-bad" / "bells"
+    numbers.write_bytes(b"123")
+    numbers.chmod(0o600)
+    assert refusal(lambda: Namespace("bad", tmp_path), numbers) == (
+        "the file does not hold solfer's notifications: 3 bytes",
         "remove the file",
     )
     with pytest.raises(UnknownName, match="unknown namespace 'bat'") as unknown:

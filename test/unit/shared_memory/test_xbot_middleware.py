@@ -320,17 +320,17 @@ def test_ten_thousand_cycles_keep_no_memory(world):
     assert sys.getallocatedblocks() - before < 100
 
 
-def test_a_bell_rings_until_it_is_acknowledged(tmp_path):
-    mine, other = Namespace("x", tmp_path).bell("pipes", "a"), Namespace("x", tmp_path).bell("pipes", "a")
-    elsewhere = Namespace("x", tmp_path).bell("pipes", "b")
-    assert mine.rung()  # what was made before it was there has to be found, too
+def test_a_notification_is_pending_until_it_is_acknowledged(tmp_path):
+    mine, other = (Namespace("x", tmp_path).notification("pipes", "a") for _ in range(2))
+    elsewhere = Namespace("x", tmp_path).notification("pipes", "b")
+    assert mine.is_pending()  # what was made before it was there has to be found, too
     mine.acknowledge()
-    elsewhere.ring()
-    assert not mine.rung()
-    other.ring()
-    assert mine.rung() and mine.rung()
+    elsewhere.send()
+    assert not mine.is_pending()
+    other.send()
+    assert mine.is_pending() and mine.is_pending()
     mine.acknowledge()
-    assert not mine.rung()
+    assert not mine.is_pending()
 
 
 def test_topics_lists_all_other_nodes(tmp_path):

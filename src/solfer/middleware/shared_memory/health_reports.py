@@ -39,7 +39,7 @@ class Reports:
 
     def __init__(self, namespace: Namespace):
         self._namespace = namespace
-        self._bell = namespace.bell(self.FOLDER)
+        self._notification = namespace.notification(self.FOLDER)
         self._own: dict[str, _Page | None] = {}
         self._others: dict[str, _Page] = {}
         self._received: dict[str, HealthReport] = {}
@@ -62,8 +62,8 @@ class Reports:
 
     def read(self) -> Mapping[str, HealthReport]:
         """Return the newest report of each part, of those that have ended, too."""
-        if self._bell.rung():
-            self._bell.acknowledge()
+        if self._notification.is_pending():
+            self._notification.acknowledge()
             self._find()
         for name, page in self._others.items():
             if page.slot.read():
@@ -76,7 +76,7 @@ class Reports:
         for page in filter(None, self._own.values()):
             page.segment.close()
         if self._own:
-            self._bell.ring()
+            self._notification.send()
 
     def _open(self, name: str) -> _Page | None:
         try:
@@ -85,7 +85,7 @@ class Reports:
         except MiddlewareError as error:
             logger.warning("the health of '%s' is not reported: %s", name, error)
             return None
-        self._bell.ring()
+        self._notification.send()
         return page
 
     def _find(self) -> None:

@@ -13,8 +13,8 @@ from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
 from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
-from solfer.middleware.shared_memory.topics.ears import Ears
 from solfer.middleware.shared_memory.topics.endpoints import PendingMessages, XbotQueue, XbotReader, XbotWriter
+from solfer.middleware.shared_memory.topics.subscriptions import Subscriptions
 from solfer.segments.lock import locked
 from solfer.segments.namespace import Namespace
 from solfer.segments.segment import Segment
@@ -41,7 +41,7 @@ class ClockProtocol(Protocol):
 
 
 class _ServedCalls:
-    """Services of a node, which receive their calls as soon as a bell of the namespace rings.
+    """Services of a node, which receive their calls as soon as a notification of the namespace is sent.
 
     Args:
         namespace: The namespace.
@@ -49,7 +49,7 @@ class _ServedCalls:
 
     def __init__(self, namespace: Namespace):
         self._servers: list[ServiceServer] = []
-        self._bell = namespace.any_bell()
+        self._notification = namespace.any_notification()
         self._busy = True
 
     def add(self, server: ServiceServer) -> None:
@@ -59,9 +59,9 @@ class _ServedCalls:
 
     def poll(self) -> None:
         """Receive calls. Does not block."""
-        bell = self._bell
-        if self._busy or bell.words[bell.place] != bell.received:
-            bell.acknowledge()
+        notification = self._notification
+        if self._busy or notification.words[notification.place] != notification.received:
+            notification.acknowledge()
             for server in self._servers:
                 server.poll()
             self._busy = any(server.busy for server in self._servers)
@@ -107,7 +107,7 @@ class XbotMiddleware(Middleware):
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._provided: dict[str, Segment] = {}
-        self._ears = Ears(self.namespace, name) if listens else None
+        self._subscriptions = Subscriptions(self.namespace, name) if listens else None
         self._served = _ServedCalls(self.namespace)
         self._survey = Survey(self.namespace)
         self._calls = Calls(self.namespace, name, self.now)
@@ -188,13 +188,13 @@ class XbotMiddleware(Middleware):
 
     def declared_queue(self, topic: str, message: str) -> XbotQueue:
         """See `Middleware.declared_queue`; a bridge forwards what is published outside."""
-        if self._ears is not None:
-            self._ears.listen(topic, message, declared=True)
+        if self._subscriptions is not None:
+            self._subscriptions.add(topic, message, declared=True)
         return self.queue(topic, message)
 
     def pending(self, queues: Sequence[Queue]) -> Callable[[], bool]:
         """See `Middleware.pending`."""
-        return PendingMessages(cast(Sequence[XbotQueue], queues), self.namespace.any_bell())
+        return PendingMessages(cast(Sequence[XbotQueue], queues), self.namespace.any_notification())
 
     def writer(self, topic: str, message: str) -> XbotWriter:
         """See `Middleware.writer`.
@@ -259,7 +259,7 @@ class XbotMiddleware(Middleware):
     def close(self) -> None:
         """See `Middleware.close`; nothing is queued here."""
         owned = (self._served, *self._endpoints, *self._provided.values())
-        for part in (*owned, self._calls, self._reports, *filter(None, (self._ears,))):
+        for part in (*owned, self._calls, self._reports, *filter(None, (self._subscriptions,))):
             part.close()
         self._provided.clear()
         self._endpoints.clear()
@@ -274,6 +274,6 @@ class XbotMiddleware(Middleware):
     def _keep(self, endpoint: Any, received: str = "") -> Any:
         """Keep an endpoint to close, and register it as a subscriber of the message `received`."""
         self._endpoints.append(endpoint)
-        if received and self._ears is not None:
-            self._ears.listen(endpoint.topic, received)
+        if received and self._subscriptions is not None:
+            self._subscriptions.add(endpoint.topic, received)
         return endpoint

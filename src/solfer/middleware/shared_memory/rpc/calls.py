@@ -91,7 +91,7 @@ class Calls:
         self.open = []
         for (name, _), channel in self._channels.items():
             channel.segment.close(for_good=True)
-            self._namespace.bell(SERVICES, name).ring()
+            self._namespace.notification(SERVICES, name).send()
 
     def _advance(self, pending: _PendingCall) -> None:
         if pending.answer.done():
@@ -138,7 +138,7 @@ class Calls:
         if key not in self._channels:
             path = self._namespace.place(SERVICES, pending.name, CALLS, self._client)
             self._channels[key] = RpcChannel.open(path, pending.interface)
-            self._namespace.bell(SERVICES, pending.name).ring()
+            self._namespace.notification(SERVICES, pending.name).send()
         return self._channels[key]
 
     def _answer(self, number: int, content: Any) -> None:

@@ -82,11 +82,11 @@ class ServiceServer:
         self._channels: dict[str, RpcChannel] = {}
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
-        self._bell = namespace.bell(SERVICES, self.name)
+        self._notification = namespace.notification(SERVICES, self.name)
 
     def poll(self) -> None:
         """Receive calls, and answer those that are done. To be called by the loop's thread."""
-        if self._bell.rung():
+        if self._notification.is_pending():
             self._find()
         for channel in self._channels.values():
             while (request := channel.requests.receive()) is not None:
@@ -100,7 +100,7 @@ class ServiceServer:
 
     @property
     def busy(self) -> bool:
-        """Whether there are clients, so that calls may come without a bell."""
+        """Whether there are clients, so that calls may come without a notification."""
         return bool(self._channels)
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class ServiceServer:
 
     def _find(self) -> None:
         """Join clients that are new, and clean up after those that have ended."""
-        self._bell.acknowledge()
+        self._notification.acknowledge()
         found = {}
         for name in self._namespace.present(SERVICES, self.name, CALLS):
             path = self._namespace.path(SERVICES, self.name, CALLS, name)

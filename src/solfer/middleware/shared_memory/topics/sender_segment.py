@@ -78,7 +78,7 @@ class SenderSegments:
 
     Attributes:
         changed: Whether `update` has something to do.
-        bell: Rings when it has.
+        notification: Sent when it has.
         current: The segments, in the order of their names.
         refused: Number of segments that are damaged, or carry another message.
 
@@ -94,13 +94,13 @@ class SenderSegments:
         self.current: list[SenderSegment] = []
         self.refused = 0
         self._throttle = Throttle(logger)
-        self.bell = namespace.bell(PIPES, topic)
-        self.changed = self.bell.rung
+        self.notification = namespace.notification(PIPES, topic)
+        self.changed = self.notification.is_pending
         require_message(namespace, topic, message)
 
     def update(self) -> None:
         """Open segments that are new, and drop those that have ended."""
-        self.bell.acknowledge()
+        self.notification.acknowledge()
         known = {
             sender_segment.segment.path: sender_segment
             for sender_segment in self.current
