@@ -155,7 +155,9 @@ def _check_step(step: Step, record: ScenarioRecord, problems: Problems) -> None:
             if row != BASE_ROW and not 0.0 < value <= 1.0:
                 mark = step.place("motions", index, 2)
                 assert mark is not None
-                problems.add(mark, f"a speed of {value:g}", "a share of the way left in each period: above 0, up to 1")
+                problems.add(
+                    mark, f"a speed of {value:g}", "a fraction of the way left in each period: above 0, up to 1"
+                )
 
 
 def _check_index(

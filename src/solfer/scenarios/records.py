@@ -26,7 +26,9 @@ class ScenarioRecord(Record):
         default=(0.0, 0.0, 0.0, 0.0), description="velocity that is added to the base's until the end [m/s, rad/s]"
     )
     vel: float = Field(
-        gt=0.0, le=1.0, description="share of what is left that vertices go in a period; speed of the base [m/s, rad/s]"
+        gt=0.0,
+        le=1.0,
+        description="fraction of what is left that vertices go in a period; speed of the base [m/s, rad/s]",
     )
     dt: float = Field(ge=1e-4, le=1.0, description="period [s]")
     x_cp: Legs = Field(alias="x cp", description="where the vertices begin: x of each leg [m]")

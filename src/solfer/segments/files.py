@@ -20,7 +20,7 @@ FOLDER_MODE = 0o2770
 """Permissions of a folder for user and group, whatever the process' mask is; its files get its group."""
 
 FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-FILE_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC  # a FIFO would block
+OPEN_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC  # a FIFO would block
 
 Identity = tuple[int, int]
 """Device and number of a file, which no other file has while it is open or mapped."""
@@ -233,7 +233,7 @@ def _step(folder: int, name: str, where: Path) -> int:
 def _open(folder: int, name: str, flags: int, where: Path) -> int:
     """Open a file in a folder, and check what was opened."""
     try:
-        file = os.open(name, flags | FILE_FLAGS, dir_fd=folder)
+        file = os.open(name, flags | OPEN_FLAGS, dir_fd=folder)
     except OSError as error:
         if error.errno == errno.ELOOP:
             raise _refused("a link: what it leads to is not opened", where) from error
@@ -249,7 +249,7 @@ def _open(folder: int, name: str, flags: int, where: Path) -> int:
 def _make(folder: int, name: str) -> int:
     """Make a file in a folder, with its mode."""
     mode = 0o660
-    file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | FILE_FLAGS, mode, dir_fd=folder)
+    file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | OPEN_FLAGS, mode, dir_fd=folder)
     os.fchmod(file, mode)  # the mask of the process may have taken the group's part away
     return file
 

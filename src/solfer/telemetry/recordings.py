@@ -130,7 +130,7 @@ class FileRecorder:
         namespace: Namespace of the loop.
         plugins: Its plugins.
         file: The file.
-        patience: Longest wait for plugins that are not there yet [s].
+        timeout: Longest wait for plugins that are not there yet [s].
 
     Attributes:
         process: The process.
@@ -142,16 +142,16 @@ class FileRecorder:
     PROGRAM = "import sys; from solfer.cli.main import main; sys.exit(main())"
     """What the process runs."""
 
-    PATIENCE = 10.0
+    TIMEOUT = 10.0
     """Longest time that the end waits for a complete file [s]."""
 
-    def __init__(self, namespace: str, plugins: Sequence[str], file: Path, patience: float = 0.0):
+    def __init__(self, namespace: str, plugins: Sequence[str], file: Path, timeout: float = 0.0):
         if not os.access(file.absolute().parent, os.W_OK):
             raise RecordingError(
                 "no file can be made there", where=str(file), expected="a folder that exists, and that you may write to"
             )
         names = [word for plugin in plugins for word in ("-n", plugin)]
-        command = ["record", *names, "--whole", "--wait", str(patience), namespace, str(file.absolute())]
+        command = ["record", *names, "--whole", "--wait", str(timeout), namespace, str(file.absolute())]
         # a session of its own: Ctrl-C ends the loop first, and then this has all of it
         self.process = subprocess.Popen(
             [sys.executable, "-c", self.PROGRAM, *command], stdin=subprocess.DEVNULL, start_new_session=True
@@ -160,9 +160,9 @@ class FileRecorder:
     def close(self) -> None:
         """Wait until the file is complete; the loop has ended."""
         try:
-            self.process.wait(self.PATIENCE)
+            self.process.wait(self.TIMEOUT)
         except subprocess.TimeoutExpired:
-            logger.warning("the recording ends before the loop, which goes on after %g s", self.PATIENCE)
+            logger.warning("the recording ends before the loop, which goes on after %g s", self.TIMEOUT)
             self.process.terminate()  # a SIGINT would be lost while Python still begins
 
 

@@ -17,7 +17,7 @@ JOINT_FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 """Fields of a JointMessage: [rad, m], [rad/s, m/s], [Nm, N], [Nm/rad], [Nms/rad]."""
 
 
-_MESSAGE_ROWS = frozenset((*JOINT_FIELDS, "values"))
+_ROWS = frozenset((*JOINT_FIELDS, "values"))
 
 GAINS = ("stiffness", "damping")
 """Those of them that are gains: they have no direction, and a lower level has values of its own for them."""
@@ -73,7 +73,7 @@ class JointMessage:
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute; an array that takes the place of a row ends the block, which would be sent instead."""
         numbers = self.__dict__
-        if "block" in numbers and name in _MESSAGE_ROWS and value is not numbers.get(name):
+        if "block" in numbers and name in _ROWS and value is not numbers.get(name):
             numbers["block"] = None
         numbers[name] = value
 

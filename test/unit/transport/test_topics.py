@@ -144,7 +144,7 @@ def test_another_class_than_declared_is_refused():
 
 
 def test_messages_of_pipes_alone_cannot_be_declared():
-    topic = TopicIn("told", "sensor_msgs/JointState", Twist, print)
+    topic = TopicIn("base", "sensor_msgs/JointState", Twist, print)
     with pytest.raises(MiddlewareError, match="JointState cannot be declared"):
         bind("stick", (topic,), MemoryWire().middleware, Inbox())
 

@@ -26,7 +26,7 @@ class TopicFaultsRecord(Record):
 
     delay: float = Field(default=0.0, **DURATION, description="time that every message takes [s]")
     jitter: float = Field(default=0.0, **DURATION, description="largest time on top, uniform from zero on [s]")
-    loss: float = Field(default=0.0, **RATIO, description="share of the messages that never arrive")
+    loss: float = Field(default=0.0, **RATIO, description="fraction of the messages that never arrive")
     bunch: float = Field(
         default=0.0,
         **DURATION,
@@ -39,7 +39,7 @@ class TopicFaultsRecord(Record):
 class LoopFaultsRecord(Record):
     """What happens to the cycles of a loop."""
 
-    skip: float = Field(default=0.0, **RATIO, description="share of the cycles that are left out")
+    skip: float = Field(default=0.0, **RATIO, description="fraction of the cycles that are left out")
     stalls: float = Field(
         default=0.0, ge=0.0, le=100.0, description="how often the whole loop stands still, on average [1/s]"
     )

@@ -25,7 +25,7 @@ class MasterWatch:
         number: Returns a number that changes when the master starts again; MiddlewareError: it does not answer.
         known: Returns whether the master knows this node; raises MiddlewareError in the same way.
         period: Time between two calls [s].
-        patience: Time without an answer after which the master is lost [s].
+        timeout: Time without an answer after which the master is lost [s].
 
     Attributes:
         loss: What happened to the master, in one line; empty while all is well.
@@ -40,13 +40,13 @@ class MasterWatch:
         number: Callable[[], int] = require_master,
         known: Callable[[], bool] = lambda: True,
         period: float = 1.0,
-        patience: float = 5.0,
+        timeout: float = 5.0,
     ):
         self._request = number
         self._known = known
         self._lost = lost
         self._period = period
-        self._patience = patience
+        self._timeout = timeout
         self.loss = ""
         self._number = number()
         self._registered = False
@@ -92,7 +92,7 @@ class MasterWatch:
         now = time.monotonic()
         if not self._failures:
             self._since = now
-            logger.warning("%s; if that stays so for %g s this node ends", failure, self._patience)
+            logger.warning("%s; if that stays so for %g s this node ends", failure, self._timeout)
         self._failures += 1
         # three failures at least: a process that stood still itself has not called often enough
-        return failure if self._failures >= 3 and now - self._since >= self._patience else ""
+        return failure if self._failures >= 3 and now - self._since >= self._timeout else ""

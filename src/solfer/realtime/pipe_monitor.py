@@ -11,7 +11,7 @@ from solfer.transport.middleware import HealthReport, Middleware
 Reports = Iterable[tuple[str, HealthReport]]
 
 
-class Looking(Protocol):
+class PeerSearch(Protocol):
     """Looks for the peers of a plugin; see `solfer.plugins.peers.Peers`.
 
     Attributes:
@@ -29,7 +29,7 @@ class Looking(Protocol):
         """Return what is wrong, in one line; empty: nothing."""
 
 
-class Lookout:
+class PipeMonitor:
     """A thread that looks for peers, reports missing ones as `<plugin> pipes`, and the health of each pipe.
 
     Args:
@@ -41,7 +41,7 @@ class Lookout:
     PERIOD = 1.0
     """Time between two checks [s]."""
 
-    def __init__(self, peers: Mapping[str, Looking], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
+    def __init__(self, peers: Mapping[str, PeerSearch], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
         self._peers = dict(peers)
         self._middleware = middleware
         self._pipes = pipes
