@@ -138,7 +138,7 @@ def lost(path: Path) -> str:
 
 
 class Notification:
-    """Says that a segment of a folder was made or has ended: until it does, there is nothing to search for.
+    """Reports that a segment of a folder was made or has ended: until then there is nothing to search for.
 
     Args:
         words: Numbers of all notifications; where two folders have the same one, some searches find nothing new.

@@ -29,10 +29,10 @@ _WRENCH = "geometry_msgs/WrenchStamped"
 class PluginLog:
     """The live arrays of a plugin for a recording, as channels `<plugin>/<what>`.
 
-    `measured/<field>` and `wanted/<field>` are the States of its Robot, `feedback/<pipe>/...` the newest numbers of
-    each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets them, `timing` the
-    stages of the cycle, `life` its state, how long commands blend in at least and the time that passed for the robot,
-    `gate` how many values were held back, and `log/...` what the component declares.
+    The measured State of its Robot is `measured/<field>`, and the commanded one beside it. `feedback/<pipe>/...` are
+    the newest numbers of each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets
+    them, `timing` the stages of the cycle, `life` its state, how long commands blend in at least and the time that
+    passed for the robot, `gate` how many values were held back, and `log/...` what the component declares.
 
     Args:
         plugin: The plugin, with all its pipes.
