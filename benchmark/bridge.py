@@ -24,7 +24,7 @@ import yaml
 from form import Figures, parser_of
 
 from solfer.components import Component, Port
-from solfer.middleware.bridge.bridge import BRIDGE_PERIOD
+from solfer.middleware.bridge import Bridge
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
@@ -250,7 +250,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, Launch(["--core"], Path(folder, "log"), free_port()) as system:
         system.wait_for_master(BEGIN)
         with contextlib.closing(RosMiddleware(RosNode("outside", ["outside"]))) as ros:
-            figures.row("bridge", rate=1.0 / BRIDGE_PERIOD, load=os.getloadavg()[0])
+            figures.row("bridge", rate=1.0 / Bridge.PERIOD, load=os.getloadavg()[0])
             for rate in RATES:
                 measure(ros, rate, given.messages, model.dofs[6:], figures)
 

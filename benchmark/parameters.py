@@ -23,7 +23,7 @@ from form import Figures, parser_of
 from solfer.interfaces.declaration import Accepted
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.supervision import supervise
-from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters
+from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, SetParameters
 
 sys.path.insert(0, str(REPOSITORY / "test"))
 from support.plugins.stamped import FILE  # noqa: E402
@@ -79,7 +79,7 @@ def measure_layer(changes: int, figures: Figures) -> bool:
         client = stack.enter_context(closing(XbotMiddleware(namespace, "client")))
 
         def ask(request: SetParameters) -> bool:
-            return client.call(SERVICE, SETTING, request, Accepted, BEGIN).success
+            return client.call(SERVICE, SET_INTERFACE, request, Accepted, BEGIN).success
 
         return measure("rt", ask, folder / "stamp", changes, figures)
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 from solfer.supervision import descendants
-from solfer.telemetry.recordings import RECORDINGS_VARIABLE, write_kept
+from solfer.telemetry.recordings import write_kept
 
 FOLDER = Path(__file__).parent
 LIMIT = 870.0
@@ -74,7 +74,7 @@ def check(path: Path, repository: Path, tmp_path: Path, **environment: str) -> N
     """Run the tests of a file, and leave what its nodes have recorded if one of them fails."""
     # Not --text: in that mode rostest reports success whatever happens.
     options = ["--pkgdir", str(repository), "--package", "solfer", "--results-base-dir", str(tmp_path)]
-    environment[RECORDINGS_VARIABLE] = str(tmp_path / "recordings")
+    environment["SOLFER_RECORDINGS"] = str(tmp_path / "recordings")
     code, output = run(["rostest", *options, str(path)], tmp_path / "output", **environment)
     count, failures = results(tmp_path)
     if code or not count:

@@ -89,7 +89,7 @@ class TopicsTest(unittest.TestCase):
             self.reports(
                 WHEELS,
                 WHEELS.replace("command", "words"),
-                "a subscriber of /velocity_controller/words wants",
+                "a subscriber of /velocity_controller/words expects",
                 "wants std_msgs/String, not solfer/JointCommand (controller 'velocity_controller'",
             )
         finally:

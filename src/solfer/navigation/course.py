@@ -9,20 +9,11 @@ from solfer.transport import BodyMessage, Middleware, Reader, Writer
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.messages import FieldsMessage
 
-COURSE_STALE_AGE = 0.5
-"""Age from which on odometry does not count [s]."""
+STALE_AGE = 0.5
+"""Age from which on what is measured does not count [s]."""
 
-SMOOTHED = 5.0
+CORRECTION_TIME = 5.0
 """Time constant with which corrections of a localisation are followed [s]."""
-
-COURSE_STILLNESS = 0.005
-"""How far a base moves that stands still [m, rad]."""
-
-ELSEWHERE, COURSE_TURN_LIMIT = 0.5, 0.5
-"""Corrections beyond which a robot is elsewhere, and not located more precisely [m, rad]."""
-
-COURSE_SILENCE_LIMIT = 0.3
-"""Age from which on the pace does not count [s]: the lower level has brought the robot to rest by then."""
 
 
 class Course(abc.ABC):
@@ -31,8 +22,8 @@ class Course(abc.ABC):
     Attributes:
         writers: Where it is published; each needs a subscriber before it begins.
         count: How many steps or waypoints there are.
-        share: Share of what is published with which the robot goes on, and with it the clock of the motion.
-        most: Largest pace that it can go on at.
+        ratio: Ratio of the robot's pace, and with it that of the motion's clock, to the published one.
+        max_pace: Largest pace that it can go on at.
         has_dialogue: Whether others answer it before it begins.
     """
 
@@ -40,8 +31,8 @@ class Course(abc.ABC):
 
     writers: Sequence[Writer] = ()
     count: int = 0
-    share: float = 1.0
-    most: float = 1.0
+    ratio: float = 1.0
+    max_pace: float = 1.0
 
     @abc.abstractmethod
     def awaits(self) -> str:
@@ -86,7 +77,7 @@ class MeasuredPose:
     """Where the base is, as odometry measures it.
 
     In the frame of a map it is predicted by the odometry, and corrected by the localisation: by the mean at first, then
-    with the time constant `SMOOTHED`. What drives would otherwise run after each of its jumps.
+    with the time constant `CORRECTION_TIME`. What drives would otherwise run after each of its jumps.
 
     Args:
         middleware: Carries it.
@@ -97,7 +88,7 @@ class MeasuredPose:
         x, y: [m].
         z: Height in the frame of the odometry [m].
         heading: [rad], continuous.
-        still: Time for which the odometry has stayed within `COURSE_STILLNESS` [s].
+        still: Time for which the odometry has stayed within 5 mm and 5 mrad [s].
     """
 
     def __init__(self, middleware: Middleware, topic: str, localisation: Localisation | None = None):
@@ -114,7 +105,7 @@ class MeasuredPose:
     def awaits(self) -> str:
         """Read the newest message; returns what is missing."""
         self._reader.read()
-        if self._reader.age() > COURSE_STALE_AGE:
+        if self._reader.age() > STALE_AGE:
             return f"odometry on {self._reader.topic}"
         message: BodyMessage = self._reader.message
         qx, qy, qz, qw = message.orientation
@@ -136,7 +127,7 @@ class MeasuredPose:
 
     def _measure_rest(self, place: tuple[float, float, float]) -> None:
         now = self._now()
-        if max(abs(new - old) for new, old in zip(place, self._stood, strict=True)) > COURSE_STILLNESS:
+        if max(abs(new - old) for new, old in zip(place, self._stood, strict=True)) > 0.005:
             self._stood = place
             self._stood_since = now
         self.still = now - self._stood_since
@@ -150,25 +141,25 @@ class MeasuredPose:
         """Move as the base has moved in the frame of the odometry since the message before."""
         x0, y0, heading0 = self._before
         self._before = x, y, heading
-        turn = self.heading - heading0
-        dx, dy = _rotated(x - x0, y - y0, turn)
-        self._move_to(self.x + dx, self.y + dy, heading + turn)
+        yaw = self.heading - heading0
+        dx, dy = _rotated(x - x0, y - y0, yaw)
+        self._move_to(self.x + dx, self.y + dy, heading + yaw)
 
     def _correct(self, x: float, y: float, heading: float, located: tuple[float, float, float]) -> None:
         """Approach the pose in the map, or take it where it is too far away for noise."""
-        x0, y0, turn = located
-        dx, dy = _rotated(x, y, turn)
+        x0, y0, yaw = located
+        dx, dy = _rotated(x, y, yaw)
         dx += x0 - self.x
         dy += y0 - self.y
-        left = math.remainder(heading + turn - self.heading, math.tau)
+        left = math.remainder(heading + yaw - self.heading, math.tau)
         now = self._now()
-        passed = 0.0 if self._located_at is None else min(max(now - self._located_at, 0.0), SMOOTHED)
+        passed = 0.0 if self._located_at is None else min(max(now - self._located_at, 0.0), CORRECTION_TIME)
         self._located_at = now
-        self._age = min(self._age + passed, SMOOTHED)
-        if math.hypot(dx, dy) > ELSEWHERE or abs(left) > COURSE_TURN_LIMIT:
+        self._age = min(self._age + passed, CORRECTION_TIME)
+        if math.hypot(dx, dy) > 0.5 or abs(left) > 0.5:  # [m, rad]: it is elsewhere, and not located more precisely
             self._age = 0.0
-        share = passed / self._age if self._age else 1.0
-        self._move_to(self.x + share * dx, self.y + share * dy, self.heading + share * left)
+        ratio = passed / self._age if self._age else 1.0
+        self._move_to(self.x + ratio * dx, self.y + ratio * dy, self.heading + ratio * left)
 
 
 def _rotated(x: float, y: float, angle: float) -> tuple[float, float]:
@@ -178,7 +169,7 @@ def _rotated(x: float, y: float, angle: float) -> tuple[float, float]:
 
 
 class FollowedPace:
-    """With which share of the velocities that it gets a module goes on, as it publishes that.
+    """The ratio of a module's pace to the velocities that it gets, as it publishes that.
 
     Args:
         middleware: Carries it.
@@ -201,7 +192,7 @@ class FollowedPace:
             self._is_known = True
         if not self._is_known:
             return ""
-        if self._reader.age() > COURSE_SILENCE_LIMIT:
+        if self._reader.age() > 0.3:  # the lower level has brought the robot to rest by then
             return f"the pace on {self.topic}"
         message: FieldsMessage = self._reader.message
         pace = float(message.fields["data"])

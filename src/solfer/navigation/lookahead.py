@@ -7,14 +7,8 @@ import numpy as np
 
 from solfer.scenarios import Player, Scenario
 
-LOOKAHEAD_FADE = 1.0
+FADE_TIME = 1.0
 """Time in which the pace goes from 1 to 0 before a jump, and back after it [s]."""
-
-LOOKAHEAD_JUMPS = (0.02, 0.05, 0.02)
-"""Smallest changes that are jumps: of the base [m/s], of its heading [rad/s], of a vertex [m/s]."""
-
-LOOKAHEAD_LOWEST_SPEED = 0.1
-"""Pace at which a jump is passed."""
 
 
 class Lookahead:
@@ -28,29 +22,32 @@ class Lookahead:
     """
 
     def __init__(self, scenario: Scenario):
-        self._scout, self._jumps = Player(scenario), deque[float]()
+        self._ahead = Player(scenario)
+        self._jumps = deque[float]()
         self._before = self._velocities()
 
-    def most(self, elapsed: float) -> float:
+    def max_pace(self, elapsed: float) -> float:
         """Return the largest pace at a time of the scenario [s], which never goes back."""
-        while not self._scout.is_over and self._scout.elapsed <= elapsed + 0.5 * LOOKAHEAD_FADE:
+        while not self._ahead.is_over and self._ahead.elapsed <= elapsed + 0.5 * FADE_TIME:
             self._look()
         while self._jumps and self._jumps[0] <= elapsed:
             self._jumps.popleft()
         if not self._jumps:
             return 1.0
-        return min(1.0, max(LOOKAHEAD_LOWEST_SPEED, math.sqrt(2.0 * (self._jumps[0] - elapsed) / LOOKAHEAD_FADE)))
+        lowest = 0.1  # at which a jump is passed
+        return min(1.0, max(lowest, math.sqrt(2.0 * (self._jumps[0] - elapsed) / FADE_TIME)))
 
     def _look(self) -> None:
         """Go on by a period of the file."""
-        begin = self._scout.elapsed
-        self._scout.step()
+        begin = self._ahead.elapsed
+        self._ahead.step()
         now = self._velocities()
         before = self._before
         self._before = now
-        if any(np.abs(new - old).max() > most for new, old, most in zip(now, before, LOOKAHEAD_JUMPS, strict=True)):
+        jumps = (0.02, 0.05, 0.02)  # smallest ones: of the base [m/s], of its heading [rad/s], of a vertex [m/s]
+        if any(np.abs(new - old).max() > jump for new, old, jump in zip(now, before, jumps, strict=True)):
             self._jumps.append(begin)
 
     def _velocities(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        base = self._scout.base_velocity
-        return base[:3].copy(), base[3:].copy(), self._scout.vertex_velocity.copy()
+        base = self._ahead.base_velocity
+        return base[:3].copy(), base[3:].copy(), self._ahead.vertex_velocity.copy()

@@ -6,7 +6,7 @@ from concurrent.futures import Future
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.interfaces.declaration import Accepted, Service
 from solfer.navigation.course import Course
-from solfer.navigation.lookahead import LOOKAHEAD_FADE
+from solfer.navigation.lookahead import FADE_TIME
 from solfer.throttle import Throttle
 from solfer.transport import Inbox, Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
@@ -16,34 +16,8 @@ from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
 
-PROGRESS = "solfer/NavigationProgress"
-
-NAVIGATION_PATIENCE = 30.0
-"""Longest wait for a subscriber of what is published [s]."""
-
-NAVIGATION_SETTLED_TIME = 0.5
-"""Time from the first sight of the subscribers on until all connections are there for certain [s]."""
-
 CONNECTIONS = "connections"
-"""What it waits for in that time."""
-
-NAVIGATION_PERIOD = 0.1
-"""Time between two messages of progress [s]."""
-
-NAVIGATION_QUIET_TIME = 2.0
-"""Time from the beginning on before which what it waits for is not logged [s]."""
-
-MOST_SKIPPED = 10
-"""Largest number of left-out periods that count; after more of them the course goes on from where it was."""
-
-STOP = 0.5
-"""Time in which the pace goes from 1 to 0 at a pause [s]."""
-
-NAVIGATION_STUCK_DISTANCE, NAVIGATION_HOLD_PACE = 60.0, 0.01
-"""Longest time that the robot does not go on at all [s], and the pace below which it does not."""
-
-ZERO_MESSAGES = 5
-"""How often zero velocities are published at the end."""
+"""What it waits for from the first sight of the subscribers on."""
 
 
 class _Subscribers:
@@ -85,11 +59,12 @@ class _Subscribers:
             missing = topics.missing_subscriber(writer.topic, writer.carries)
             if missing is None:
                 continue
-            if now - self.begin > NAVIGATION_PATIENCE:
+            if now - self.begin > 30.0:
                 raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
             self._lacked = now
             return f"a subscriber on {writer.topic}"
-        self._are_connected = now - max(self._lacked, self.begin) >= NAVIGATION_SETTLED_TIME
+        settling = 0.5  # [s], after which all connections are there for certain
+        self._are_connected = now - max(self._lacked, self.begin) >= settling
         return "" if self._are_connected else CONNECTIONS
 
 
@@ -107,10 +82,13 @@ class Navigation:
     Attributes:
         done: Whether the course has come to its end.
         paused: Whether it has been asked to stop until it is asked to go on.
-        pace: Share of the planned speed that it requests at present.
+        pace: Fraction of the planned speed that it requests at present.
         elapsed: Time that it has moved, at its planned speed [s].
         waits: What it waits for; empty: nothing.
     """
+
+    PROGRESS_PERIOD = 0.1
+    """Time between two messages of progress [s]."""
 
     def __init__(self, middleware: Middleware, course: Course, name: str, rate: float):
         self._middleware = middleware
@@ -122,8 +100,8 @@ class Navigation:
         self.pace = 0.0
         self.elapsed = 0.0
         self.waits = ""
-        self._progress = middleware.writer(f"{name}/progress", PROGRESS)
-        self._reported = -NAVIGATION_PERIOD
+        self._progress = middleware.writer(f"{name}/progress", "solfer/NavigationProgress")
+        self._reported = -self.PROGRESS_PERIOD
         self._number = -1
         self._subscribers = _Subscribers(middleware, course)
         self._went = self._subscribers.begin
@@ -141,7 +119,7 @@ class Navigation:
                 lambda _, skipped: self.cycle(skipped), lambda: self._middleware.running() and not self.done
             )
         finally:
-            for _ in range(ZERO_MESSAGES):
+            for _ in range(5):  # some may be lost
                 self._course.rest()
             self._publish_progress()
         if self.done:
@@ -152,22 +130,25 @@ class Navigation:
 
     def cycle(self, skipped: int = 0) -> None:
         """Carry out one period, and those that were `skipped` before: the robot has gone on meanwhile."""
-        period = (1 + min(skipped, MOST_SKIPPED)) / self._rate
+        # after more than ten skipped periods the course goes on from where it was
+        period = (1 + min(skipped, 10)) / self._rate
         self._inbox.apply()
         self.waits = self._subscribers.missing()
         # a course that asks others has its answers when it begins; one that measures begins with what is new then
         if not self.waits or (self._course.has_dialogue and self.waits == CONNECTIONS):
             self.waits = self._course.awaits() or self.waits
         if self.waits:
-            if self._middleware.now() - self._subscribers.begin > NAVIGATION_QUIET_TIME:
+            if self._middleware.now() - self._subscribers.begin > 2.0:  # the beginning always takes a while
                 self._throttle.warning(self.waits, "waits for %s", self.waits)
-            self.pace, self._went = 0.0, self._middleware.now()
+            self.pace = 0.0
+            self._went = self._middleware.now()
             self._course.rest()
         else:
-            change = (0.0 if self.paused else self._course.most) - self.pace
-            self.pace += min(max(change, -period / STOP), period / LOOKAHEAD_FADE)
+            change = (0.0 if self.paused else self._course.max_pace) - self.pace
+            stop_time = 0.5  # [s], in which the pace goes from 1 to 0 at a pause
+            self.pace += min(max(change, -period / stop_time), period / FADE_TIME)
             self.done = not self._course.step(period, self.pace)
-            self.elapsed += period * self.pace * self._course.share
+            self.elapsed += period * self.pace * self._course.ratio
             self._require_progress()
         self._report()
 
@@ -178,11 +159,12 @@ class Navigation:
             ComponentError: It has not for a long time.
         """
         now = self._middleware.now()
-        if self.paused or self._course.share >= NAVIGATION_HOLD_PACE:
+        timeout = 60.0  # [s]
+        if self.paused or self._course.ratio >= 0.01:
             self._went = now
-        elif now - self._went > NAVIGATION_STUCK_DISTANCE:
+        elif now - self._went > timeout:
             raise ComponentError(
-                f"the robot has not gone on for {NAVIGATION_STUCK_DISTANCE:g} s: its pace is {self._course.share:.2f}",
+                f"the robot has not gone on for {timeout:g} s: its pace is {self._course.ratio:.2f}",
                 expected="a motion that the robot can follow; its own log says what holds it",
             )
 
@@ -197,7 +179,7 @@ class Navigation:
             self._number = course.number
             logger.info("%d of %d, %s: %.1f s left", course.number, course.count, course.name, course.left)
         now = self._middleware.now()
-        if now - self._reported >= NAVIGATION_PERIOD or self.done:
+        if now - self._reported >= self.PROGRESS_PERIOD or self.done:
             self._reported = now
             self._publish_progress()
 
@@ -211,7 +193,7 @@ class Navigation:
                     "name": course.name,
                     "elapsed": self.elapsed,
                     "left": 0.0 if self.done else course.left,
-                    "pace": self.pace * course.share,
+                    "pace": self.pace * course.ratio,
                     "paused": self.paused,
                     "done": self.done,
                     "waits": self.waits,

@@ -10,19 +10,16 @@ from solfer.config.tasks.references import ReferenceRecord, ReferencesRecord
 from solfer.errors import UnknownName
 from solfer.interfaces.task_references import REFERENCE_MESSAGES, GetReference, ReferenceReply
 from solfer.interfaces.trajectories import TRAJECTORY, JointTrajectory, TrajectoryPoint
-from solfer.navigation.course import COURSE_STALE_AGE, Course
+from solfer.navigation.course import STALE_AGE, Course
 from solfer.references import ReferenceGenerator, build_reference, joints_of
 from solfer.transport import JointMessage, Middleware, Reader
 from solfer.transport.declared.fields import message_of
 from solfer.transport.messages import VectorMessage
 
-GET = "solfer/GetReference"
+GET_REFERENCE = "solfer/GetReference"
 
-REFERENCE_PATIENCE = 30.0
+ANSWER_TIMEOUT = 30.0
 """Longest time until a target says where a reference is [s]."""
-
-REFERENCE_LEAD = 0.1
-"""By how much a message is ahead of the joints [s]; without another one they brake in the same time after it."""
 
 
 class _Reference:
@@ -61,7 +58,9 @@ class _TaskReference(_Reference):
         """Request the place of the reference; return what is missing."""
         if self._answer is None:
             request = GetReference(self.name)
-            self._answer = self._middleware.request(self._service, GET, request, ReferenceReply, REFERENCE_PATIENCE)
+            self._answer = self._middleware.request(
+                self._service, GET_REFERENCE, request, ReferenceReply, ANSWER_TIMEOUT
+            )
         if not self._answer.done():
             return f"an answer of {self._service}"
         reply = self._answer.result()
@@ -88,7 +87,7 @@ class _JointReference(_Reference):
     def awaits(self) -> str:
         """Read where the joints are; returns what is missing."""
         self._reader.read()
-        if self._reader.age() > COURSE_STALE_AGE:
+        if self._reader.age() > STALE_AGE:
             return f"positions of joints on {self._reader.topic}"
         message: JointMessage = self._reader.message
         for name in self._names:
@@ -104,12 +103,14 @@ class _JointReference(_Reference):
 
     def publish(self, time: float, pace: float) -> None:
         """Publish where the joints are to be a little after a time [s], and where they come to rest without another."""
-        position = self.at(time + pace * REFERENCE_LEAD)
+        # by which a message is ahead of the joints; without another one they brake in the same time after it [s]
+        lead = 0.1
+        position = self.at(time + pace * lead)
         velocity = pace * self._velocity
-        rest = position + 0.5 * REFERENCE_LEAD * velocity
+        rest = position + 0.5 * lead * velocity
         points = (
-            TrajectoryPoint(tuple(position.tolist()), tuple(velocity.tolist()), time_from_start=REFERENCE_LEAD),
-            TrajectoryPoint(tuple(rest.tolist()), (0.0,) * len(rest), time_from_start=2.0 * REFERENCE_LEAD),
+            TrajectoryPoint(tuple(position.tolist()), tuple(velocity.tolist()), time_from_start=lead),
+            TrajectoryPoint(tuple(rest.tolist()), (0.0,) * len(rest), time_from_start=2.0 * lead),
         )
         self.writer.write(message_of(TRAJECTORY, JointTrajectory(joint_names=self._names, points=points)))
 

@@ -14,11 +14,6 @@ from solfer.scenarios import Player, Scenario
 from solfer.scenarios.records import LegRecord
 from solfer.transport import Middleware
 
-LIFT_CONTACTS = "solfer/LiftContacts"
-
-CONTACT_PATIENCE = 120.0
-"""Longest time until a contact is lifted or carries again [s]."""
-
 
 class ContactChanges:
     """Lets contacts be lifted and carry again, one after the other, as a scenario has them.
@@ -63,7 +58,9 @@ class ContactChanges:
             return ""
         self._changing = int(changed[0])
         request = LiftContacts((self._names[self._changing],), bool(self._grounded[self._changing]))
-        self._answer = self._middleware.request(self._service, LIFT_CONTACTS, request, LiftReply, CONTACT_PATIENCE)
+        self._answer = self._middleware.request(
+            self._service, "solfer/LiftContacts", request, reply=LiftReply, timeout=120.0
+        )
         return f"an answer of {self._service}"
 
 
@@ -124,7 +121,7 @@ class ScenarioCourse(Course):
         if missing := self._motion.awaits():
             return missing
         missing = self._followed.awaits()
-        self.share = 0.0 if missing else self._followed.value
+        self.ratio = 0.0 if missing else self._followed.value
         return self._changes.awaits() or missing
 
     def step(self, period: float, pace: float) -> bool:
@@ -133,7 +130,7 @@ class ScenarioCourse(Course):
             self.rest()
             return True
         if not self._is_held:
-            self._go_on(period * pace * self.share)
+            self._go_on(period * pace * self.ratio)
             self._pace = pace
             self._is_held = bool(self._changes.change())  # what the player has computed waits for the contact
             if self._is_held:
@@ -148,7 +145,7 @@ class ScenarioCourse(Course):
         if period > 0.0:
             self._moves = self._player.step(period)
             self._motion.go_on(period)
-            self.most = self._lookahead.most(self._player.elapsed)
+            self.max_pace = self._lookahead.max_pace(self._player.elapsed)
 
     def rest(self) -> None:
         """See `Course.rest`."""

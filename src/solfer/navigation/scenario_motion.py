@@ -11,20 +11,11 @@ from solfer.errors import SolferError
 from solfer.interfaces.support import BASE_PORT, LEAD, VERTICES_PORT
 from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.navigation.course import MeasuredPose
-from solfer.navigation.reference_course import GET, REFERENCE_PATIENCE
+from solfer.navigation.reference_course import ANSWER_TIMEOUT, GET_REFERENCE
 from solfer.numerics.planar_move import PlanarMove
 from solfer.scenarios import Player
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage, PointsMessage, VectorMessage
-
-SUPPORT = "solfer/WheelsSupport"
-WHEELS_STATE = "solfer/WheelsState"
-
-JUMP_MARGINS, TOP_SPEEDS = (0.05, 0.1), (2.0, 3.0)
-"""Margins [m, rad], and largest speeds [m/s, rad/s], beyond which an odometry has jumped, as plugins have them."""
-
-ARRIVING, STANDING_TIME = 4.0 * LEAD, 0.3
-"""Time after the last motion for which places are published [s], and that for which the base stands then."""
 
 
 class ScenarioMotion(abc.ABC):
@@ -65,8 +56,8 @@ class ScenarioVelocities(ScenarioMotion):
 
     def __init__(self, middleware: Middleware, player: Player, name: str, odometry: str):
         self._player = player
-        self._support = middleware.writer(f"{name}wheels_support", SUPPORT)
-        self._state = middleware.writer(f"{name}wheels_state", WHEELS_STATE)
+        self._support = middleware.writer(f"{name}wheels_support", "solfer/WheelsSupport")
+        self._state = middleware.writer(f"{name}wheels_state", "solfer/WheelsState")
         self._pose = MeasuredPose(middleware, odometry) if odometry else None
         self._cos = 1.0
         self._sin = 0.0
@@ -106,7 +97,8 @@ class OdometryJumps:
     """Finds jumps of an odometry: it is not where it would be if it had gone on as before."""
 
     def __init__(self) -> None:
-        self._measured, self._step = np.zeros((2, 4))
+        self._measured = np.zeros(4)
+        self._step = np.zeros(4)
         self._measured_at = -math.inf
 
     def find(self, pose: MeasuredPose, now: float) -> PlanarMove | None:
@@ -117,12 +109,10 @@ class OdometryJumps:
         self._step = measured - self._measured
         self._measured = measured
         self._measured_at = now
-        turn = float(measured[3] - expected[3])
-        move = PlanarMove(expected[:3], measured[:3], turn)
-        has_jumped = (
-            move.distance > JUMP_MARGINS[0] + TOP_SPEEDS[0] * passed
-            or abs(turn) > JUMP_MARGINS[1] + TOP_SPEEDS[1] * passed
-        )
+        yaw = float(measured[3] - expected[3])
+        move = PlanarMove(expected[:3], measured[:3], yaw)
+        # margins [m, rad] and largest speeds [m/s, rad/s] as plugins have them
+        has_jumped = move.distance > 0.05 + 2.0 * passed or abs(yaw) > 0.1 + 3.0 * passed
         if has_jumped or passed == math.inf:
             self._step[:] = 0.0
         return move if has_jumped else None
@@ -184,11 +174,11 @@ class ScenarioPositions(ScenarioMotion):
             return
         begin = self._begin[BASE_PORT]
         player = self._player
-        x, y, z, turn = (self._base + LEAD * pace * player.base_velocity).tolist()
+        x, y, z, yaw = (self._base + LEAD * pace * player.base_velocity).tolist()
         cos = math.cos(self._heading)
         sin = math.sin(self._heading)
         place = begin[0] + cos * x - sin * y, begin[1] + sin * x + cos * y, begin[2] + z
-        half = 0.5 * (self._heading + turn)
+        half = 0.5 * (self._heading + yaw)
         self._base_writer.write(VectorMessage("world", np.array((*place, 0.0, 0.0, math.sin(half), math.cos(half)))))
         vertices = self._begin[VERTICES_PORT] + self._vertices + LEAD * pace * player.vertex_velocity
         self._vertices_writer.write(PointsMessage("world", (), vertices))
@@ -196,13 +186,13 @@ class ScenarioPositions(ScenarioMotion):
     def arrives(self, period: float) -> bool:
         """See `ScenarioMotion.arrives`."""
         self._ended += period
-        return self._ended < ARRIVING or self._pose.still < STANDING_TIME
+        return self._ended < 4.0 * LEAD or self._pose.still < 0.3  # [s]: it stands after the last position
 
     def _request(self, task: str) -> str:
         """Request the begin of a reference; return what is missing."""
         if self._answer is None:
             self._answer = self._middleware.request(
-                self._service, GET, GetReference(task), ReferenceReply, REFERENCE_PATIENCE
+                self._service, GET_REFERENCE, GetReference(task), reply=ReferenceReply, timeout=ANSWER_TIMEOUT
             )
         if not self._answer.done():
             return f"an answer of {self._service}"

@@ -2,15 +2,10 @@
 
 import math
 
-from solfer.navigation.course import SMOOTHED, Course, Localisation, MeasuredPose
+from solfer.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose
 from solfer.navigation.waypoints import WaypointFollower
 from solfer.transport import Middleware
 from solfer.transport.messages import FieldsMessage
-
-TWIST = "geometry_msgs/Twist"
-
-WAYPOINT_SETTLED_TIME = 0.3
-"""Time for which the base stands still in the end [s]."""
 
 
 class WaypointCourse(Course):
@@ -37,9 +32,9 @@ class WaypointCourse(Course):
     ):
         self._follower = follower
         self._pose = MeasuredPose(middleware, odometry, localisation)
-        self._settles = 0.0 if localisation is None else SMOOTHED
+        self._settles = 0.0 if localisation is None else CORRECTION_TIME
         self._rested = 0.0
-        self._twist = middleware.writer(f"{target}/cmd_vel" if target else "cmd_vel", TWIST)
+        self._twist = middleware.writer(f"{target}/cmd_vel" if target else "cmd_vel", "geometry_msgs/Twist")
         self.writers = (self._twist,)
         self.count = len(follower.waypoints)
 
@@ -63,7 +58,7 @@ class WaypointCourse(Course):
         self._publish(cos * x + sin * y, cos * y - sin * x, rate)
         if moves:
             return True
-        if self._rested >= self._settles and pose.still >= WAYPOINT_SETTLED_TIME:
+        if self._rested >= self._settles and pose.still >= 0.3:
             return False
         follower.stay(place)
         return True

@@ -6,20 +6,11 @@ from dataclasses import dataclass
 
 from solfer.errors import SolferError
 
-WAYPOINT_ARRIVAL_DISTANCE, WAYPOINT_TURN_LIMIT = 0.01, 0.01
-"""Distance from the last waypoint [m], and from its heading [rad], that is near enough."""
-
-STRAYED = 0.02
-"""Distance from the last waypoint [m], and from its heading [rad], at which it has been left again."""
-
-PASSED = 0.05
-"""Distance at which a waypoint on the way counts as passed [m]."""
-
-WAYPOINT_GAIN = 1.5
+APPROACH_RATE = 1.5
 """Rate at which what is left of a way decreases near its end [1/s]."""
 
-DECELERATION_SHARE = 0.8
-"""Share of the largest deceleration with which it is planned to brake."""
+BRAKING_RATIO = 0.8
+"""Ratio of the deceleration with which it is planned to brake to the largest one."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +56,8 @@ class DriveLimits:
 class WaypointFollower:
     """Drives a base that can go in all directions along a polygon of waypoints, and turns it meanwhile.
 
-    It passes a waypoint within `PASSED`, slower the more the way bends there, and comes to rest at the last one. Its
-    velocities never change faster than the limits say.
+    It passes a waypoint within `PASSING_DISTANCE`, slower the more the way bends there, and comes to rest at the last
+    one. Its velocities never change faster than the limits say.
 
     Args:
         waypoints: At least one.
@@ -76,6 +67,15 @@ class WaypointFollower:
         velocity: x and y in the frame of the waypoints [m/s], and rate of the heading [rad/s].
         index: Waypoint that it goes to; the number of waypoints when it has arrived.
     """
+
+    ARRIVAL_DISTANCE = 0.01
+    """Distance from the last waypoint that is near enough [m]."""
+
+    ARRIVAL_ANGLE = 0.01
+    """Difference from its heading that is near enough [rad]."""
+
+    PASSING_DISTANCE = 0.05
+    """Distance at which a waypoint on the way counts as passed [m]."""
 
     def __init__(self, waypoints: Sequence[Waypoint], limits: DriveLimits):
         if not waypoints:
@@ -96,10 +96,10 @@ class WaypointFollower:
         Args:
             pose: x, y [m] and heading [rad] of the base.
             period: [s].
-            pace: Share of the planned speed.
+            pace: Fraction of the planned speed.
         """
         self._pose = x, y, heading = pose
-        while self.index < len(self.waypoints) - 1 and self._distance(x, y) <= PASSED:
+        while self.index < len(self.waypoints) - 1 and self._distance(x, y) <= self.PASSING_DISTANCE:
             self.index += 1
         if self.index >= len(self.waypoints) or (self._has_arrived(x, y, heading) and not any(self.velocity)):
             self.index = len(self.waypoints)
@@ -108,35 +108,35 @@ class WaypointFollower:
         goal = self.waypoints[self.index]
         distance = self._distance(x, y)
         limits = self.limits
-        arrived = self.index == len(self.waypoints) - 1 and distance <= WAYPOINT_ARRIVAL_DISTANCE
+        arrived = self.index == len(self.waypoints) - 1 and distance <= self.ARRIVAL_DISTANCE
         speed = 0.0 if arrived else pace * self._speed(distance)
-        turn = self._turn(heading)
+        yaw = self._heading_error(heading)
         rate = (
             0.0
-            if abs(turn) <= WAYPOINT_TURN_LIMIT
-            else pace * _approach(turn, limits.turn_speed, limits.turn_acceleration)
+            if abs(yaw) <= self.ARRIVAL_ANGLE
+            else pace * _approach(yaw, limits.turn_speed, limits.turn_acceleration)
         )
-        share = speed / distance if distance > 0.0 else 0.0
-        self._change((share * (goal.x - x), share * (goal.y - y)), math.copysign(rate, turn), period)
+        scale = speed / distance if distance > 0.0 else 0.0
+        self._change((scale * (goal.x - x), scale * (goal.y - y)), math.copysign(rate, yaw), period)
         return True
 
     @property
     def left(self) -> float:
-        """Time that is left [s], about: path by speed, or turn by rate, and braking."""
+        """Time that is left [s], about: path by speed, or yaw by rate, and braking."""
         if self.index >= len(self.waypoints):
             return 0.0
         x, y, heading = self._pose
         limits = self.limits
         path = self._distance(x, y) + self._after[self.index]
-        turn = abs(self._turn(heading))
+        yaw = abs(self._heading_error(heading))
         return max(_duration(path, limits.speed, limits.acceleration),
-                   _duration(turn, limits.turn_speed, limits.turn_acceleration))  # fmt: skip
+                   _duration(yaw, limits.turn_speed, limits.turn_acceleration))  # fmt: skip
 
     def stay(self, pose: tuple[float, float, float]) -> None:
         """Go to the last waypoint once more if a base that has arrived is elsewhere; see `step`."""
         x, y, heading = pose
         self.index = len(self.waypoints) - 1
-        if self._distance(x, y) <= STRAYED and abs(self._turn(heading)) <= STRAYED:
+        if self._distance(x, y) <= 0.02 and abs(self._heading_error(heading)) <= 0.02:  # [m, rad]
             self.index = len(self.waypoints)
 
     def stop(self) -> None:
@@ -164,11 +164,11 @@ class WaypointFollower:
         through = self._through[self.index]
         if self.index == len(self.waypoints) - 1:
             return _approach(distance, limits.speed, limits.acceleration)
-        left = max(0.0, distance - PASSED)
-        braking = math.sqrt(through**2 + 2.0 * DECELERATION_SHARE * limits.acceleration * left)
-        return min(limits.speed, max(braking, WAYPOINT_GAIN * PASSED))
+        left = max(0.0, distance - self.PASSING_DISTANCE)
+        braking = math.sqrt(through**2 + 2.0 * BRAKING_RATIO * limits.acceleration * left)
+        return min(limits.speed, max(braking, APPROACH_RATE * self.PASSING_DISTANCE))
 
-    def _turn(self, heading: float) -> float:
+    def _heading_error(self, heading: float) -> float:
         """Return what is left to the heading of the present waypoint, or of the next one that has one [rad]."""
         desired = next((each.heading for each in self.waypoints[self.index :] if each.heading is not None), heading)
         return math.remainder(desired - heading, math.tau)
@@ -177,28 +177,28 @@ class WaypointFollower:
         last = self.index == len(self.waypoints) - 1
         return (
             last
-            and self._distance(x, y) <= WAYPOINT_ARRIVAL_DISTANCE
-            and abs(self._turn(heading)) <= WAYPOINT_TURN_LIMIT
+            and self._distance(x, y) <= self.ARRIVAL_DISTANCE
+            and abs(self._heading_error(heading)) <= self.ARRIVAL_ANGLE
         )
 
     def _change(self, desired: tuple[float, float], rate: float, period: float) -> None:
         """Let the velocity go to the desired one within the acceleration."""
-        vx, vy, turn = self.velocity
+        vx, vy, before = self.velocity
         change = math.hypot(desired[0] - vx, desired[1] - vy)
         most = self.limits.acceleration * period
-        share = 1.0 if change <= most else most / change
+        ratio = 1.0 if change <= most else most / change
         step = self.limits.turn_acceleration * period
         self.velocity = (
-            vx + share * (desired[0] - vx),
-            vy + share * (desired[1] - vy),
-            turn + min(max(rate - turn, -step), step),
+            vx + ratio * (desired[0] - vx),
+            vy + ratio * (desired[1] - vy),
+            before + min(max(rate - before, -step), step),
         )
 
 
 def _approach(left: float, speed: float, acceleration: float) -> float:
     """Return the speed with which the end of a path can still be met."""
     left = abs(left)
-    return min(speed, math.sqrt(2.0 * DECELERATION_SHARE * acceleration * left), WAYPOINT_GAIN * left)
+    return min(speed, math.sqrt(2.0 * BRAKING_RATIO * acceleration * left), APPROACH_RATE * left)
 
 
 def _duration(path: float, speed: float, acceleration: float) -> float:

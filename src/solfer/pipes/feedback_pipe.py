@@ -14,7 +14,7 @@ from solfer.numerics.filters import LowPass
 from solfer.pipes.pipe_warnings import PipeWarnings
 from solfer.pipes.precedence import Precedence, Watch
 from solfer.pipes.state_field import StateField
-from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, MessageStatus, Publisher, Reader
+from solfer.transport.endpoints import NEW, NONE, OLD, PUBLISHER_TIMEOUT, MessageStatus, Publisher, Reader
 from solfer.transport.messages import Message
 from solfer.transport.sender_clock import SenderClock
 
@@ -225,7 +225,7 @@ class FeedbackPipe(abc.ABC):
 
     def _name_publishers(self) -> None:
         reader = self.reader
-        recent_senders = reader.recent_senders(reader.arrival - RIVALRY)
+        recent_senders = reader.recent_senders(reader.arrival - PUBLISHER_TIMEOUT)
         if len(recent_senders) > 1:
             self.warnings.throttle.warning(
                 "publishers",
@@ -414,7 +414,7 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def conflict(self, now: float) -> str:
         """See `FeedbackPipe.conflict`."""
-        rivals = [] if self._precedence is None else self._precedence.rivals(now - RIVALRY)
+        rivals = [] if self._precedence is None else self._precedence.rivals(now - PUBLISHER_TIMEOUT)
         if not rivals:
             return ""
         return f"{self.place}, where {' and '.join(rivals)} publish the same DoFs: end one of them"

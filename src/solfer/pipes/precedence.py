@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.transport.endpoints import RIVALRY
+from solfer.transport.endpoints import PUBLISHER_TIMEOUT
 
 
 class Owner:
@@ -80,7 +80,7 @@ class Precedence:
     """
 
     def __init__(self, size: int):
-        self.timeout = RIVALRY
+        self.timeout = PUBLISHER_TIMEOUT
         self.strikes = 1
         self.ignored = 0
         self.handovers = 0
@@ -110,7 +110,7 @@ class Precedence:
             return True
         self.ignored += 1
         if name not in self._conflicts:
-            self._forget(arrival - RIVALRY)
+            self._forget(arrival - PUBLISHER_TIMEOUT)
         self._conflicts[name] = arrival, rivals
         return False
 

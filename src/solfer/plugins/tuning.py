@@ -18,10 +18,10 @@ from solfer.config.yaml.nodes import dotted
 from solfer.errors import ComponentError, Overtaken, SizeMismatch, SolferError, UnknownName, described, singles
 from solfer.interfaces.declaration import Accepted, LiveParameter, Service
 from solfer.transport.parameters import (
+    GET_INTERFACE,
     GET_PARAMETERS,
-    GETTING,
+    SET_INTERFACE,
     SET_PARAMETERS,
-    SETTING,
     GetParameters,
     ParametersReply,
     SetParameters,
@@ -154,7 +154,7 @@ class Tuning:
         """Make the service `<plugin>/set_parameters`."""
         return Service(
             SET_PARAMETERS,
-            SETTING,
+            SET_INTERFACE,
             SetParameters,
             reply=Accepted,
             handler=self._carry_out,
@@ -166,7 +166,7 @@ class Tuning:
         """Make the service `<plugin>/get_parameters`."""
         return Service(
             GET_PARAMETERS,
-            GETTING,
+            GET_INTERFACE,
             GetParameters,
             reply=ParametersReply,
             handler=lambda reply: reply,

@@ -7,13 +7,13 @@ from pathlib import Path
 from solfer.segments.files import PREFIX
 from solfer.segments.latched import latched
 
-ESTOP_FILE = "estop"
-ESTOP_KIND = "estop"
-ESTOP_LAYOUT = b"""{"words": ["tripped", "time [ns]", "pid", "answer [ns]", "answering pid", "holds"],
-"texts": ["reason", "answer"]}"""
-TRIPPED, TIME, PID, ANSWER, ANSWERING, HOLDS = range(6)
-ESTOP_WORDS = 6
-ESTOP_TEXT_BYTES = 160  # [words], [B]
+# words of the memory
+TRIPPED = 0
+TRIP_TIME = 1  # [ns]
+TRIP_PID = 2
+ANSWER_TIME = 3  # [ns]
+ANSWER_PID = 4
+HOLDS = 5
 
 
 class EmergencyStopLatch:
@@ -31,13 +31,18 @@ class EmergencyStopLatch:
         MiddlewareError: The folder cannot be used, or a foreign file is in the way.
     """
 
+    TEXT_SIZE = 160
+    """Bytes of the reason, and of the answer; what is longer is cut off."""
+
     def __init__(self, folder: Path):
-        self.segment = latched(
-            folder / ESTOP_FILE, ESTOP_KIND, ESTOP_LAYOUT, size=8 * ESTOP_WORDS + 2 * ESTOP_TEXT_BYTES
-        )
-        self._words = self.segment.data[: 8 * ESTOP_WORDS].cast("q")
-        self._text = self.segment.data[8 * ESTOP_WORDS : 8 * ESTOP_WORDS + ESTOP_TEXT_BYTES]
-        self._answer = self.segment.data[8 * ESTOP_WORDS + ESTOP_TEXT_BYTES : 8 * ESTOP_WORDS + 2 * ESTOP_TEXT_BYTES]
+        layout = b"""{"words": ["tripped", "time [ns]", "pid", "answer [ns]", "answering pid", "holds"],
+"texts": ["reason", "answer"]}"""
+        words = 8 * 6  # [B]
+        text = self.TEXT_SIZE
+        self.segment = latched(folder / "estop", "estop", layout, size=words + 2 * text)
+        self._words = self.segment.data[:words].cast("q")
+        self._text = self.segment.data[words : words + text]
+        self._answer = self.segment.data[words + text : words + 2 * text]
 
     def __bool__(self) -> bool:
         return bool(self._words[TRIPPED])
@@ -47,7 +52,7 @@ class EmergencyStopLatch:
         """Why it was tripped, and by which process; empty while it is not."""
         if not self:
             return ""
-        return f"{_read(self._text)} (process {self._words[PID]})"
+        return f"{_read(self._text)} (process {self._words[TRIP_PID]})"
 
     @property
     def cure(self) -> str:
@@ -57,17 +62,17 @@ class EmergencyStopLatch:
     @property
     def time(self) -> int:
         """Time at which it was tripped, on the monotonic clock [ns]."""
-        return self._words[TIME]
+        return self._words[TRIP_TIME]
 
     @property
     def answered(self) -> int:
         """Time at which an executor last held because of it, on the monotonic clock [ns]; 0: never."""
-        return self._words[ANSWER]
+        return self._words[ANSWER_TIME]
 
     @property
     def answer_pid(self) -> int:
         """Process of that executor; 0: none."""
-        return self._words[ANSWERING]
+        return self._words[ANSWER_PID]
 
     @property
     def holds(self) -> bool:
@@ -76,7 +81,7 @@ class EmergencyStopLatch:
 
     @property
     def answer_text(self) -> str:
-        """Which plugins of that executor hold, or which cannot and why; cut off at TEXT bytes."""
+        """Which plugins of that executor hold, or which cannot and why; cut off at `TEXT_SIZE` bytes."""
         return _read(self._answer)
 
     def trip(self, reason: str) -> None:
@@ -84,15 +89,16 @@ class EmergencyStopLatch:
         if self:
             return
         _write(self._text, reason)
-        self._words[TIME], self._words[PID] = time.monotonic_ns(), os.getpid()
+        self._words[TRIP_TIME] = time.monotonic_ns()
+        self._words[TRIP_PID] = os.getpid()
         self._words[TRIPPED] = 1
 
     def answer(self, text: str, holds: bool = True) -> None:
         """Confirm as the executor that all plugins hold, or name those that cannot."""
         _write(self._answer, text)
-        self._words[ANSWERING] = os.getpid()
+        self._words[ANSWER_PID] = os.getpid()
         self._words[HOLDS] = holds
-        self._words[ANSWER] = time.monotonic_ns()
+        self._words[ANSWER_TIME] = time.monotonic_ns()
 
     def close(self) -> None:
         """Leave it to the others; tripped or not, it stays."""
@@ -117,4 +123,4 @@ def _read(text: memoryview) -> str:
 
 
 def _write(text: memoryview, content: str) -> None:
-    text[:] = content.encode(errors="replace")[:ESTOP_TEXT_BYTES].ljust(ESTOP_TEXT_BYTES, b"\0")
+    text[:] = content.encode(errors="replace")[: len(text)].ljust(len(text), b"\0")

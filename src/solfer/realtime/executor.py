@@ -28,11 +28,15 @@ from solfer.transport.plugin_state import FAILED_STATES, SAFE_STOP, PluginState
 
 logger = logging.getLogger(__name__)
 
-BESIDE_CALL_PERIOD = 0.1
-"""Time between two calls of `beside` [s]."""
-
-CYCLE, OVERHEAD, LATENESS = LoopTime
-CYCLES, SKIPPED, OVERRUNS, UNFORGIVEN, TIME = LoopCount
+# to look a member up in its enumeration would cost time in each cycle
+CYCLE = LoopTime.CYCLE
+OVERHEAD = LoopTime.OVERHEAD
+LATENESS = LoopTime.LATENESS
+CYCLES = LoopCount.CYCLES
+SKIPPED = LoopCount.SKIPPED
+OVERRUNS = LoopCount.OVERRUNS
+UNFORGIVEN = LoopCount.UNFORGIVEN
+TIME = LoopCount.TIME
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class ExecutorRules:
 
     Attributes:
         blend: Shortest time in which commands blend in from the measured state at a start [s].
-        budget: Share of the period that a component may use.
+        budget: Fraction of the period that a component may use.
         overruns: Unforgiven overruns, of the loop or of a component's budget, at which it is stopped.
         grace: First cycles, of the loop and of each start of a plugin, in which overruns do not count.
     """
@@ -124,7 +128,7 @@ class Executor:
         )
         self._set.measure(telemetry.nanoseconds, self._durations[len(LoopTime) :])
         self._set.interrupted = self._interrupted
-        self._seldom = max(1, round(BESIDE_CALL_PERIOD * self.rate))
+        self._beside_cycles = max(1, round(0.1 * self.rate))  # from one call of `beside` to the next
         self._period = round(1e9 / self.rate)
         self._late = LeakyCounter(rules.overruns)
         self._black_box = telemetry.black_box
@@ -176,7 +180,7 @@ class Executor:
         Deadlines are absolute. A loop that is late skips whole periods and never makes up for them.
         """
         try:
-            FixedRateLoop(self._middleware, self.rate).run(self._turn, running or self._middleware.running)
+            FixedRateLoop(self._middleware, self.rate).run(self._run_cycle, running or self._middleware.running)
         finally:
             self.close()
 
@@ -228,7 +232,7 @@ class Executor:
                 expected=f"`{self.estop.cure}`, or the service {EXECUTOR}/estop_clear, first",
             )
 
-    def _turn(self, late: float, skipped: int) -> None:
+    def _run_cycle(self, late: float, skipped: int) -> None:
         """Run a cycle, which begins `late` [s] after its deadline, or after the first one of the `skipped` periods."""
         lateness = max(0, int(1e9 * late))
         overhang = self._overhang()
@@ -236,7 +240,7 @@ class Executor:
             self._skip(skipped, lateness - overhang)
         # what the cycle before took too long was counted with that
         self.cycle(lateness - min(skipped, overhang // self._period) * self._period)
-        if self._set.cycles % self._seldom == 0:
+        if self._set.cycles % self._beside_cycles == 0:
             for index, managed in enumerate(self.plugins):
                 self.statistics.put_computed(index, managed.plugin.robot.computations())
                 managed.plugin.tuning.log()

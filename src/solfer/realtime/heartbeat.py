@@ -8,9 +8,6 @@ from solfer.errors import MiddlewareError
 from solfer.segments.segment import Segment
 from solfer.telemetry import STATISTICS
 
-HEARTBEAT_POLL_PERIOD = 0.05
-"""Time between two looks for a process that is missing, or has begun again [s]."""
-
 
 class Heartbeat:
     """The heartbeat of an RT process, which may come, go and come back.
@@ -23,6 +20,9 @@ class Heartbeat:
         generation: How often a heartbeat was begun in this namespace; 0: never.
         period: Time from one of its beats to the next [s]; 0 before the first.
     """
+
+    POLL_PERIOD = 0.05
+    """Time between two searches for a process that is missing, or has begun again [s]."""
 
     def __init__(self, folder: Path):
         self._path = folder / STATISTICS
@@ -41,7 +41,7 @@ class Heartbeat:
             now = time.monotonic()
             if now < self._next_look:
                 return None
-            self._next_look = now + HEARTBEAT_POLL_PERIOD
+            self._next_look = now + self.POLL_PERIOD
             segment = self._attach()
             if segment is None:
                 return None

@@ -6,11 +6,8 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-STOPPED_CODES = frozenset("Tt")
-"""States of a process that a signal or a debugger has stopped."""
 
-
-class ProcessorShare:
+class ProcessorTime:
     """Measures how long the main thread of another process ran, or waited for something else than a processor.
 
     Args:
@@ -31,7 +28,7 @@ class ProcessorShare:
         state, ran = self._read()
         before = self._ran
         self._ran = ran
-        if state in STOPPED_CODES:
+        if state in ("T", "t"):  # stopped by a signal or a debugger
             return 0.0
         return 1e-9 * (ran - before) if state == "R" else elapsed
 

@@ -8,13 +8,8 @@ import os
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
-PRIORITY = 60
-"""Priority of the RT process among those of SCHED_FIFO."""
-
 LATENCY = "/dev/cpu_dma_latency"
-MCL_CURRENT = 1
-MCL_FUTURE = 2
-PR_SET_TIMERSLACK = 29
+"""File that keeps the processors out of deep sleep while it is open."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +25,7 @@ class ScheduleRequest:
         freeze_collector: Whether the garbage collector is off while the loop runs.
     """
 
-    priority: int = PRIORITY
+    priority: int = 60
     cpus: tuple[int, ...] = ()
     lock_memory: bool = True
     timer_slack: int = 1
@@ -75,34 +70,37 @@ class Schedule:
                 self._undo.pop()()
 
 
-def apply(wishes: ScheduleRequest) -> Schedule:
+def apply(request: ScheduleRequest) -> Schedule:
     """Apply the requested measures as far as the kernel grants them; never fails."""
+    pr_set_timerslack = 29  # of sys/prctl.h
+    mcl_current = 1  # of sys/mman.h
+    mcl_future = 2
     schedule = Schedule()
-    if wishes.freeze_collector:
+    if request.freeze_collector:
         schedule.attempt("collector frozen", _freeze, _thaw)
-    if wishes.timer_slack:
+    if request.timer_slack:
         schedule.attempt(
-            f"timer slack {wishes.timer_slack} ns",
-            lambda: _libc("prctl", PR_SET_TIMERSLACK, ctypes.c_ulong(wishes.timer_slack)),
+            f"timer slack {request.timer_slack} ns",
+            lambda: _libc("prctl", pr_set_timerslack, ctypes.c_ulong(request.timer_slack)),
         )
-    if wishes.lock_memory:
+    if request.lock_memory:
         schedule.attempt(
-            "memory locked", lambda: _libc("mlockall", MCL_CURRENT | MCL_FUTURE), lambda: _libc("munlockall")
+            "memory locked", lambda: _libc("mlockall", mcl_current | mcl_future), lambda: _libc("munlockall")
         )
-    if wishes.cpu_latency:
+    if request.cpu_latency:
         latency = _Latency()
         schedule.attempt("processor latency", latency.open, latency.close)
-    if wishes.cpus:
+    if request.cpus:
         before = os.sched_getaffinity(0)
         schedule.attempt(
-            f"processors {_listed(wishes.cpus)}",
-            lambda: _keep_to(wishes.cpus, before),
+            f"processors {_listed(request.cpus)}",
+            lambda: _keep_to(request.cpus, before),
             lambda: os.sched_setaffinity(0, before),
         )
-    if wishes.priority:
+    if request.priority:
         schedule.attempt(
-            f"FIFO {wishes.priority}",
-            lambda: _fifo(wishes.priority),
+            f"FIFO {request.priority}",
+            lambda: _fifo(request.priority),
             lambda: os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0)),
         )
     return schedule

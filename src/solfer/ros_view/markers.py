@@ -17,33 +17,14 @@ from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene import ContactForce, ScenePose, SceneState, ShownReference
 
-DESIRED_PREFIX = "desired"
-"""Prefix of the frames of the desired robot."""
-
-LIFETIME = 0.5
-"""Time after which what is not published again disappears [s]."""
-
 FORCE_SCALE = 1e-3
 """Length of the arrow of a force [m/N]."""
-
-MARKER_SMALLEST_SIZE = 0.05
-"""Smallest height of a cone of friction [m]."""
-
-SIDES = 24
-"""Triangles of a cone of friction."""
 
 AXES_LENGTH = 0.1
 """Length of the axes of a reference [m]."""
 
 MEASURED_COLOR = (0.1, 0.4, 0.9, 1.0)
-PROJECTED = (0.9, 0.2, 0.2, 1.0)
-EDGES_MARKER_COLOR = (0.1, 0.7, 0.2, 1.0)
-INNER_MARKER_COLOR = (0.9, 0.7, 0.1, 1.0)
-FORCE_MARKER_COLOR = (0.9, 0.3, 0.1, 1.0)
-CONE = (0.9, 0.6, 0.1, 0.25)
-PATH_MARKER_COLOR = (0.6, 0.2, 0.8, 1.0)
-GOAL_MARKER_COLOR = (0.5, 0.5, 0.5, 0.7)
-OF_AXES = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.8, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
+"""Color of what is measured: red, green, blue, opacity."""
 
 
 class SceneMarkers:
@@ -76,7 +57,7 @@ class SceneMarkers:
     def _placed(self, state: SceneState) -> Iterator[TransformStamped]:
         stamp = genpy.Time(*present())
         for link, pose in state.desired.items():
-            made = TransformStamped(child_frame_id=prefixed(self._prefix, f"{DESIRED_PREFIX}/{link}"))
+            made = TransformStamped(child_frame_id=prefixed(self._prefix, f"desired/{link}"))
             made.header.frame_id = state.frame
             made.header.stamp = stamp
             placed = pose_of(pose)
@@ -94,17 +75,18 @@ def markers_of(state: SceneState) -> Iterator[Marker]:
     """Make the markers of a scene."""
     for made in _markers(state):
         made.header.frame_id = state.frame
-        made.lifetime = genpy.Duration.from_sec(LIFETIME)
+        made.lifetime = genpy.Duration.from_sec(0.5)  # disappears unless it is published again
         yield made
 
 
 def _markers(state: SceneState) -> Iterator[Marker]:
+    projected = (0.9, 0.2, 0.2, 1.0)
     yield _ball("center", 0, state.center, size=0.08, color=MEASURED_COLOR)
-    yield _ball("center", 1, state.projection, size=0.05, color=PROJECTED)
-    yield _lines("center", 2, [state.center, state.projection], width=0.005, color=PROJECTED)
+    yield _ball("center", 1, state.projection, size=0.05, color=projected)
+    yield _lines("center", 2, [state.center, state.projection], width=0.005, color=projected)
     for name, corners, color in (
-        ("polygon", state.polygon, EDGES_MARKER_COLOR),
-        ("margins", state.inner, INNER_MARKER_COLOR),
+        ("polygon", state.polygon, (0.1, 0.7, 0.2, 1.0)),
+        ("margins", state.inner, (0.9, 0.7, 0.1, 1.0)),
     ):
         if len(corners):
             yield _lines(name, 0, [*corners, corners[0]], width=0.015, color=color)
@@ -114,13 +96,12 @@ def _markers(state: SceneState) -> Iterator[Marker]:
             yield _cone(index, force, state.friction)
     for index, reference in enumerate(state.references):
         yield _frame(index, reference)
-        yield _ball("desired", index, reference.desired.position, size=0.03, color=GOAL_MARKER_COLOR)
+        yield _ball("desired", index, reference.desired.position, size=0.03, color=(0.5, 0.5, 0.5, 0.7))
         yield _name(index, reference)
     if len(state.path) > 1:
         ground = state.projection[2]
-        yield _lines(
-            "path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], width=0.015, color=PATH_MARKER_COLOR
-        )
+        points = [np.array((x, y, ground)) for x, y, _ in state.path]
+        yield _lines("path", 0, points, width=0.015, color=(0.6, 0.2, 0.8, 1.0))
 
 
 def _marker(name: str, number: int, kind: int, scale: tuple[float, float, float], color: Iterable[float]) -> Marker:
@@ -142,16 +123,17 @@ def _lines(name: str, number: int, points: Iterable[np.ndarray], width: float, c
 
 
 def _arrow(number: int, force: ContactForce) -> Marker:
-    made = _marker("forces", number, Marker.ARROW, scale=(0.02, 0.04, 0.06), color=FORCE_MARKER_COLOR)
+    made = _marker("forces", number, Marker.ARROW, scale=(0.02, 0.04, 0.06), color=(0.9, 0.3, 0.1, 1.0))
     made.points = [_point(force.position), _point(force.position + FORCE_SCALE * force.force)]
     return made
 
 
 def _cone(number: int, force: ContactForce, friction: float) -> Marker:
     """Make a cone as high as the vertical force is long: what friction holds has its tip in the base of the cone."""
-    height = max(FORCE_SCALE * float(force.force[2]), MARKER_SMALLEST_SIZE)
-    made = _marker("cones", number, Marker.TRIANGLE_LIST, scale=(1.0, 1.0, 1.0), color=CONE)
-    angles = [math.tau * each / SIDES for each in range(SIDES + 1)]
+    height = max(FORCE_SCALE * float(force.force[2]), 0.05)
+    made = _marker("cones", number, Marker.TRIANGLE_LIST, scale=(1.0, 1.0, 1.0), color=(0.9, 0.6, 0.1, 0.25))
+    sides = 24
+    angles = [math.tau * each / sides for each in range(sides + 1)]
     radius = friction * height
     rim = [force.position + (radius * math.cos(angle), radius * math.sin(angle), height) for angle in angles]
     apex = _point(force.position)
@@ -164,7 +146,8 @@ def _frame(number: int, reference: ShownReference) -> Marker:
     made = _marker("references", number, Marker.LINE_LIST, scale=(0.01, 0.0, 0.0), color=MEASURED_COLOR)
     position = reference.reference.position
     rotation = reference.reference.rotation
-    for axis, color in zip(rotation.T, OF_AXES, strict=True):
+    colors = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.8, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
+    for axis, color in zip(rotation.T, colors, strict=True):
         made.points += [_point(position), _point(position + AXES_LENGTH * axis)]
         made.colors += [ColorRGBA(*color)] * 2
     return made

@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+from geometry_msgs.msg import Quaternion
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback
 
@@ -13,27 +14,6 @@ from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.ros_view.markers import pose_of
 from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
 from solfer.scene.live_scene import WORLD
-
-HANDLE_SIZE = 0.25
-"""Of a marker [m]."""
-
-HANDLE_STEP = 1e-3
-"""How far a reference moves before its marker follows [m, rad]."""
-
-ROOT_OF_HALF = np.sqrt(0.5)
-AXIS_QUATERNIONS = {
-    "x": (ROOT_OF_HALF, 0.0, 0.0, ROOT_OF_HALF),
-    "y": (0.0, 0.0, ROOT_OF_HALF, ROOT_OF_HALF),
-    "z": (0.0, ROOT_OF_HALF, 0.0, ROOT_OF_HALF),
-}
-"""Quaternions (x, y, z, w) that turn the axis x of a control to each axis."""
-
-DRAG_MODES = {
-    "position": (InteractiveMarkerControl.MOVE_AXIS,),
-    "orientation": (InteractiveMarkerControl.ROTATE_AXIS,),
-    "pose": (InteractiveMarkerControl.MOVE_AXIS, InteractiveMarkerControl.ROTATE_AXIS),
-}
-"""How a reference can be dragged, by its quantity."""
 
 
 class ReferenceMarkers:
@@ -82,10 +62,10 @@ class ReferenceMarkers:
             self._dragged.release(shown, feedback.client_id)
         elif feedback.event_type == feedback.POSE_UPDATE:
             place = feedback.pose.position
-            turn = feedback.pose.orientation
+            rotation = feedback.pose.orientation
             position = np.array((place.x, place.y, place.z))
             try:
-                pose = ScenePose(position, rotation_from_quaternion((turn.x, turn.y, turn.z, turn.w)))
+                pose = ScenePose(position, rotation_from_quaternion((rotation.x, rotation.y, rotation.z, rotation.w)))
             except NotFinite:
                 return
             if np.isfinite(position).all():
@@ -96,13 +76,20 @@ class ReferenceMarkers:
 
 
 def _made(name: str, frame: str, shown: ShownReference) -> InteractiveMarker:
-    made = InteractiveMarker(name=name, description=name, scale=HANDLE_SIZE, pose=pose_of(shown.own))
+    half = np.sqrt(0.5)
+    rotations = {  # quaternions that rotate the axis x of a control to each axis
+        "x": Quaternion(half, 0.0, 0.0, half),
+        "y": Quaternion(0.0, 0.0, half, half),
+        "z": Quaternion(0.0, half, 0.0, half),
+    }
+    move = InteractiveMarkerControl.MOVE_AXIS
+    rotate = InteractiveMarkerControl.ROTATE_AXIS
+    modes = {"position": (move,), "orientation": (rotate,), "pose": (move, rotate)}
+    made = InteractiveMarker(name=name, description=name, scale=0.25, pose=pose_of(shown.own))
     made.header.frame_id = frame
-    for direction in DRAG_MODES[shown.quantity]:
-        for axis, turn in AXIS_QUATERNIONS.items():
-            control = InteractiveMarkerControl(name=f"{axis}{direction}", interaction_mode=direction)
-            place = control.orientation
-            place.x, place.y, place.z, place.w = turn
+    for mode in modes[shown.quantity]:
+        for axis, rotation in rotations.items():
+            control = InteractiveMarkerControl(name=f"{axis}{mode}", interaction_mode=mode, orientation=rotation)
             made.controls.append(control)
     return made
 
@@ -111,4 +98,4 @@ def _differs(first: ScenePose | None, second: ScenePose) -> bool:
     if first is None:
         return True
     away = np.abs(first.position - second.position).max(), np.abs(first.rotation - second.rotation).max()
-    return not max(away) < HANDLE_STEP
+    return not max(away) < 1e-3  # [m], of the rotation's numbers [1]

@@ -14,11 +14,6 @@ from solfer.transport import Middleware
 
 logger = logging.getLogger(__name__)
 
-STATISTICS_PERIOD = 1.0
-"""Time between two messages [s]."""
-
-SUMMARY_MESSAGES = {LayerSummary: LayerStatistics, PluginSummary: PluginStatistics, StageSummary: StageTimes}
-
 
 class StatisticsPublisher:
     """Reads the statistics of a layer once a second, in a thread of its own, and publishes them.
@@ -29,9 +24,7 @@ class StatisticsPublisher:
         period: Time between two messages [s].
     """
 
-    def __init__(
-        self, look: Callable[[], LayerSummary | None], middleware: Middleware, period: float = STATISTICS_PERIOD
-    ):
+    def __init__(self, look: Callable[[], LayerSummary | None], middleware: Middleware, period: float = 1.0):
         self._look = look
         self._middleware = middleware
         self._period = period
@@ -43,7 +36,9 @@ class StatisticsPublisher:
 
     def cycle(self) -> None:
         """Read the statistics once and publish them."""
-        figures, self._before, before = self._look(), None, self._before
+        figures = self._look()
+        before = self._before
+        self._before = None
         for name, report in reports_of(figures, before).items():
             self._middleware.report(name, report.level, report.summary, report.values)
         if figures is None:
@@ -70,7 +65,8 @@ class StatisticsPublisher:
 
 def message_of(figures: Any) -> Any:
     """Convert figures to their message, with the fields that it has."""
-    kind = SUMMARY_MESSAGES[type(figures)]
+    kinds = {LayerSummary: LayerStatistics, PluginSummary: PluginStatistics, StageSummary: StageTimes}
+    kind = kinds[type(figures)]
     fields = {name: getattr(figures, name) for name in kind.__slots__ if hasattr(figures, name)}
     for name, value in fields.items():
         if isinstance(value, Sequence) and not isinstance(value, str):

@@ -7,11 +7,6 @@ from solfer.scenarios.scenario import Scenario
 from solfer.scenarios.script import Script
 from solfer.scenarios.steps import played
 
-STEP_PERIODS = 1_000_000
-"""Periods that a step may take."""
-
-_ROUNDING = 1e-9  # of a period
-
 
 class Player:
     """Plays a scenario, open loop: what it gives never depends on the robot.
@@ -96,16 +91,17 @@ class Player:
 
         Args:
             period: Another time than `self.period` by which to go on [s], above zero: what plays a scenario slower
-                than it is goes on by a share of its own period, and multiplies the velocities by that share.
+                than it is goes on by a fraction of its own period, and multiplies the velocities by that fraction.
         """
         period = self.period if period is None else period
         vertices = self.vertex_velocity
         base = self.base_velocity
         left = period
+        rounding = 1e-9  # of a period
         vertices[:] = 0.0
         base[:] = 0.0
-        while left > _ROUNDING * period:
-            if self._rest <= _ROUNDING * self._script.period:
+        while left > rounding * period:
+            if self._rest <= rounding * self._script.period:
                 if not self._go_on():
                     break
                 self._rest = self._script.period
@@ -144,16 +140,17 @@ def count_periods(scenario: Scenario) -> tuple[int, ...]:
         ConfigError: A step never ends.
     """
     script = Script(scenario)
+    limit = 1_000_000  # periods that a step may take
     counts = []
     for number, (record, step) in enumerate(zip(scenario.pattern, played(scenario), strict=True), 1):
         step.start(script)
         most = step.longest(script)
         count = 0
         while not step.done(script):
-            if count > most or most > STEP_PERIODS:
+            if count > most or most > limit:
                 raise ConfigError(
                     f"step {number} of the pattern, '{record.type}', "
-                    + ("never ends" if count > most or most == np.inf else f"takes more than {STEP_PERIODS} periods"),
+                    + ("never ends" if count > most or most == np.inf else f"takes more than {limit} periods"),
                     where=record.where(),
                     expected="speeds with which its goals can be reached, and met to 5 mm and 5 mrad",
                 )

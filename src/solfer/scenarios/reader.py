@@ -13,6 +13,7 @@ from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 from solfer.scenarios.player import count_periods
 from solfer.scenarios.records import (
+    BASE_ROW,
     VERBS,
     FootprintRecord,
     LegRecord,
@@ -23,13 +24,9 @@ from solfer.scenarios.records import (
 )
 from solfer.scenarios.scenario import Scenario
 
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 PATTERN = "pattern"
-_TABLES = {"x_cp": "x cp ref", "y_cp": "y cp ref", "z_cp": "z cp ref", "base": "base ref", "cs": "cs ref"}
-_OF_LEGS = {"x cp": "x_cp", "y cp": "y_cp", "z cp": "z_cp"}
-_TABLES_OF_LEGS = {"x cp ref": "x_cp_ref", "y cp ref": "y_cp_ref", "z cp ref": "z_cp_ref", "cs ref": "cs_ref"}
-_BASE_ROW = 3
 
 
 def read_scenario(path: str | os.PathLike) -> Scenario:
@@ -54,7 +51,7 @@ def read_scenario(path: str | os.PathLike) -> Scenario:
         _check_legs(node, record, problems)
         for step in pattern:
             _check_step(step, record, problems)
-    problems.log(_LOG)
+    problems.log(logger)
     problems.raise_if_any()
     assert record is not None
     scenario = Scenario(file.path, record, tuple(pattern))
@@ -120,8 +117,10 @@ def _step(node: YamlNode, problems: Problems) -> Step | None:
 
 def _check_legs(node: YamlNode, record: ScenarioRecord, problems: Problems) -> None:
     """Check that all lists of legs are of one length: that of most of them."""
-    lengths: dict[tuple[Key, ...], int] = {(key,): len(getattr(record, field)) for key, field in _OF_LEGS.items()}
-    for key, field in _TABLES_OF_LEGS.items():
+    lists = {"x cp": "x_cp", "y cp": "y_cp", "z cp": "z_cp"}
+    tables = {"x cp ref": "x_cp_ref", "y cp ref": "y_cp_ref", "z cp ref": "z_cp_ref", "cs ref": "cs_ref"}
+    lengths: dict[tuple[Key, ...], int] = {(key,): len(getattr(record, field)) for key, field in lists.items()}
+    for key, field in tables.items():
         lengths |= {(key, row): len(each) for row, each in enumerate(getattr(record, field) or ())}
     legs = statistics.mode(lengths.values())
     for path, length in lengths.items():
@@ -132,30 +131,33 @@ def _check_legs(node: YamlNode, record: ScenarioRecord, problems: Problems) -> N
 def _check_step(step: Step, record: ScenarioRecord, problems: Problems) -> None:
     """Check what a step refers to: rows of tables, legs, and speeds."""
     if isinstance(step, FootprintRecord):
+        names = {"x_cp": "x cp ref", "y_cp": "y cp ref", "z_cp": "z cp ref", "base": "base ref", "cs": "cs ref"}
         rows = {"x_cp": record.x_cp_ref, "y_cp": record.y_cp_ref, "z_cp": record.z_cp_ref}
         if isinstance(step, MoveRecord):
             rows |= {"base": record.base_ref}
             rows |= {"cs": record.cs_ref or ()} if step.cs is not None else {}
         for key, table in rows.items():
-            _check_index(step, (key,), getattr(step, key), table=table, name=f"'{_TABLES[key]}'", problems=problems)
+            _check_index(step, (key,), getattr(step, key), table=table, name=f"'{names[key]}'", problems=problems)
     elif isinstance(step, LegRecord):
         _check_index(step, ("leg",), step.leg, table=record.x_cp, name="'x cp'", problems=problems)
     elif isinstance(step, SpeedRecord):
         for index, (row, column, value) in enumerate(step.motions):
             path = ("motions", index, 1)
-            of = "the base" if row == _BASE_ROW else "'x cp'"
+            of = "the base" if row == BASE_ROW else "'x cp'"
             _check_index(
                 step,
                 path,
                 column,
-                table=record.base_now if row == _BASE_ROW else record.x_cp,
+                table=record.base_now if row == BASE_ROW else record.x_cp,
                 name=of,
                 problems=problems,
             )
-            if row != _BASE_ROW and not 0.0 < value <= 1.0:
+            if row != BASE_ROW and not 0.0 < value <= 1.0:
                 mark = step.place("motions", index, 2)
                 assert mark is not None
-                problems.add(mark, f"a speed of {value:g}", "a share of the way left in each period: above 0, up to 1")
+                problems.add(
+                    mark, f"a speed of {value:g}", "a fraction of the way left in each period: above 0, up to 1"
+                )
 
 
 def _check_index(

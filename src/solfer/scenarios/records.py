@@ -8,16 +8,11 @@ from solfer.config import Record
 from solfer.config.records.bounds import COORDINATE, COUNT, Bounds
 
 INDEX: Bounds = {"ge": 0, "le": 9999}
-SHARE: Bounds = {"gt": 0.0, "le": 1.0}
-"""Share of what is left that vertices go in a period; without any they would jump to their goals at once."""
-
-LEGS: Bounds = {"min_length": 1, "max_length": 32}
-BASE: Bounds = {"min_length": 4, "max_length": 4}
 TABLE: Bounds = {"min_length": 1, "max_length": 10_000}
 
 Coordinate = Annotated[float, Field(**COORDINATE)]
-Legs = Annotated[tuple[Coordinate, ...], Field(**LEGS)]
-Base = Annotated[tuple[Coordinate, ...], Field(**BASE)]
+Legs = Annotated[tuple[Coordinate, ...], Field(min_length=1, max_length=32)]
+Base = Annotated[tuple[Coordinate, ...], Field(min_length=4, max_length=4)]
 Change = tuple[Annotated[int, Field(ge=0, le=3)], Annotated[int, Field(**INDEX)], Annotated[float, Field(ge=0, le=10)]]
 
 
@@ -31,7 +26,9 @@ class ScenarioRecord(Record):
         default=(0.0, 0.0, 0.0, 0.0), description="velocity that is added to the base's until the end [m/s, rad/s]"
     )
     vel: float = Field(
-        **SHARE, description="share of what is left that vertices go in a period; speed of the base [m/s, rad/s]"
+        gt=0.0,
+        le=1.0,
+        description="fraction of what is left that vertices go in a period; speed of the base [m/s, rad/s]",
     )
     dt: float = Field(ge=1e-4, le=1.0, description="period [s]")
     x_cp: Legs = Field(alias="x cp", description="where the vertices begin: x of each leg [m]")
@@ -103,6 +100,10 @@ class LegReleaseRecord(LegRecord):
     """A leg is released: it gets its contact with the ground again."""
 
     type: Literal["release"]
+
+
+BASE_ROW = 3
+"""Row of the base in the motions of a `SpeedRecord`, behind x, y and z of the vertices."""
 
 
 class SpeedRecord(Record):

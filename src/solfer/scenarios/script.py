@@ -6,17 +6,11 @@ import numpy as np
 
 from solfer.scenarios.scenario import Scenario
 
-SCRIPT_LOWEST_SPEED = 1e-3
+LOWEST_SPEED = 1e-3
 """Speed of a vertex below which it goes what is left in one period [m/s]."""
 
-NEAREST = 1e-3
+LAST_STEP = 1e-3
 """What is left of the base's way below which it goes there in one period [m, rad]."""
-
-SCRIPT_REACH_TOLERANCE = 5e-3
-"""Distance from the goal of a move that is near enough, absolute [m, rad] or as a share of the goal."""
-
-SCRIPT_TURN_LIMIT = 1e-2
-"""Distance from the heading of a turn or a circle that is near enough [rad]."""
 
 HEADING_INDEX = 3
 """Index of the heading among the numbers of the base."""
@@ -34,7 +28,7 @@ class Script:
         base: x, y, z [m] and heading [rad] of the base, shape (4,), without the constant velocity.
         vertex_velocity: Shape (n, 3) [m/s].
         base_velocity: Shape (4,) [m/s, rad/s], without the constant velocity.
-        vertex_speed: Share of what is left that each vertex goes in a period, shape (n, 3).
+        vertex_speed: Fraction of what is left that each vertex goes in a period, shape (n, 3).
         base_speed: Shape (4,) [m/s, rad/s].
         camber: Camber of each leg, shape (n,) [rad].
         grounded: Which legs have contact with the ground, shape (n,).
@@ -69,7 +63,7 @@ class Script:
         np.divide(self._left, self.period, out=self._left)
         np.multiply(self._left, self.vertex_speed, out=self.vertex_velocity)
         np.abs(self.vertex_velocity, out=self._bare)
-        np.less(self._bare, SCRIPT_LOWEST_SPEED, out=self._slow)
+        np.less(self._bare, LOWEST_SPEED, out=self._slow)
         np.copyto(self.vertex_velocity, self._left, where=self._slow)
 
     def go(self, goal: np.ndarray) -> None:
@@ -79,7 +73,7 @@ class Script:
         np.sign(left, out=self.base_velocity)
         np.multiply(self.base_velocity, self.base_speed, out=self.base_velocity)
         np.abs(left, out=self._base_bare)
-        np.less(self._base_bare, NEAREST, out=self._base_near)
+        np.less(self._base_bare, LAST_STEP, out=self._base_near)
         np.divide(left, self.period, out=left)
         np.copyto(self.base_velocity, left, where=self._base_near)
 
@@ -87,7 +81,7 @@ class Script:
         """Let the heading go to `heading` [rad] at its speed, x, y and z not at all; return its rate [rad/s]."""
         left = heading - self.base[HEADING_INDEX]
         self.base_velocity[:] = 0.0
-        rate = left / self.period if abs(left) < NEAREST else math.copysign(self.base_speed[HEADING_INDEX], left)
+        rate = left / self.period if abs(left) < LAST_STEP else math.copysign(self.base_speed[HEADING_INDEX], left)
         self.base_velocity[HEADING_INDEX] = rate
         return rate
 

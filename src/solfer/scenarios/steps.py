@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from solfer.scenarios.records import (
+    BASE_ROW,
     CircleRecord,
     LegClaimRecord,
     LegReleaseRecord,
@@ -17,14 +18,7 @@ from solfer.scenarios.records import (
     WaitRecord,
 )
 from solfer.scenarios.scenario import Scenario
-from solfer.scenarios.script import (
-    HEADING_INDEX,
-    NEAREST,
-    SCRIPT_LOWEST_SPEED,
-    SCRIPT_REACH_TOLERANCE,
-    SCRIPT_TURN_LIMIT,
-    Script,
-)
+from solfer.scenarios.script import HEADING_INDEX, LAST_STEP, LOWEST_SPEED, Script
 
 
 class PlayedStep(abc.ABC):
@@ -65,7 +59,7 @@ class _Speed(_Instant):
 
     def start(self, script: Script) -> None:
         for row, column, value in self._motions:
-            if row == HEADING_INDEX:
+            if row == BASE_ROW:
                 script.base_speed[column] = value
             else:
                 script.vertex_speed[column, row] = value
@@ -104,9 +98,9 @@ class _Move(PlayedStep):
         self._vertices = vertices
         self._base = base
         self._camber = camber
-        self._near, self._base_near = (
-            SCRIPT_REACH_TOLERANCE * np.maximum(1.0, np.abs(each)) for each in (vertices, base)
-        )
+        tolerance = 5e-3  # absolute [m, rad], or as a fraction of the goal
+        self._near = tolerance * np.maximum(1.0, np.abs(vertices))
+        self._base_near = tolerance * np.maximum(1.0, np.abs(base))
         self._left = np.zeros_like(vertices)
         self._base_left = np.zeros_like(base)
         self._fits = np.zeros(vertices.shape, dtype=bool)
@@ -139,8 +133,8 @@ class _Move(PlayedStep):
             _straight(distance, speed * script.period) for distance, speed in zip(distances, speeds, strict=True)
         )
         left = np.abs(self._vertices - script.vertices).ravel().tolist()
-        shares = script.vertex_speed.ravel().tolist()
-        return max(base, *(_exponential(*each, script.period) for each in zip(left, shares, strict=True)))
+        ratios = script.vertex_speed.ravel().tolist()
+        return max(base, *(_exponential(*each, script.period) for each in zip(left, ratios, strict=True)))
 
 
 class _Heading(PlayedStep):
@@ -151,7 +145,7 @@ class _Heading(PlayedStep):
         self._heading = heading
 
     def done(self, script: Script) -> bool:
-        return abs(self._heading - float(script.base[HEADING_INDEX])) <= SCRIPT_TURN_LIMIT
+        return abs(self._heading - float(script.base[HEADING_INDEX])) <= 1e-2  # [rad]
 
     def longest(self, script: Script) -> float:
         left = abs(self._heading - float(script.base[HEADING_INDEX]))
@@ -186,16 +180,16 @@ class _Circle(_Heading):
 
 def _straight(left: float, step: float) -> float:
     """Return after how many steps of a length a path is gone, or passed to and fro for ever."""
-    if left <= NEAREST:
+    if left <= LAST_STEP:
         return 1.0
     return left / step + 2.0 if step > 0.0 else math.inf
 
 
-def _exponential(left: float, share: float, period: float) -> float:
-    """Return after how many periods a vertex that goes a share of what is left in each has arrived."""
-    if share * left < SCRIPT_LOWEST_SPEED * period or share >= 1.0:
+def _exponential(left: float, ratio: float, period: float) -> float:
+    """Return after how many periods a vertex that goes a ratio of what is left in each has arrived."""
+    if ratio * left < LOWEST_SPEED * period or ratio >= 1.0:
         return 2.0
-    return math.log(SCRIPT_LOWEST_SPEED * period / (share * left)) / math.log1p(-share) + 3.0
+    return math.log(LOWEST_SPEED * period / (ratio * left)) / math.log1p(-ratio) + 3.0
 
 
 def played(scenario: Scenario) -> tuple[PlayedStep, ...]:

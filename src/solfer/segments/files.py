@@ -16,12 +16,11 @@ from pathlib import Path
 from solfer.errors import MiddlewareError
 
 PREFIX = "solfer-"
-FOLDER_MODE, FILE_MODE = 0o2770, 0o660
-"""Permissions of user and group, whatever the process' mask is; files get the group of their folder."""
+FOLDER_MODE = 0o2770
+"""Permissions of a folder for user and group, whatever the process' mask is; its files get its group."""
 
-FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 OPEN_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC  # a FIFO would block
-LINKS = (errno.ELOOP, errno.ENOTDIR)
 
 Identity = tuple[int, int]
 """Device and number of a file, which no other file has while it is open or mapped."""
@@ -87,7 +86,7 @@ def listed(folder: Path) -> list[str]:
         MiddlewareError: It is not to be trusted.
     """
     with folder_of(folder / "any") as (opened, _):
-        readable = os.open(".", FOLDER, dir_fd=opened)
+        readable = os.open(".", FOLDER_FLAGS, dir_fd=opened)
         try:
             return os.listdir(readable)
         finally:
@@ -224,9 +223,9 @@ def _made(folder: int, name: str) -> bool:
 def _step(folder: int, name: str, where: Path) -> int:
     """Open a folder in a folder."""
     try:
-        return os.open(name, FOLDER | os.O_NOFOLLOW, dir_fd=folder)
+        return os.open(name, FOLDER_FLAGS | os.O_NOFOLLOW, dir_fd=folder)
     except OSError as error:
-        if error.errno in LINKS:
+        if error.errno in (errno.ELOOP, errno.ENOTDIR):
             raise _refused("not a folder, but a link or a file", where) from error
         raise
 
@@ -249,8 +248,9 @@ def _open(folder: int, name: str, flags: int, where: Path) -> int:
 
 def _make(folder: int, name: str) -> int:
     """Make a file in a folder, with its mode."""
-    file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | OPEN_FLAGS, FILE_MODE, dir_fd=folder)
-    os.fchmod(file, FILE_MODE)  # the mask of the process may have taken the group's part away
+    mode = 0o660
+    file = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | OPEN_FLAGS, mode, dir_fd=folder)
+    os.fchmod(file, mode)  # the mask of the process may have taken the group's part away
     return file
 
 

@@ -10,9 +10,14 @@ from solfer.errors import MiddlewareError
 
 MAGIC = int.from_bytes(b"solferRT", "little")
 VERSION = 1
-HEADER_HEADER = 128  # [B]
-HEADER_LINE = 64  # [B], of the processor's cache
-HEADER_KIND = slice(96, 128)
+LAYOUT_OFFSET = 128
+"""Size of the header, behind which the layout lies as a text [B]."""
+
+CACHE_LINE = 64
+"""Size of a line of the processor's cache [B]."""
+
+KIND_FIELD = slice(96, 128)
+"""Bytes of the header that hold the kind."""
 
 
 class Word(enum.IntEnum):
@@ -32,7 +37,7 @@ class Word(enum.IntEnum):
 
 def padded(size: int) -> int:
     """Round a size up to whole lines of the processor's cache [B]."""
-    return -(-size // HEADER_LINE) * HEADER_LINE
+    return -(-size // CACHE_LINE) * CACHE_LINE
 
 
 def boot() -> bytes:
@@ -47,12 +52,12 @@ def hash_of(layout: bytes) -> int:
 
 def kind_of(memory: mmap.mmap) -> str:
     """Return what a segment is for."""
-    return memory[HEADER_KIND].rstrip(b"\0").decode(errors="replace")
+    return memory[KIND_FIELD].rstrip(b"\0").decode(errors="replace")
 
 
 def is_ours(memory: mmap.mmap) -> bool:
     """Return whether there is a header of solfer at all."""
-    return len(memory) >= HEADER_HEADER and int.from_bytes(memory[:8], "little") == MAGIC
+    return len(memory) >= LAYOUT_OFFSET and int.from_bytes(memory[:8], "little") == MAGIC
 
 
 def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> None:
@@ -70,7 +75,7 @@ def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> Non
     where = str(path)
     if not is_ours(memory):
         raise MiddlewareError("the file is not shared memory of solfer", where=where, expected="remove the file")
-    words = memoryview(memory)[: HEADER_KIND.start].cast("q")
+    words = memoryview(memory)[: KIND_FIELD.start].cast("q")
     if words[Word.VERSION] != VERSION:
         raise MiddlewareError(
             f"shared memory of the version {words[Word.VERSION]}",
@@ -89,7 +94,7 @@ def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> Non
         )
     if kind_of(memory) != kind:
         raise MiddlewareError(f"shared memory of the kind '{kind_of(memory)}'", where=where, expected=f"'{kind}'")
-    text = memory[HEADER_HEADER : HEADER_HEADER + words[Word.TEXT]]
+    text = memory[LAYOUT_OFFSET : LAYOUT_OFFSET + words[Word.TEXT]]
     if hash_of(text) != words[Word.LAYOUT]:
         raise MiddlewareError(
             "shared memory is damaged: its layout is not the one it was made with",
@@ -106,12 +111,14 @@ def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> Non
 
 def write_header(memory: mmap.mmap, kind: bytes, layout: bytes, generation: int) -> None:
     """Write the header of a new segment of this process."""
-    words = memoryview(memory)[: HEADER_KIND.start].cast("q")
-    words[Word.MAGIC], words[Word.VERSION], words[Word.LAYOUT] = MAGIC, VERSION, hash_of(layout)
+    words = memoryview(memory)[: KIND_FIELD.start].cast("q")
+    words[Word.MAGIC] = MAGIC
+    words[Word.VERSION] = VERSION
+    words[Word.LAYOUT] = hash_of(layout)
     words[Word.PID] = os.getpid()
     words[Word.GENERATION] = generation
     words[Word.SIZE] = len(memory)
     words[Word.TEXT] = len(layout)
     memory[8 * Word.BOOT : 8 * Word.BOOT + 16] = boot()
-    memory[HEADER_KIND] = kind.ljust(32, b"\0")
-    memory[HEADER_HEADER : HEADER_HEADER + len(layout)] = layout
+    memory[KIND_FIELD] = kind.ljust(32, b"\0")
+    memory[LAYOUT_OFFSET : LAYOUT_OFFSET + len(layout)] = layout

@@ -9,9 +9,8 @@ from pathlib import Path
 from solfer.errors import MiddlewareError
 from solfer.segments import files
 
-LOCK_BYTES = 32  # [B], the number of a process
-LOCK_TRIES = 5
-LOCK_PAUSE = 0.01  # [1], [s]: a process that only checks whether a lock is held has it for some microseconds
+PID_SIZE = 32
+"""Bytes for the number of the owner, which is all that the file of a lock holds."""
 
 _HELD: "weakref.WeakSet[Lock]" = weakref.WeakSet()
 
@@ -32,7 +31,7 @@ class Lock:
     def __init__(self, path: Path):
         self._path = path
         self._file = files.open_or_make(_lock_file(path))
-        if os.fstat(self._file).st_size > LOCK_BYTES:
+        if os.fstat(self._file).st_size > PID_SIZE:
             os.close(self._file)
             raise MiddlewareError(
                 "the file is not a lock of solfer", where=str(_lock_file(path)), expected="remove the file"
@@ -106,18 +105,19 @@ def _lock_file(path: Path) -> Path:
 
 
 def _try(file: int) -> bool:
-    for turn in range(LOCK_TRIES):
+    attempts = 5
+    for attempt in range(attempts):
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return True
         except BlockingIOError:
-            if turn < LOCK_TRIES - 1:
-                time.sleep(LOCK_PAUSE)
+            if attempt < attempts - 1:
+                time.sleep(0.01)  # a process that only checks whether a lock is held has it for some microseconds
     return False
 
 
 def _owner(file: int) -> str:
-    return os.pread(file, LOCK_BYTES, 0).decode(errors="replace") or "of an unknown number"
+    return os.pread(file, PID_SIZE, 0).decode(errors="replace") or "of an unknown number"
 
 
 def _forget() -> None:

@@ -1,4 +1,4 @@
-"""The folder in which processes find each other's segments, and bells that ring when these change."""
+"""The folder in which processes find each other's segments, and notifications of changes of these."""
 
 import mmap
 import os
@@ -12,14 +12,9 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.segments import files
 
 SHARED_MEMORY = Path("/dev/shm")
-BELLS = "bells"
-BELLS_SIZE = 4096
+NOTIFICATIONS_FILE = "bells"
 ANY = 0
-"""Place of the bell that rings with every other one."""
-
-MAX_INTEGER = 2**63 - 1
-LONGEST_NAMESPACE = 240  # [letters]
-HIDDEN_SUFFIXES = (".lock", ".new")
+"""Place of the notification that is sent with every other one."""
 
 
 class Namespace:
@@ -58,13 +53,13 @@ class Namespace:
         finally:
             os.close(opened)
         try:
-            self._bells, self._rung = self._open_bells()
+            self._numbers, self._numbers_file = self._open_numbers()
         except OSError as error:
             raise self._unusable(error) from error
 
     def loss(self) -> str:
         """Describe what happened to the folder since it was opened; empty while new processes find it."""
-        for path, opened in ((self.folder, self._folder), (self.folder / BELLS, self._rung)):
+        for path, opened in ((self.folder, self._folder), (self.folder / NOTIFICATIONS_FILE, self._numbers_file)):
             if not files.stands(path, opened):
                 return lost(path)
         return ""
@@ -96,28 +91,31 @@ class Namespace:
             present = files.listed(self.path(*names))
         except FileNotFoundError:
             return []
-        return sorted(unquote(file) for file in present if not file.endswith(HIDDEN_SUFFIXES))
+        return sorted(unquote(file) for file in present if not file.endswith((".lock", ".new")))
 
-    def bell(self, *names: str) -> "Bell":
-        """Return the bell of the segments in a folder."""
-        place = zlib.crc32("/".join(map(_quoted, names)).encode()) % (len(self._bells) - 1)
-        return Bell(self._bells, ANY + 1 + place)
+    def notification(self, *names: str) -> "Notification":
+        """Return the notification of changes of the segments in a folder."""
+        place = zlib.crc32("/".join(map(_quoted, names)).encode()) % (len(self._numbers) - 1)
+        return Notification(self._numbers, ANY + 1 + place)
 
-    def any_bell(self) -> "Bell":
-        """Return a bell that rings with every other one."""
-        return Bell(self._bells, ANY)
+    def any_notification(self) -> "Notification":
+        """Return the notification that is sent with every other one."""
+        return Notification(self._numbers, ANY)
 
-    def _open_bells(self) -> tuple[memoryview, files.Identity]:
-        path = self.folder / BELLS
+    def _open_numbers(self) -> tuple[memoryview, files.Identity]:
+        path = self.folder / NOTIFICATIONS_FILE
+        whole = 4096  # [B]
         file = files.open_or_make(path)
         try:
             size = os.fstat(file).st_size
-            if size not in (0, BELLS_SIZE):
+            if size not in (0, whole):
                 raise MiddlewareError(
-                    f"the file does not hold solfer's bells: {size} bytes", where=str(path), expected="remove the file"
+                    f"the file does not hold solfer's notifications: {size} bytes",
+                    where=str(path),
+                    expected="remove the file",
                 )
-            os.ftruncate(file, BELLS_SIZE)
-            return memoryview(mmap.mmap(file, BELLS_SIZE)).cast("q"), files.identity(file)
+            os.ftruncate(file, whole)
+            return memoryview(mmap.mmap(file, whole)).cast("q"), files.identity(file)
         finally:
             os.close(file)
 
@@ -139,16 +137,16 @@ def lost(path: Path) -> str:
     return f"{path} was {'replaced' if os.path.lexists(path) else 'removed'} while it was in use"
 
 
-class Bell:
-    """Rings when a segment of a folder was made or has ended: without a ring there is nothing to search for.
+class Notification:
+    """Reports that a segment of a folder was made or has ended: until then there is nothing to search for.
 
     Args:
-        words: Numbers of all bells; where two folders have the same one, some searches find nothing new.
-        place: Which of them is this bell's.
+        words: Numbers of all notifications; where two folders have the same one, some searches find nothing new.
+        place: Which of them is that of this one.
 
     Attributes:
         words, place: See above.
-        received: The bell's number when it was acknowledged last; another one than now: it rang since.
+        received: Its number when it was acknowledged last; another one than now: it was sent since.
     """
 
     def __init__(self, words: memoryview, place: int):
@@ -156,25 +154,25 @@ class Bell:
         self.place = place
         self.received = -1
 
-    def rung(self) -> bool:
-        """Return whether it rang since `acknowledge`, or ever if that was not called yet."""
+    def is_pending(self) -> bool:
+        """Return whether it was sent since `acknowledge`, or ever if that was not called yet."""
         return self.words[self.place] != self.received
 
     def acknowledge(self) -> None:
-        """Ignore the rings so far; to be called before the search."""
+        """Ignore what was sent so far; to be called before the search."""
         self.received = self.words[self.place]
 
-    def ring(self) -> None:
+    def send(self) -> None:
         """Announce that a segment was made or has ended; to be called afterwards."""
-        # a number that no other process rings with: adding one would lose a ring if two rang at once
-        self.words[self.place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & MAX_INTEGER
+        # a number that no other process sends: adding one would lose one of two that are sent at once
+        self.words[self.place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & (2**63 - 1)
         self.words[ANY] = number
 
 
 def _quoted(name: str) -> str:
     """Quote a name as a file's: without slashes, and none of the names that mean something to the file system."""
     file = quote(name.lstrip("/"), safe="").replace(".", "%2E") or "%"
-    if len(file) > LONGEST_NAMESPACE:
+    if len(file) > 240:  # file systems take 255 bytes, and the lock's name is longer
         raise MiddlewareError(
             f"a name of {len(name)} letters is too long for shared memory: {name[:40]}...", expected="a shorter name"
         )

@@ -7,9 +7,6 @@ from solfer.errors import MiddlewareError
 from solfer.segments.namespace import Namespace, lost
 from solfer.segments.segment import Segment
 
-PRESENCE_PERIOD = 0.1
-"""Time between two checks [s]."""
-
 
 class Presence:
     """Checks whether the folder of a namespace, and what stops a process, are still those that the process has opened.
@@ -25,11 +22,14 @@ class Presence:
         loss: What became of the files, in one line; empty while all is well.
     """
 
+    PERIOD = 0.1
+    """Time between two checks [s]."""
+
     def __init__(self, namespace: Namespace, segments: Sequence[Segment] = ()):
         self._namespace = namespace
         self._segments = tuple(segments)
         self.loss = ""
-        self._due = time.monotonic() + PRESENCE_PERIOD
+        self._due = time.monotonic() + self.PERIOD
 
     def look(self) -> None:
         """Check once, with one system call for each file."""
@@ -37,10 +37,10 @@ class Presence:
         self.loss = self.loss or self._namespace.loss() or next(gone, "")
 
     def lost(self) -> bool:
-        """Return whether the files are lost; may be called in every cycle, checks once per `PRESENCE_PERIOD`."""
+        """Return whether the files are lost; may be called in every cycle, checks once per `PERIOD`."""
         now = time.monotonic()
         if now >= self._due:
-            self._due = now + PRESENCE_PERIOD
+            self._due = now + self.PERIOD
             self.look()
         return bool(self.loss)
 

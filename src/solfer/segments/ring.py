@@ -1,6 +1,6 @@
 """Every record of one writer in its order, in fixed memory."""
 
-from solfer.segments.slot import NEWEST, REFUSED_WORD, TAKEN, Slots
+from solfer.segments.slot import NEWEST, REFUSED, TAKEN, Slots
 
 
 class Ring(Slots):
@@ -29,7 +29,7 @@ class Ring(Slots):
     @property
     def refused(self) -> int:
         """Records that the writer could not place since the segment was made."""
-        return self.words[REFUSED_WORD]
+        return self.words[REFUSED]
 
     def write(self, stamp: int) -> bool:
         """Append `values`; only the owner of the segment may.
@@ -41,7 +41,7 @@ class Ring(Slots):
             False if the ring is full and refuses; then it was counted.
         """
         if self._refuse and self.sequence - self.words[TAKEN] >= self._count:
-            self.words[REFUSED_WORD] += 1
+            self.words[REFUSED] += 1
             return False
         self.put(stamp)
         return True

@@ -14,8 +14,8 @@ from typing import NamedTuple
 from solfer.errors import MiddlewareError
 from solfer.segments import files
 from solfer.segments.header import (
-    HEADER_HEADER,
-    HEADER_KIND,
+    KIND_FIELD,
+    LAYOUT_OFFSET,
     Word,
     check,
     is_ours,
@@ -24,9 +24,6 @@ from solfer.segments.header import (
     write_header,
 )
 from solfer.segments.lock import Lock, locked
-
-ORDERED = ("x86_64", "amd64", "i686", "i386")
-"""Processors that keep the order of writes; on others a reader could see the new index before the new numbers."""
 
 
 class _Mapped(NamedTuple):
@@ -53,9 +50,9 @@ class Segment:
         self._memory = memory
         self._lock = lock
         view = memoryview(memory)
-        self._words = view[: HEADER_KIND.start].cast("q")
-        start = HEADER_HEADER + padded(self._words[Word.TEXT])
-        self.layout = bytes(view[HEADER_HEADER : HEADER_HEADER + self._words[Word.TEXT]])
+        self._words = view[: KIND_FIELD.start].cast("q")
+        start = LAYOUT_OFFSET + padded(self._words[Word.TEXT])
+        self.layout = bytes(view[LAYOUT_OFFSET : LAYOUT_OFFSET + self._words[Word.TEXT]])
         self.data = view[start:]
         self.pid = self._words[Word.PID]
         self.generation = self._words[Word.GENERATION]
@@ -178,10 +175,12 @@ class Segment:
 
 
 def _require_order() -> None:
-    if os.uname().machine.lower() not in ORDERED:
+    """Refuse a processor that may reorder writes: a reader could see the new index before the new numbers."""
+    ordered = ("x86_64", "amd64", "i686", "i386")
+    if os.uname().machine.lower() not in ordered:
         raise MiddlewareError(
             f"shared memory is not safe on a {os.uname().machine}: it may reorder writes",
-            expected=f"one of {', '.join(ORDERED)}, or the middleware ROS",
+            expected=f"one of {', '.join(ordered)}, or the middleware ROS",
         )
 
 
@@ -216,10 +215,10 @@ def _previous(path: Path) -> mmap.mmap | None:
 def _replace(path: Path, kind: str, layout: bytes, size: int) -> _Mapped:
     """Put new memory at `path`; the caller holds the lock."""
     previous = _previous(path)
-    words = memoryview(previous)[: HEADER_KIND.start].cast("q") if previous is not None else None
+    words = memoryview(previous)[: KIND_FIELD.start].cast("q") if previous is not None else None
     generation = words[Word.GENERATION] + 1 if words is not None else 1
     draft = path.with_name(f"{path.name}.new")
-    mapped = _allocate(draft, HEADER_HEADER + padded(len(layout)) + padded(size))
+    mapped = _allocate(draft, LAYOUT_OFFSET + padded(len(layout)) + padded(size))
     write_header(mapped.memory, kind.encode(), layout, generation=generation)
     files.replace(draft, path)
     if words is not None:

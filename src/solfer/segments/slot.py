@@ -1,22 +1,29 @@
 """The newest numbers of one writer, for any number of readers, without a lock.
 
-A seqlock over several slots: the writer fills them in turn, marks a slot as unfinished while it does, and moves the
-index last. A reader copies the slot of the index and accepts the copy only if the mark shows that it was not written
-meanwhile. Readers and writer never wait, and a writer that dies in the middle leaves its last whole numbers readable.
+A seqlock over several slots: the writer fills one after the other, marks a slot as unfinished while it does, and moves
+the index last. A reader copies the slot of the index and accepts the copy only if the mark shows that it was not
+written meanwhile. Readers and writer never wait, and a writer that dies in the middle leaves its last whole numbers
+readable.
 """
 
 import numpy as np
 
-from solfer.segments.header import HEADER_LINE
+from solfer.segments.header import CACHE_LINE
 
-SLOT_TRIES = 8
-"""Attempts of a read until it returns that there is nothing new."""
+NEWEST = 0
+"""Word in front of the slots: number of the newest record."""
 
-NEWEST, TAKEN, REFUSED_WORD = 0, 1, 2
-"""Words in front of the slots: number of the newest record; for a ring, the record read last and the refused ones."""
+TAKEN = 1
+"""Word in front of the slots of a ring: number of the record that was read last."""
 
-SLOT_STATE, SLOT_STAMP = 0, 1
-"""Words in front of each slot: twice the number of its record, less one while it is written; time of the sender."""
+REFUSED = 2
+"""Word in front of the slots of a ring: how many records were refused."""
+
+STATE_WORD = 0
+"""Word in front of each slot: twice the number of its record, less one while it is written."""
+
+STAMP_WORD = 1
+"""Word in front of each slot: time of the sender [ns]."""
 
 
 class Slots:
@@ -39,18 +46,19 @@ class Slots:
         self.sequence = 0
         self.stamp = 0
         # to copy 50 numbers from view to view takes 60 ns, as arrays 200 ns
-        self._content, self._copy = memoryview(self.values), memoryview(np.zeros(width))
+        self._content = memoryview(self.values)
+        self._copy = memoryview(np.zeros(width))
         self.words = memory[: self.size(width, count)].cast("q")
         stride = self._stride(width)
-        self._places = [(HEADER_LINE + index * stride) // 8 for index in range(count)]
-        begins = [2 * HEADER_LINE + index * stride for index in range(count)]
+        self._places = [(CACHE_LINE + index * stride) // 8 for index in range(count)]
+        begins = [2 * CACHE_LINE + index * stride for index in range(count)]
         self._records = [memory[begin : begin + 8 * width].cast("d") for begin in begins]
         self._count = count
 
     @classmethod
     def size(cls, width: int, count: int) -> int:
         """Compute the memory that the records need [B]."""
-        return HEADER_LINE + count * cls._stride(width)
+        return CACHE_LINE + count * cls._stride(width)
 
     @property
     def newest(self) -> int:
@@ -63,7 +71,7 @@ class Slots:
 
     @staticmethod
     def _stride(width: int) -> int:
-        return HEADER_LINE + -(-8 * width // HEADER_LINE) * HEADER_LINE
+        return CACHE_LINE + -(-8 * width // CACHE_LINE) * CACHE_LINE
 
     def put(self, stamp: int) -> None:
         """Publish `values` as the next record, `stamp` [ns] in the writer's clock, over the oldest one."""
@@ -71,10 +79,10 @@ class Slots:
         number = self.sequence + 1
         index = number % self._count
         place = self._places[index]
-        words[place + SLOT_STATE] = 2 * number - 1
-        words[place + SLOT_STAMP] = stamp
+        words[place + STATE_WORD] = 2 * number - 1
+        words[place + STAMP_WORD] = stamp
         self._records[index][:] = self._content
-        words[place + SLOT_STATE] = 2 * number
+        words[place + STATE_WORD] = 2 * number
         words[NEWEST] = number
         self.sequence = number
         self.stamp = stamp
@@ -84,11 +92,11 @@ class Slots:
         words = self.words
         index = number % self._count
         place = self._places[index]
-        if words[place + SLOT_STATE] != 2 * number:
+        if words[place + STATE_WORD] != 2 * number:
             return False
-        stamp = words[place + SLOT_STAMP]
+        stamp = words[place + STAMP_WORD]
         self._copy[:] = self._records[index]
-        if words[place + SLOT_STATE] != 2 * number:
+        if words[place + STATE_WORD] != 2 * number:
             return False
         self._content[:] = self._copy
         self.sequence = number
@@ -128,7 +136,7 @@ class Slot(Slots):
         number = self.words[NEWEST]
         if number == self.sequence:
             return False
-        for _ in range(SLOT_TRIES):
+        for _ in range(8):  # then the writer is too fast, and this read finds nothing new
             if self._fetch(number):
                 return True
             number = self.words[NEWEST]

@@ -13,7 +13,8 @@ class Text:
     """
 
     def __init__(self, values: np.ndarray):
-        self._length, self._bytes = values[:1], values[1:].view(np.uint8)
+        self._length = values[:1]
+        self._bytes = values[1:].view(np.uint8)
 
     @staticmethod
     def width(size: int) -> int:

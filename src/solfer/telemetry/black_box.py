@@ -12,14 +12,14 @@ from solfer.recording.log import Logger
 from solfer.recording.model import Event
 from solfer.recording.versions import versions
 from solfer.telemetry.plugin_log import NANOSECOND, PluginLog
-from solfer.telemetry.recorder import RECORDER_DURATION, Recorder
+from solfer.telemetry.recorder import DURATION, Recorder
 from solfer.transport.endpoints import NEW, Reader
 from solfer.transport.plugin_state import PluginState
 
 LOOP_PREFIX = "loop"
 """Begin of the names of the channels that belong to no plugin."""
 
-BLACK_BOX_KINDS = {
+EVENT_KINDS = {
     PluginState.STARTING: "start",
     PluginState.RUNNING: "run",
     PluginState.STOPPING: "stop",
@@ -59,7 +59,7 @@ class BlackBox(Recorder):
         self,
         folder: Path,
         plugins: Sequence[Plugin],
-        seconds: float = RECORDER_DURATION,
+        seconds: float = DURATION,
         ros_time: Callable[[], float] | None = None,
         truth: Reader | None = None,
     ):
@@ -118,5 +118,5 @@ class BlackBox(Recorder):
         state = managed.state
         ran = self._words[3 + index] == PluginState.RUNNING
         self._words[3 + index] = state
-        kind = HOLD if ran and state is PluginState.STARTING else BLACK_BOX_KINDS.get(state, state.name.lower())
+        kind = HOLD if ran and state is PluginState.STARTING else EVENT_KINDS.get(state, state.name.lower())
         self.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))

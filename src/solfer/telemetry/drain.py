@@ -11,7 +11,7 @@ from solfer.recording.model import Event
 from solfer.recording.writer import RecordingWriter
 from solfer.segments.ring import Ring
 from solfer.segments.segment import Segment
-from solfer.telemetry.rows import RECORDER_FILE, RECORDER_KIND, RowLayout, events_of
+from solfer.telemetry.rows import RECORDING, RowLayout, events_of
 
 BATCH = 256
 """Most rows of a chunk of the file."""
@@ -34,11 +34,11 @@ class RecordDrain:
 
     def __init__(self, folder: Path):
         try:
-            self._segment = Segment.attach(folder / RECORDER_FILE, RECORDER_KIND)
+            self._segment = Segment.attach(folder / RECORDING, RECORDING)
         except MiddlewareError as error:
             raise MiddlewareError(
                 f"there is no recording: {error.what}",
-                where=str(folder / RECORDER_FILE),
+                where=str(folder / RECORDING),
                 expected="an RT layer in this namespace, with `record` above 0",
             ) from error
         described = json.loads(self._segment.layout)

@@ -6,8 +6,8 @@ import numpy as np
 
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import indices_at, record_at, release_fence
-from solfer.segments.header import HEADER_LINE
-from solfer.segments.slot import NEWEST, SLOT_STAMP, SLOT_STATE
+from solfer.segments.header import CACHE_LINE
+from solfer.segments.slot import NEWEST, STAMP_WORD, STATE_WORD
 from solfer.telemetry import histograms
 
 ROW_RING = np.dtype(
@@ -32,18 +32,18 @@ def _append(address, stamp):
     arrays = indices_at(ring.arrays, ring.pieces)
     sizes = indices_at(ring.sizes, ring.pieces)
     number = ring.number + 1
-    slot = HEADER_LINE // 8 + (number % ring.count) * ring.stride
-    words[slot + SLOT_STATE] = 2 * number - 1
-    words[slot + SLOT_STAMP] = stamp
+    slot = CACHE_LINE // 8 + (number % ring.count) * ring.stride
+    words[slot + STATE_WORD] = 2 * number - 1
+    words[slot + STAMP_WORD] = stamp
     release_fence()
-    place = slot + HEADER_LINE // 8
+    place = slot + CACHE_LINE // 8
     for piece in range(ring.pieces):
         array = indices_at(arrays[piece], sizes[piece])
         for index in range(sizes[piece]):
             words[place + index] = array[index]
         place += sizes[piece]
     release_fence()
-    words[slot + SLOT_STATE] = 2 * number
+    words[slot + STATE_WORD] = 2 * number
     release_fence()
     words[NEWEST] = number
     ring.number = number
@@ -53,7 +53,7 @@ def _count_durations(rows, times, always):
     """Count one duration for each histogram; a zero counts only in the first `always` of them.
 
     Args:
-        rows: The histograms, int64, shape (rows, HISTOGRAM_WORDS).
+        rows: The histograms, int64, shape (rows, histograms.ROW_WORDS).
         times: The durations, int64, shape (rows,) [ns].
         always: Number of histograms that count zeros.
     """

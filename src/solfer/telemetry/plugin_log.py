@@ -23,33 +23,16 @@ from solfer.transport.messages import BodyMessage, JointMessage, PointsMessage, 
 NANOSECOND = 1e-9
 """Unit of the times of stages [s]."""
 
-_STATES = {"position": "position", "velocity": "velocity", "effort": "torque"}
-"""Fields of a message of joints, and the interfaces of a State that they carry."""
-
 _WRENCH = "geometry_msgs/WrenchStamped"
-
-_UNITS = {"velocity": "m/s", "acceleration": "m/s2", "force": "N", "torque": "Nm"}
-"""Units of the quantities whose message does not contain them."""
-
-_FORMS = {
-    "position": "{}",
-    "velocity": "{}/s",
-    "acceleration": "{}/s2",
-    "effort": "Nm",
-    "torque": "Nm",
-    "stiffness": "Nm/{}",
-    "damping": "Nms/{}",
-}
-"""Units of fields of joints: with rad, or m of a joint that slides."""
 
 
 class PluginLog:
     """The live arrays of a plugin for a recording, as channels `<plugin>/<what>`.
 
-    `measured/<field>` and `desired/<field>` are the States of its Robot, `feedback/<pipe>/...` the newest numbers of
-    each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets them, `timing` the
-    stages of the cycle, `life` its state, how long commands blend in at least and the time that passed for the robot,
-    `gate` how many values were held back, and `log/...` what the component declares.
+    The measured State of its Robot is `measured/<field>`, and the commanded one beside it. `feedback/<pipe>/...` are
+    the newest numbers of each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets
+    them, `timing` the stages of the cycle, `life` its state, how long commands blend in at least and the time that
+    passed for the robot, `gate` how many values were held back, and `log/...` what the component declares.
 
     Args:
         plugin: The plugin, with all its pipes.
@@ -65,8 +48,10 @@ class PluginLog:
         self._plugin = plugin
         robot = plugin.robot
         log = Logger(plugin.name)
+        # fields of a message of joints, and the interfaces of a State that they carry
+        interfaces = {"position": "position", "velocity": "velocity", "effort": "torque"}
         for title, state in (("measured", robot.state), ("wanted", robot.command)):
-            for field, interface in _STATES.items():
+            for field, interface in interfaces.items():
                 _add_joints(log.section(title), robot, field, values=state[interface], names=robot.dofs)
         gates = [(pipe, gate) for pipe, gate in plugin.outputs.controllers if gate is not None]
         counted = [f"{pipe.name} {kind}" for pipe, gate in gates for kind in gate.kinds]
@@ -100,9 +85,11 @@ class PluginLog:
         self._words[:] = self._plugin.timing.times
         life = self._life
         ages = self._ages
-        life[0], life[1] = self._plugin.life, self._blend.shortest
+        life[0] = self._plugin.life
+        life[1] = self._blend.shortest
         component = self._plugin.component
-        life[2], life[3] = component.passed, component.time_lost
+        life[2] = component.passed
+        life[3] = component.time_lost
         for place, pipe in self._aged:
             ages[place] = now - pipe.arrival
         for target, source in self._copies:
@@ -177,7 +164,16 @@ def _declared(plugin: Plugin, log: Logger) -> None:
 
 def _add_joints(log: Logger, robot: Robot, field: str, values: np.ndarray, names: Sequence[str]) -> None:
     """Declare a field of joints, in rad, or m of a joint that slides."""
-    form = _FORMS.get(field, "")
+    forms = {
+        "position": "{}",
+        "velocity": "{}/s",
+        "acceleration": "{}/s2",
+        "effort": "Nm",
+        "torque": "Nm",
+        "stiffness": "Nm/{}",
+        "damping": "Nms/{}",
+    }
+    form = forms.get(field, "")
     units = []
     for name in names:
         joint = robot.description.joints.get(name)  # one that the Robot does not have counts as turning
@@ -189,14 +185,16 @@ def _add_joints(log: Logger, robot: Robot, field: str, values: np.ndarray, names
 def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     """Declare the numbers of a port."""
     kind = POINT_MESSAGES[port.quantity]
-    unit = _UNITS.get(port.quantity, "")
+    # of the quantities whose message does not contain them
+    units = {"velocity": "m/s", "acceleration": "m/s2", "force": "N", "torque": "Nm"}
+    unit = units.get(port.quantity, "")
     if port.count is None:
         log.add(name, port.value, unit=unit, frame=frame, kind=kind)
     else:
         columns = NAMED[kind]
         names = [f"{index} {column}" for index in range(port.count) for column in columns]
-        units = (unit,) * len(columns) if unit else with_units(columns, CHANNEL_UNITS)
-        log.add(name, port.value, names, unit=units * port.count, frame=frame)
+        of_columns = (unit,) * len(columns) if unit else with_units(columns, CHANNEL_UNITS)
+        log.add(name, port.value, names, unit=of_columns * port.count, frame=frame)
 
 
 def _of_each(names: tuple[str, ...], values: np.ndarray) -> list[str]:

@@ -10,13 +10,13 @@ import numpy as np
 from solfer.numerics.pointers import Memory
 from solfer.recording.log import LogSource
 from solfer.recording.model import Event
-from solfer.segments.header import HEADER_LINE
+from solfer.segments.header import CACHE_LINE
 from solfer.segments.ring import Ring
 from solfer.segments.segment import Segment
 from solfer.telemetry.kernel import ROW_RING, append
-from solfer.telemetry.rows import EVENT_WIDTH, RECORDER_EVENTS, RECORDER_FILE, RECORDER_KIND, RowLayout, events_of
+from solfer.telemetry.rows import EVENT_COUNT, EVENT_WIDTH, RECORDING, RowLayout, events_of
 
-RECORDER_DURATION = 10.0
+DURATION = 10.0
 """Duration that the memory holds [s]: a reader may hang that long, and after a crash that much is left."""
 
 
@@ -46,7 +46,7 @@ class Recorder:
         folder: Path,
         sources: Sequence[LogSource],
         rate: float,
-        seconds: float = RECORDER_DURATION,
+        seconds: float = DURATION,
         attachments: Mapping[str, str] | None = None,
         *,
         metadata: Mapping[str, str] | None = None,
@@ -54,9 +54,9 @@ class Recorder:
         layout, arrays = RowLayout.of(sources, attachments or {}, metadata or {})
         count = max(3, round(rate * seconds))
         own = Ring.size(layout.width, count)
-        self.size = own + Ring.size(EVENT_WIDTH, RECORDER_EVENTS)
+        self.size = own + Ring.size(EVENT_WIDTH, EVENT_COUNT)
         text = json.dumps({"rows": layout.text(), "count": count, "rate": rate}).encode()
-        self._segment = Segment.create(folder / RECORDER_FILE, RECORDER_KIND, text, size=self.size)
+        self._segment = Segment.create(folder / RECORDING, RECORDING, text, size=self.size)
         # touch each page now: else the first round of the ring would do so in the loop
         np.frombuffer(self._segment.data, dtype=np.uint8)[:: mmap.PAGESIZE] = 0
         self._events = events_of(self._segment.data, own)
@@ -70,7 +70,7 @@ class Recorder:
             words=words,
             size=words.size,
             count=count,
-            stride=(own - HEADER_LINE) // (8 * count),
+            stride=(own - CACHE_LINE) // (8 * count),
             number=0,
         )
         self._address = self._memory.address

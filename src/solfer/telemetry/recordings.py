@@ -18,29 +18,29 @@ from solfer.segments.files import PREFIX
 from solfer.segments.lock import locked
 from solfer.segments.namespace import SHARED_MEMORY, Namespace, names
 from solfer.telemetry.drain import RecordDrain, writer_of
-from solfer.telemetry.rows import RECORDER_FILE
+from solfer.telemetry.rows import RECORDING
 
 logger = logging.getLogger(__name__)
-
-RECORDINGS_VARIABLE = "SOLFER_RECORDINGS"
-"""Environment variable: a folder in which nodes keep their last seconds when they end."""
 
 SHARED_FOLDER = "recordings"
 """Folder of a namespace for processes that have no namespace of their own, such as the nodes of a ROS master."""
 
 
-OF_MASTERS = "ros."
+MASTER_PREFIX = "ros."
 """How the names of namespaces begin in which nodes of a ROS master are recorded."""
 
-YOUNG, CRASHED = 60.0, 86400.0
-"""Ages up to which such a namespace is kept without a living process: a new one, and one with what a crash left [s]."""
+YOUNG_AGE = 60.0
+"""Age up to which such a namespace is kept without a living process [s]: one may be about to begin."""
+
+CRASH_AGE = 86400.0
+"""Age up to which it is kept without a living process for what a crash left in it [s]."""
 
 
 def namespace_of_master() -> str:
     """Return the namespace in which the nodes of this ROS master and of this namespace of ROS are recorded."""
     port = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
     inside = os.environ.get("ROS_NAMESPACE", "")
-    return ".".join((f"{OF_MASTERS}{port}", *filter(None, inside.split("/"))))
+    return ".".join((f"{MASTER_PREFIX}{port}", *filter(None, inside.split("/"))))
 
 
 def place_beside(namespace: str, node: str) -> Path:
@@ -50,14 +50,14 @@ def place_beside(namespace: str, node: str) -> Path:
         MiddlewareError: It cannot be made.
     """
     sweep(namespace)
-    return Namespace(namespace).place(SHARED_FOLDER, node, RECORDER_FILE).parent
+    return Namespace(namespace).place(SHARED_FOLDER, node, RECORDING).parent
 
 
 def sweep(own: str, root: Path = SHARED_MEMORY) -> None:
     """Remove what nodes of other ROS masters have left, of this user, where none of them lives any more."""
     for name in names(root):
         folder = root / f"{PREFIX}{name}"
-        if name != own and name.startswith(OF_MASTERS):
+        if name != own and name.startswith(MASTER_PREFIX):
             with contextlib.suppress(OSError):
                 if _is_left(folder):
                     shutil.rmtree(folder)
@@ -65,11 +65,11 @@ def sweep(own: str, root: Path = SHARED_MEMORY) -> None:
 
 def _is_left(folder: Path) -> bool:
     status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or _age(folder) < YOUNG:
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or _age(folder) < YOUNG_AGE:
         return False
     files = [each for each in folder.rglob("*") if each.is_file()]
     lives = any(locked(each.with_suffix("")) for each in files if each.suffix == ".lock")
-    return not lives and all(_age(each) > CRASHED for each in files if each.name == RECORDER_FILE)
+    return not lives and all(_age(each) > CRASH_AGE for each in files if each.name == RECORDING)
 
 
 def _age(path: Path) -> float:
@@ -95,13 +95,13 @@ def keep(folder: Path, node: str) -> None:
         folder: Folder of the memory.
         node: Name of the node.
     """
-    kept = os.environ.get(RECORDINGS_VARIABLE)
+    kept = os.environ.get("SOLFER_RECORDINGS")
     if not kept:
         return
     target = Path(kept, node.strip("/"))
     try:
         target.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(folder / RECORDER_FILE, target / RECORDER_FILE)
+        shutil.copyfile(folder / RECORDING, target / RECORDING)
     except OSError as error:
         logger.warning("the last cycles are not kept in %s: %s", target, error.strerror)
 
@@ -113,7 +113,7 @@ def write_kept(folder: Path, target: Path) -> list[Path]:
         RecordingError: A file cannot be written.
     """
     files = []
-    for place in sorted(path.parent for path in folder.rglob(RECORDER_FILE)):
+    for place in sorted(path.parent for path in folder.rglob(RECORDING)):
         drain = RecordDrain(place)
         target.mkdir(parents=True, exist_ok=True)
         files.append(target / f"{place.name}.mcap")
@@ -130,7 +130,7 @@ class FileRecorder:
         namespace: Namespace of the loop.
         plugins: Its plugins.
         file: The file.
-        patience: Longest wait for plugins that are not there yet [s].
+        timeout: Longest wait for plugins that are not there yet [s].
 
     Attributes:
         process: The process.
@@ -139,31 +139,31 @@ class FileRecorder:
         RecordingError: Nothing can be written there.
     """
 
-    PATIENCE = 10.0
+    PROGRAM = "import sys; from solfer.cli.main import main; sys.exit(main())"
+    """What the process runs."""
+
+    TIMEOUT = 10.0
     """Longest time that the end waits for a complete file [s]."""
 
-    def __init__(self, namespace: str, plugins: Sequence[str], file: Path, patience: float = 0.0):
+    def __init__(self, namespace: str, plugins: Sequence[str], file: Path, timeout: float = 0.0):
         if not os.access(file.absolute().parent, os.W_OK):
             raise RecordingError(
                 "no file can be made there", where=str(file), expected="a folder that exists, and that you may write to"
             )
         names = [word for plugin in plugins for word in ("-n", plugin)]
-        command = ["record", *names, "--whole", "--wait", str(patience), namespace, str(file.absolute())]
+        command = ["record", *names, "--whole", "--wait", str(timeout), namespace, str(file.absolute())]
         # a session of its own: Ctrl-C ends the loop first, and then this has all of it
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _MAIN, *command], stdin=subprocess.DEVNULL, start_new_session=True
+            [sys.executable, "-c", self.PROGRAM, *command], stdin=subprocess.DEVNULL, start_new_session=True
         )
 
     def close(self) -> None:
         """Wait until the file is complete; the loop has ended."""
         try:
-            self.process.wait(self.PATIENCE)
+            self.process.wait(self.TIMEOUT)
         except subprocess.TimeoutExpired:
-            logger.warning("the recording ends before the loop, which goes on after %g s", self.PATIENCE)
+            logger.warning("the recording ends before the loop, which goes on after %g s", self.TIMEOUT)
             self.process.terminate()  # a SIGINT would be lost while Python still begins
-
-
-_MAIN = "import sys; from solfer.cli.main import main; sys.exit(main())"
 
 
 def of_plugins(plugins: Sequence[str], namespace: str = "", root: Path = SHARED_MEMORY) -> list[RecordDrain]:

@@ -10,10 +10,14 @@ from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
 from solfer.segments.ring import Ring
 
-RECORDER_FILE = RECORDER_KIND = "recording"
+RECORDING = "recording"
+"""File and kind of the segment."""
 
-RECORDER_EVENTS, EVENT_WIDTH = 256, 64
-"""Events that the memory holds, and their size in words of eight bytes; a longer text is cut."""
+EVENT_COUNT = 256
+"""Events that the memory holds."""
+
+EVENT_WIDTH = 64
+"""Size of an event in words of eight bytes; a longer text is cut."""
 
 
 @dataclass(frozen=True)
@@ -109,4 +113,4 @@ class RowLayout:
 
 def events_of(memory: memoryview, rows: int) -> Ring:
     """Return the ring of events in a segment, behind that of the rows, which takes so many bytes."""
-    return Ring(memory[rows:], EVENT_WIDTH, RECORDER_EVENTS)
+    return Ring(memory[rows:], EVENT_WIDTH, EVENT_COUNT)

@@ -12,7 +12,7 @@ from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
 from solfer.segments.segment import Segment
 from solfer.telemetry import STATISTICS
-from solfer.telemetry.histograms import HISTOGRAM_WORDS
+from solfer.telemetry.histograms import ROW_WORDS
 from solfer.transport.plugin_state import PluginState
 
 EXECUTOR = "xbotcore"
@@ -53,7 +53,7 @@ class PluginCount(enum.IntEnum):
 COMPUTED = ("kinematics", "center_of_mass", "contacts", "center_of_pressure", BIAS, INERTIA, INERTIA_INVERSE)
 """What a Robot computes, as `Robot.computations` names it: further words of a plugin."""
 
-STATISTICS_WORDS = len(PluginCount) + len(COMPUTED)
+PLUGIN_WORDS = len(PluginCount) + len(COMPUTED)
 """Words of a plugin."""
 
 LOOP_HISTOGRAMS = tuple(each.name.lower() for each in LoopTime)
@@ -73,7 +73,7 @@ class RuntimeStatistics:
         memory: The memory; None: memory of this process.
 
     Attributes:
-        histograms: Rows by `LoopTime`, then `stages` of each plugin, int64, shape (rows, HISTOGRAM_WORDS).
+        histograms: Rows by `LoopTime`, then `stages` of each plugin, int64, shape (rows, ROW_WORDS).
         skips: Periods that were skipped because of each of these rows; a late wake-up counts for `lateness`.
         counts: Words by `LoopCount`, int64.
         segments: The segment of shared memory; none if it is not shared.
@@ -84,13 +84,13 @@ class RuntimeStatistics:
         self.plugins = tuple(plugins)
         self.stages = tuple(stages)
         rows = len(LOOP_HISTOGRAMS) + len(self.stages) * len(self.plugins)
-        words = (len(LoopCount), STATISTICS_WORDS * len(self.plugins), HISTOGRAM_WORDS * rows, rows)
+        words = (len(LoopCount), PLUGIN_WORDS * len(self.plugins), ROW_WORDS * rows, rows)
         ends = [8 * end for end in accumulate(words)]
         self.size = ends[-1] + TEXT_BYTES * (1 + len(self.plugins))
         data = memory if memory is not None else memoryview(bytearray(self.size))
         parts = [data[end - 8 * size : end].cast("q") for end, size in zip(ends, words, strict=True)]
         self.counts, self._lives, histograms, self.skips = parts
-        self.histograms = np.frombuffer(histograms, dtype=np.int64).reshape(rows, HISTOGRAM_WORDS)
+        self.histograms = np.frombuffer(histograms, dtype=np.int64).reshape(rows, ROW_WORDS)
         self._texts = data[ends[-1] : self.size]
         self.segments: tuple[Segment, ...] = ()
 
@@ -147,7 +147,7 @@ class RuntimeStatistics:
 
     def life(self, plugin: int) -> memoryview:
         """Return the words of a plugin: by `PluginCount`, then those of COMPUTED."""
-        return self._lives[plugin * STATISTICS_WORDS : (plugin + 1) * STATISTICS_WORDS]
+        return self._lives[plugin * PLUGIN_WORDS : (plugin + 1) * PLUGIN_WORDS]
 
     def state(self, plugin: int) -> PluginState:
         """Return the state of a plugin's life."""
@@ -174,7 +174,7 @@ class RuntimeStatistics:
         return bytes(self._text(plugin)).rstrip(b"\0").decode(errors="replace")
 
     def put_text(self, text: str, plugin: int | None = None) -> None:
-        """Set a text; it is cut off at TEXT bytes."""
+        """Set a text; it is cut off at TEXT_BYTES."""
         self._text(plugin)[:] = text.encode(errors="replace")[:TEXT_BYTES].ljust(TEXT_BYTES, b"\0")
 
     def _text(self, plugin: int | None) -> memoryview:

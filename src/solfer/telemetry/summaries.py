@@ -13,8 +13,6 @@ from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 from solfer.transport.plugin_state import FAILED_STATES
 
-FAILED_NAMES = frozenset(state.name for state in FAILED_STATES)
-
 
 @dataclass(frozen=True)
 class StageSummary:
@@ -152,14 +150,14 @@ class StatisticsReader:
 
 
 def reports_of(now: LayerSummary | None, before: LayerSummary | None) -> dict[str, HealthReport]:
-    """Judge the health of a layer and of each of its plugins; None: there is no layer."""
+    """Evaluate the health of a layer and of each of its plugins; None: there is no layer."""
     if now is None:
         return {EXECUTOR: HealthReport(Health.ERROR, "there is no real-time layer", {})}
     return {EXECUTOR: layer_report(now, before), **{plugin.name: plugin_report(plugin) for plugin in now.plugins}}
 
 
 def layer_report(now: LayerSummary, before: LayerSummary | None) -> HealthReport:
-    """Judge the health of the layer from two summaries.
+    """Evaluate the health of the layer from two summaries.
 
     A process that has ended or does not cycle, or an emergency stop, is an error; skipped periods, and cycles that were
     too long, since the summary `before` are a warning.
@@ -190,8 +188,9 @@ def layer_report(now: LayerSummary, before: LayerSummary | None) -> HealthReport
 
 
 def plugin_report(plugin: PluginSummary) -> HealthReport:
-    """Judge the health of a plugin: an error if it failed, a warning if it waits for something."""
-    level = Health.ERROR if plugin.stage in FAILED_NAMES else Health.WARNING if plugin.reason else Health.GOOD
+    """Evaluate the health of a plugin: an error if it failed, a warning if it waits for something."""
+    has_failed = plugin.stage in {state.name for state in FAILED_STATES}
+    level = Health.ERROR if has_failed else Health.WARNING if plugin.reason else Health.GOOD
     values = {
         "stage": plugin.stage,
         "starts": plugin.starts,

@@ -70,18 +70,18 @@ class Backlog(Generic[Item]):
                     self.waiting.clear()
                     return [item for _, item in waiting]
             known = [sender for sender in self.waiting if sender in first]
-            strangers = [sender for sender in self.waiting if sender not in first]
-            return self._turns(known, most) + self._turns(strangers, others)
+            unknown = [sender for sender in self.waiting if sender not in first]
+            return self._round_robin(known, most) + self._round_robin(unknown, others)
 
-    def _turns(self, senders: list[str], most: int) -> list[Item]:
-        """Return at most `most` messages of `senders`, round robin; a sender that was served goes to the back."""
+    def _round_robin(self, senders: list[str], most: int) -> list[Item]:
+        """Return at most `most` messages of `senders`; one that was served goes to the back."""
         taken: list[Item] = []
-        turns = deque(senders)
-        while turns and len(taken) < most:
-            sender = turns.popleft()
+        waiting_senders = deque(senders)
+        while waiting_senders and len(taken) < most:
+            sender = waiting_senders.popleft()
             waiting = self.waiting.pop(sender)
             taken.append(waiting.popleft()[1])
             if waiting:
                 self.waiting[sender] = waiting
-                turns.append(sender)
+                waiting_senders.append(sender)
         return taken

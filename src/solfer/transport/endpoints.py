@@ -24,7 +24,7 @@ OLD = MessageStatus.OLD
 NEW = MessageStatus.NEW
 
 
-RIVALRY = 1.0
+PUBLISHER_TIMEOUT = 1.0
 """A publisher counts as active for this time after its newest message [s]."""
 
 

@@ -37,12 +37,14 @@ class FixedRateLoop:
         self._sleep_until = clock.sleep_until
         self.period = 1.0 / rate
         self._made_up = max(0.0, catch_up - self.period)
-        self.skipped = self._turn = 0
+        self.skipped = 0
+        self._periods = 0
         self._begin = self.deadline = clock.now()
 
     def restart(self) -> None:
         """Begin again: the next cycle is due now."""
-        self._turn, self._begin = 0, self._now()
+        self._periods = 0
+        self._begin = self._now()
         self.deadline = self._begin
 
     def begin(self) -> tuple[float, int]:
@@ -76,5 +78,5 @@ class FixedRateLoop:
             self.wait()
 
     def _advance(self, periods: int) -> None:
-        self._turn += periods
-        self.deadline = self._begin + self._turn * self.period
+        self._periods += periods
+        self.deadline = self._begin + self._periods * self.period

@@ -7,9 +7,6 @@ from typing import Any
 
 from solfer.errors import MiddlewareError
 
-RATION, WAITING_CALLS = 16, 64
-"""Default of an `Inbox`: calls in one cycle, and calls that may wait."""
-
 _Call = tuple[Callable[[], Any], "Future[Any]"]
 
 
@@ -25,11 +22,11 @@ class Inbox:
         refused: Calls refused because too many others were waiting.
         most: The largest number of calls, urgent ones left out, that a cycle has run.
         sources: Called with the `refusal` before the queued calls: they receive what comes in by topics.
-        mail: Reports whether anything may wait in these topics; without it the sources are called only
+        pending: Returns whether anything may wait in these topics; where nothing does, the sources are called only
             where there is a `refusal`.
     """
 
-    def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING_CALLS) -> None:
+    def __init__(self, refusal: str = "", ration: int = 16, waiting: int = 64) -> None:
         self.refusal = refusal
         self.refused = 0
         self.most = 0
@@ -39,7 +36,7 @@ class Inbox:
         self._urgent: deque[_Call] = deque()
         self._single: deque[_Call] = deque()
         self.sources: list[Callable[[str], None]] = []
-        self.mail: Callable[[], bool] = lambda: True
+        self.pending: Callable[[], bool] = lambda: True
 
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":
         """Queue `call`; the Future holds its result or its error after one of the next cycles.
@@ -63,7 +60,7 @@ class Inbox:
             BaseException: A call raised a request to exit, such as SystemExit. Its caller gets it, too; the calls
                 behind it stay queued.
         """
-        if self.sources and (self.refusal or self.mail()):
+        if self.sources and (self.refusal or self.pending()):
             for receive in self.sources:
                 receive(self.refusal)
         while self._urgent:

@@ -4,11 +4,8 @@ import logging
 
 logger = logging.getLogger(__name__)
 
-MOST_SENDERS = 100
-"""Most senders that are reported; those whose name changes each time do not fill the memory."""
 
-
-class InexactTurns:
+class InexactOrientations:
     """Reports the first inexact orientation of each sender; see `normalize`."""
 
     def __init__(self) -> None:
@@ -16,6 +13,7 @@ class InexactTurns:
 
     def report(self, sender: str) -> None:
         """Log that an orientation of a sender was inexact, unless it was before."""
-        if sender not in self._senders and len(self._senders) < MOST_SENDERS:
+        # no more: senders whose name changes each time do not fill the memory
+        if sender not in self._senders and len(self._senders) < 100:
             self._senders.add(sender)
             logger.warning("quaternions of %s have not quite the length 1: they get it", sender or "an unknown sender")

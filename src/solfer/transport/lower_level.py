@@ -32,7 +32,7 @@ TOPIC = "topic "
 plugin that publishes it."""
 
 
-OF_NODE = "#"
+SEPARATOR = "#"
 """Between a node and one of its components in the name of a claimant; no node has it in its own name."""
 
 
@@ -45,12 +45,12 @@ def claimant(node: str, component: str) -> str:
     """
     if not component or component == node.rpartition("/")[2]:
         return node
-    return f"{node}{OF_NODE}{component}"
+    return f"{node}{SEPARATOR}{component}"
 
 
 def node_of(claimant: str) -> str:
     """Return the node of a claimant: the sender of its commands."""
-    return claimant.partition(OF_NODE)[0]
+    return claimant.partition(SEPARATOR)[0]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ JOINT_FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 """Fields of a JointMessage: [rad, m], [rad/s, m/s], [Nm, N], [Nm/rad], [Nms/rad]."""
 
 
-_MESSAGE_ROWS = frozenset((*JOINT_FIELDS, "values"))
+_ROWS = frozenset((*JOINT_FIELDS, "values"))
 
 GAINS = ("stiffness", "damping")
 """Those of them that are gains: they have no direction, and a lower level has values of its own for them."""
@@ -73,7 +73,7 @@ class JointMessage:
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute; an array that takes the place of a row ends the block, which would be sent instead."""
         numbers = self.__dict__
-        if "block" in numbers and name in _MESSAGE_ROWS and value is not numbers.get(name):
+        if "block" in numbers and name in _ROWS and value is not numbers.get(name):
             numbers["block"] = None
         numbers[name] = value
 
@@ -110,7 +110,7 @@ class BodyMessage:
         orientation: Hamilton quaternion (x, y, z, w) that rotates from `child` to `frame`, shape (4,).
         linear: Velocity of the link's origin, shape (3,) [m/s].
         angular: Angular velocity of the link, shape (3,) [rad/s].
-        pose_covariance: Of position [m] and turns about the axes of `frame` [rad], shape (6, 6); zero: not known.
+        pose_covariance: Of position [m] and rotations about the axes of `frame` [rad], shape (6, 6); zero: not known.
         twist_covariance: Of linear and angular velocity in the axes of `child`, as nav_msgs/Odometry has it, shape
             (6, 6) [m/s, rad/s]; zero: not known.
     """
@@ -284,9 +284,6 @@ TYPES: dict[str, type[Message]] = {
 }
 """Class of the messages by their canonical name."""
 
-INTERFACE_NAME = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
-"""Name of an interface: what is none of TYPES travels as a FieldsMessage."""
-
 
 def arrays(message: Any) -> tuple[np.ndarray, ...]:
     """Return the arrays that hold all numbers of a message."""
@@ -312,12 +309,12 @@ def copied(message: Any) -> Any:
 
 
 def type_of(message: str) -> type[Message]:
-    """Return the class of the messages of a canonical name.
+    """Return the class of the messages of a canonical name; what is none of TYPES travels as a FieldsMessage.
 
     Raises:
         MiddlewareError: It is no name of a message.
     """
-    if message not in TYPES and not INTERFACE_NAME.fullmatch(message):
+    if message not in TYPES and not re.fullmatch(r"[A-Za-z]\w*/[A-Za-z]\w*", message):
         raise MiddlewareError(f"no message: {message}", expected=f"package/Type, such as {', '.join(TYPES)}")
     return TYPES.get(message, FieldsMessage)
 

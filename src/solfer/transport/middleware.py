@@ -20,9 +20,6 @@ from solfer.transport.topics import Missing, Topics
 
 logger = logging.getLogger(__name__)
 
-FIRST_MESSAGE_QUIET_TIME = 1.0
-"""Time without a first message after which `joint_order` warns about a missing publisher [s]."""
-
 Submit = Callable[[Callable[[], Any]], "Future[Any]"]
 """Runs a call from any thread between two cycles; the Future holds its result or its error."""
 
@@ -182,7 +179,7 @@ class Middleware(abc.ABC):
         """Make a writer of a topic that a component declares."""
         return self.writer(topic, message)
 
-    def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
+    def pending(self, queues: Sequence[Queue]) -> Callable[[], bool]:
         """Return a function that reports whether messages may wait in any of these queues, as `Queue.waits` does."""
         return partial(any, [queue.waits for queue in queues])
 
@@ -206,12 +203,13 @@ class Middleware(abc.ABC):
             MiddlewareError: Nothing arrived within `timeout` [s]; names what is wrong with the topic.
         """
         message = canonical(message, where)
-        topic, order = self._first_order(topic, message, min(FIRST_MESSAGE_QUIET_TIME, timeout))
-        if order is None and timeout > FIRST_MESSAGE_QUIET_TIME:
+        quiet = 1.0  # time without a first message after which a missing publisher is reported [s]
+        topic, order = self._first_order(topic, message, min(quiet, timeout))
+        if order is None and timeout > quiet:
             missing = self._missing_publisher(topic, message)
             if missing is not None:
                 logger.warning("%s%s%s", f"{where}: " if where else "", missing.what, missing.hint)
-            topic, order = self._first_order(topic, message, timeout - FIRST_MESSAGE_QUIET_TIME)
+            topic, order = self._first_order(topic, message, timeout - quiet)
         if order is not None:
             return order
         missing = self._missing_publisher(topic, message)

@@ -2,11 +2,17 @@
 
 from dataclasses import dataclass
 
-GET_PARAMETERS, SET_PARAMETERS = "get_parameters", "set_parameters"
-"""Names of the services, behind that of the plugin."""
+GET_PARAMETERS = "get_parameters"
+"""Name of the service that describes parameters, behind that of the plugin."""
 
-GETTING, SETTING = "solfer/GetParameters", "solfer/SetParameters"
-"""Their interfaces."""
+GET_INTERFACE = "solfer/GetParameters"
+"""Its interface."""
+
+SET_PARAMETERS = "set_parameters"
+"""Name of the service that changes parameters, behind that of the plugin."""
+
+SET_INTERFACE = "solfer/SetParameters"
+"""Its interface."""
 
 
 @dataclass(frozen=True)

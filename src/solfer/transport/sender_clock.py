@@ -2,33 +2,11 @@
 
 import math
 
-DISTRUST = 1.0
-"""Time after a wrong stamp for which arrivals count [s]."""
-
-BACK, AHEAD = 0.5, 1.5
-"""Periods by which a stamp may be behind the one before, or ahead of all others at its arrival: transports keep the
-order of messages, and are no faster than they have been."""
-
-SPREAD = 1.0
-"""Share of the mean delay beyond the least one by which a stamp may be ahead besides."""
+AHEAD = 1.5
+"""Periods by which a stamp may be ahead of all others at its arrival: transports are no faster than they have been."""
 
 AVERAGED = 100
 """Messages over which periods and delays are averaged."""
-
-LEARNED = 20
-"""Messages from which on a stamp is judged by those before: at first some may come that have waited."""
-
-FORGETTING_TIME = 1.0
-"""Time in which a least delay is forgotten: a simulation that is slower than real time falls behind [s]."""
-
-LONGEST_COUNTED = 0.02
-"""Longest time that counts for that between two messages: what comes late after a stall comes together [s]."""
-
-PULL = 0.1
-"""Share of a period by which the time of a message goes on at least, and of a difference that is made up for in one."""
-
-CLOCK_DIFFERENCE = 0.1
-"""Mean difference of a message's time and its stamp from which on its clock was set, and is no jitter [s]."""
 
 
 class SenderClock:
@@ -55,14 +33,14 @@ class SenderClock:
         self._until = -math.inf
         self._stamp = self._arrival = self._difference = math.nan
         self._count = 0
-        self._time = self._period = self._interval = self._delay = self._least = self._offset = 0.0
+        self._time = self._period = self._interval = self._delay = self._lowest = self._offset = 0.0
 
     def time(self, stamp: float, arrival: float) -> float:
         """Return the time of a message by its stamp and its arrival [s]."""
         passed = arrival - self._arrival
         step = stamp - self._stamp
         delay = arrival - stamp
-        if not self.is_distrusted and 0.0 <= step and delay >= self._least:
+        if not self.is_distrusted and 0.0 <= step and delay >= self._lowest:
             count = self._count
             if count < AVERAGED:
                 self._count = count = count + 1
@@ -71,11 +49,13 @@ class SenderClock:
             self._period += (step - self._period) / count
             self._interval += (passed - self._interval) / count
             self._delay += (delay - self._delay) / count
-            self._least += (delay - self._least) * min(passed, LONGEST_COUNTED) / FORGETTING_TIME
+            # the lowest delay is forgotten in a second: a simulation that is slower than real time falls behind; of the
+            # time between two messages at most 20 ms count: what comes late after a stall comes together
+            self._lowest += (delay - self._lowest) * min(passed, 0.02)
             return stamp + self._offset
-        return self._judge(stamp, arrival)
+        return self._check(stamp, arrival)
 
-    def _judge(self, stamp: float, arrival: float) -> float:
+    def _check(self, stamp: float, arrival: float) -> float:
         """Return the time of a message that is the first, earlier than all before, or comes after a wrong stamp."""
         passed = arrival - self._arrival
         step = stamp - self._stamp
@@ -83,18 +63,20 @@ class SenderClock:
         self._arrival = arrival
         if math.isnan(passed) or (self._stamp == 0.0 and not self.is_distrusted):  # or the first one with a stamp
             self._stamp = stamp
-            self._delay = self._least = delay
+            self._delay = self._lowest = delay
             return stamp
-        period = self._period if self._count >= LEARNED else math.inf
-        tolerance = AHEAD * period + SPREAD * (self._delay - self._least)
+        # no stamp is checked by those of the first messages, of which some may have waited
+        period = self._period if self._count >= 20 else math.inf
+        # a stamp may be ahead by the mean delay beyond the lowest one besides
+        tolerance = AHEAD * period + (self._delay - self._lowest)
         speed = self._period / self._interval if self._interval else 1.0
-        is_ahead = step > speed * passed + tolerance and (self.is_distrusted or delay < self._least - tolerance)
-        if not step >= -BACK * period or is_ahead or not stamp:
+        is_ahead = step > speed * passed + tolerance and (self.is_distrusted or delay < self._lowest - tolerance)
+        if not step >= -0.5 * period or is_ahead or not stamp:
             self._distrust(stamp, step, arrival - passed)
         if self.is_distrusted:
             return self._follow(stamp, arrival)
         self._count = count = min(self._count + 1, AVERAGED)
-        self._least = min(self._least, delay)
+        self._lowest = min(self._lowest, delay)
         self._stamp = max(stamp, self._stamp)
         self._period += (step - self._period) / count
         self._interval += (passed - self._interval) / count
@@ -110,18 +92,19 @@ class SenderClock:
         if not self.is_distrusted:
             self._time = before - self._delay + self._offset
         self.is_distrusted = True
-        self._until = self._arrival + DISTRUST
+        self._until = self._arrival + 1.0
         self._difference = math.nan
 
     def _follow(self, stamp: float, arrival: float) -> float:
         """Return the time of a message by its arrival, and in the end by its stamp, from where times are by then."""
         is_over = arrival > self._until
-        if is_over and abs(self._difference - self._offset) > CLOCK_DIFFERENCE:
+        if is_over and abs(self._difference - self._offset) > 0.1:  # [s]: the clock was set, this is no jitter
             self._offset = self._difference
         target = stamp if is_over else arrival - self._delay
         target += self._offset
         expected = self._time + self._period
-        self._time = max(expected + PULL * (target - expected), self._time + PULL * self._period)
+        # a tenth of a difference is made up for in one period, and time goes on by a tenth of it at least
+        self._time = max(expected + 0.1 * (target - expected), self._time + 0.1 * self._period)
         if math.isfinite(stamp) and stamp:
             self._stamp = stamp if abs(stamp - self._stamp) > AHEAD * self._period else max(stamp, self._stamp)
             difference = self._time - stamp
@@ -129,5 +112,5 @@ class SenderClock:
             self._difference = known + (difference - known) / AVERAGED
         if is_over and self._time - target < 0.5 * self._period:
             self.is_distrusted = False
-            self._delay = self._least = arrival - stamp
+            self._delay = self._lowest = arrival - stamp
         return self._time

@@ -2,9 +2,6 @@
 
 import math
 
-STAMP_PERSISTENT = 0.2
-"""A clock was set, or is another, if its stamps jump or differ for so long [s]."""
-
 
 class StampFault:
     """A fault of stamps: after a while it is their clock that has changed.
@@ -17,10 +14,10 @@ class StampFault:
         self.since = math.nan
 
     def persists(self, arrival: float) -> bool:
-        """Note that a stamp which arrives at a time [s] has the fault; return whether it has lasted for long."""
+        """Note that a stamp which arrives at a time [s] has the fault; return whether it has for 0.2 s."""
         if math.isnan(self.since):
             self.since = arrival
-        return arrival - self.since >= STAMP_PERSISTENT
+        return arrival - self.since >= 0.2
 
 
 class StreamClock:

@@ -5,9 +5,6 @@ from dataclasses import dataclass, field
 
 from solfer.errors import nearest
 
-HINT_SHOWN_COUNT = 3
-"""Most names that a hint suggests."""
-
 
 @dataclass(frozen=True)
 class Missing:
@@ -56,7 +53,9 @@ class Topics:
             return Missing(f"no subscriber on {topic}", _alike(topic, message, self.received))
         if present in ("", message):
             return None
-        return Missing(f"a subscriber of {topic} wants {present}, not {message}", _alike(topic, message, self.received))
+        return Missing(
+            f"a subscriber of {topic} expects {present}, not {message}", _alike(topic, message, self.received)
+        )
 
 
 def _on(topics: Mapping[str, str], topic: str) -> str | None:
@@ -64,9 +63,7 @@ def _on(topics: Mapping[str, str], topic: str) -> str | None:
 
 
 def _alike(topic: str, message: str, topics: Mapping[str, str]) -> tuple[str, ...]:
-    """List topics with similar names, those of the same message first; else any of the same message."""
+    """List up to three topics with similar names, those of the same message first; else any of the same message."""
     fitting = [name for name, present in topics.items() if present == message and name != topic]
     foreign = [name for name, present in topics.items() if present != message and name != topic]
-    return tuple(
-        (nearest(topic, fitting) + nearest(topic, foreign))[:HINT_SHOWN_COUNT] or sorted(fitting)[:HINT_SHOWN_COUNT]
-    )
+    return tuple((nearest(topic, fitting) + nearest(topic, foreign))[:3] or sorted(fitting)[:3])

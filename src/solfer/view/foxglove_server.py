@@ -12,7 +12,7 @@ from solfer.errors import MiddlewareError, MissingDependency
 from solfer.interfaces.declaration import Accepted
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene import ContactForce, SceneState
-from solfer.transport.parameters import SET_PARAMETERS, SETTING, SetParameters
+from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, SetParameters
 from solfer.view.columns import PlottedColumns
 from solfer.view.control import PageControl
 from solfer.view.drawing import FORCE_SCALE, FORCES
@@ -174,7 +174,7 @@ class FoxgloveServer(ServerListener):
         text = value if isinstance(value, str) else json.dumps(value)
         request = SetParameters((parameter,), (text,))
         forget = partial(self._parameters.forget, part)
-        self._requests.call(f"{part}/{SET_PARAMETERS}", SETTING, request, Accepted, lambda _: forget())
+        self._requests.call(f"{part}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, lambda _: forget())
 
     def _values(self) -> dict[str, Any]:
         """Return the values of all parameters, '<part>.<name>'."""

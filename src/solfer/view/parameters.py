@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from concurrent.futures import Future
 
 from solfer.transport import Middleware
-from solfer.transport.parameters import GET_PARAMETERS, GETTING, GetParameters, ParametersReply
+from solfer.transport.parameters import GET_INTERFACE, GET_PARAMETERS, GetParameters, ParametersReply
 
 TRIALS, PARAMETERS_PAUSE = 10, 2.0
 """How often, and after which time [s], a part is requested its parameters: it may report before it offers them."""
@@ -38,7 +38,9 @@ class KnownParameters:
                 self._left[part] -= 1
                 self._next[part] = now + PARAMETERS_PAUSE
                 service = self._middleware.resolve(f"{part}/{GET_PARAMETERS}")
-                answer = self._middleware.request(service, GETTING, GetParameters(), ParametersReply, PARAMETERS_PAUSE)
+                answer = self._middleware.request(
+                    service, GET_INTERFACE, GetParameters(), ParametersReply, PARAMETERS_PAUSE
+                )
                 self._pending[part] = answer
 
     def forget(self, part: str) -> None:

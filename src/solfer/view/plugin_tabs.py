@@ -22,7 +22,7 @@ from solfer.interfaces.declaration import Accepted
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
-from solfer.transport.parameters import SET_PARAMETERS, SETTING, ParametersReply, SetParameters
+from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, ParametersReply, SetParameters
 from solfer.view.control import PageControl
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
@@ -169,7 +169,9 @@ class _PluginTab:
         if self._control is not None and self._control.may_command(client):
             request = SetParameters((name,), (text,))
             service = f"{self._name}/{SET_PARAMETERS}"
-            self._requests.call(service, SETTING, request, Accepted, lambda _: self._parameters.forget(self._name))
+            self._requests.call(
+                service, SET_INTERFACE, request, Accepted, lambda _: self._parameters.forget(self._name)
+            )
 
 
 def _number(text: str) -> float:

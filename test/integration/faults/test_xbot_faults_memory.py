@@ -134,7 +134,7 @@ def test_a_foreign_file_is_named(folder, listener, content, caplog):
     with process(publish, folder):
         stranger = pipe_file(folder, "stranger")
         stranger.write_bytes(content)
-        listener.namespace.bell("pipes", TOPIC).ring()
+        listener.namespace.notification("pipes", TOPIC).send()
         with caplog.at_level(logging.WARNING):
             news(reader)
             while not reader.refused:

@@ -15,7 +15,7 @@ from support.table_1 import ELBOW, HAND, KNEE_SPRING, PUSH, STILL, WHEEL_JOINTS,
 
 from solfer.components.move_joints import MoveJoints
 from solfer.config import load
-from solfer.middleware.bridge.bridge import BRIDGE_PERIOD
+from solfer.middleware.bridge import Bridge
 from solfer.numerics.rotations import quaternion_from_rotation
 
 FILE = Path(__file__).parents[2] / "data" / "table_2.yaml"
@@ -78,7 +78,7 @@ def load_gains(world, folder, factor):
     reply = world.bus.call("position_controller/load_gains", file=str(file))
     while not reply.done():  # a thread reads the file
         time.sleep(0.01)
-        world.run(BRIDGE_PERIOD)
+        world.run(Bridge.PERIOD)
     assert reply.result(0).success, reply.result(0).message
 
 

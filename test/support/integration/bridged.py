@@ -8,8 +8,7 @@ from support.integration.xbot_world import XbotWorld
 from support.shared_memory.xbot_bridge import made
 
 from solfer.config import Configuration
-from solfer.middleware.bridge import routes
-from solfer.middleware.bridge.bridge import BRIDGE_PERIOD
+from solfer.middleware.bridge import Bridge, routes
 from solfer.middleware.memory import FaultsRecord, MemoryMiddleware
 from solfer.plugins import Plugin
 
@@ -32,7 +31,7 @@ class BridgedWorld(XbotWorld):
         end = self.node(BRIDGE)
         inwards, outwards = routes(inside)
         self.bridge = made(end.namespace, end, MemoryMiddleware(self.bus, BRIDGE), inwards, outwards)
-        self.bus.every(BRIDGE_PERIOD, self.bridge.cycle)
+        self.bus.every(Bridge.PERIOD, self.bridge.cycle)
 
     def outside(self, name: str, file: Path = CONFIG / "centauro.yaml") -> Plugin:
         """Make a plugin that is not in the layer, and put its cycle on the bus."""

@@ -16,7 +16,7 @@ from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.demo.driving import COURSE_RATE
 from solfer.demo.waving import Waving
-from solfer.middleware.bridge.bridge import BRIDGE_PERIOD as BRIDGED
+from solfer.middleware.bridge import Bridge
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.navigation import Navigation, ScenarioCourse
 from solfer.plugins import PluginSet, Registry, generate, generate_shared
@@ -189,5 +189,5 @@ class InLayer(_Scheduled, BridgedWorld):
         return [executor]
 
     def _schedule(self):
-        self.bus.every(BRIDGED, self.bridge.receive, FIRST - BEFORE)
-        self.bus.every(BRIDGED, self.bridge.publish, FIRST + 0.5 * BRIDGED)
+        self.bus.every(Bridge.PERIOD, self.bridge.receive, FIRST - BEFORE)
+        self.bus.every(Bridge.PERIOD, self.bridge.publish, FIRST + 0.5 * Bridge.PERIOD)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.navigation.course import SMOOTHED
+from solfer.navigation.course import CORRECTION_TIME
 
 
 class Correction:
@@ -37,6 +37,6 @@ class Correction:
 
     def mean_pose(self, base):
         """Return the mean of these poses, by the time constant with which they are followed."""
-        ages = np.arange(0.0, 6.0 * SMOOTHED, 0.1)
+        ages = np.arange(0.0, 6.0 * CORRECTION_TIME, 0.1)
         poses = [self.pose(base, self.bus.time - age) for age in ages]
-        return np.average(poses, axis=0, weights=np.exp(-ages / SMOOTHED))
+        return np.average(poses, axis=0, weights=np.exp(-ages / CORRECTION_TIME))

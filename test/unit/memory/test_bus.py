@@ -132,14 +132,14 @@ def test_a_closed_node_leaves_nothing(bus):
     service = Service("double", "test/Double", dict, dict, lambda request: request)
     first, other = MemoryMiddleware(bus, "first"), MemoryMiddleware(bus, "other")
     first.serve("node", [service], Inbox().submit)
-    writer, reader = first.writer("told", JOINT_STATE), other.reader("told", JOINT_STATE)
-    first.reader("heard", JOINT_STATE)
-    other.writer("heard", JOINT_STATE)
+    writer, reader = first.writer("sent", JOINT_STATE), other.reader("sent", JOINT_STATE)
+    first.reader("received", JOINT_STATE)
+    other.writer("received", JOINT_STATE)
     writer.write(message(1.0))
-    assert bus.topics(other).published == {"told": JOINT_STATE}
+    assert bus.topics(other).published == {"sent": JOINT_STATE}
     first.close()
     assert bus.topics(other).published == {} and bus.topics(other).received == {}
-    assert bus.topics(first).published == {"heard": JOINT_STATE}
+    assert bus.topics(first).published == {"received": JOINT_STATE}
     assert reader.read() is MessageStatus.NEW
     with pytest.raises(UnknownName):
         bus.call("node/double")

@@ -1,4 +1,4 @@
-"""The navigation in memory, with a base that integrates what it is told."""
+"""The navigation in memory, with a base that integrates its commands."""
 
 import math
 
@@ -18,7 +18,7 @@ from solfer.navigation import (
     WaypointCourse,
     WaypointFollower,
 )
-from solfer.navigation.course import SMOOTHED, MeasuredPose
+from solfer.navigation.course import CORRECTION_TIME, MeasuredPose
 from solfer.scenarios import Player, read_scenario
 
 RATE = 100.0  # [Hz]
@@ -71,10 +71,10 @@ class Told:
 
 
 def test_it_goes_to_way_points_and_ends_at_rest(bus, go):
-    base, told = DrivenBase(bus, heading=0.7), Told(bus)
+    base, recorded = DrivenBase(bus, heading=0.7), Told(bus)
     assert go((1.0, 0.5), (1.5, -0.5, -1.0)).run() == 0
     assert math.dist(base.pose[:2], (1.5, -0.5)) < 0.02 and abs(base.pose[2] + 1.0) < 0.02
-    messages = told.messages()
+    messages = recorded.messages()
     assert [message["number"] for message in messages][-1] == 2 and messages[-1]["done"]
     before = base.pose.copy()
     bus.run_until(bus.time + 1.0)
@@ -109,23 +109,23 @@ def test_it_plays_a_scenario_along_the_heading_of_the_beginning(bus, play, repos
     own = Player(scenario)
     while own.step():
         pass
-    base, told = DrivenBase(bus, heading=0.7), Told(bus)
+    base, recorded = DrivenBase(bus, heading=0.7), Told(bus)
     start = base.pose.copy()
     assert play(scenario).run() == 0
     x, y, z, heading = own.base - scenario.base
     cos, sin = math.cos(0.7), math.sin(0.7)
-    wanted = (cos * x - sin * y, sin * x + cos * y, heading)
-    np.testing.assert_allclose(base.pose - start, wanted, atol=0.01)
+    expected = (cos * x - sin * y, sin * x + cos * y, heading)
+    np.testing.assert_allclose(base.pose - start, expected, atol=0.01)
     np.testing.assert_allclose(base.vertices, own.vertices - scenario.vertices, atol=0.01)
     assert abs(base.z - z) < 0.01 and base.camber == tuple(own.camber)
-    assert told.messages()[-1]["done"] and not base.velocity.any()
+    assert recorded.messages()[-1]["done"] and not base.velocity.any()
 
 
 def test_it_pauses_at_rest_and_goes_on(bus, play, tmp_path):
     """Two seconds of pause: the base rests, the progress reports it, and the whole way is completed all the same."""
     pattern = [{"type": "move", **STAY, "base": 0}]
     base = DrivenBase(bus)
-    start, told = base.pose[0], Told(bus)
+    start, recorded = base.pose[0], Told(bus)
     navigation = play(made(tmp_path, pattern, vel=0.2, base_ref=[[1.0, 0.0, 0.0, 0.0]]))
     seen = []
     bus.every(1e9, lambda: bus.call("navigation/pause", data=True), start=3.0)
@@ -134,7 +134,7 @@ def test_it_pauses_at_rest_and_goes_on(bus, play, tmp_path):
     assert navigation.run() == 0
     assert seen[1][0] == seen[0] > 0.1 and seen[1][1].result().success
     assert base.pose[0] - start == pytest.approx(0.995, abs=0.01)
-    messages = told.messages()
+    messages = recorded.messages()
     assert any(message["paused"] for message in messages) and not messages[-1]["paused"]
     assert messages[-1]["elapsed"] == pytest.approx(4.975, abs=0.05)
     assert bus.time == pytest.approx(0.5 + 1.0 + 4.975 + 3.25, abs=0.1)  # connections, start and end, way, pause
@@ -198,7 +198,7 @@ def test_legs_that_are_lifted_need_names_of_contacts(bus, play, tmp_path):
 
 
 def test_without_odometry_it_stops_and_goes_on_later(bus, go):
-    base, told = DrivenBase(bus), Told(bus)
+    base, recorded = DrivenBase(bus), Told(bus)
 
     def silence(silent):
         base.is_silent = silent
@@ -209,7 +209,7 @@ def test_without_odometry_it_stops_and_goes_on_later(bus, go):
     bus.every(1.0, lambda: moved.append(base.moved))
     assert go((2.0, 0.0)).run() == 0
     assert moved[6] == moved[5] > moved[3]  # it stops half a second after the last message
-    assert "odometry on odometry/odom" in {message["waits"] for message in told.messages()}
+    assert "odometry on odometry/odom" in {message["waits"] for message in recorded.messages()}
     assert math.dist(base.pose[:2], (2.0, 0.0)) < 0.02
 
 
@@ -248,20 +248,20 @@ def test_it_begins_when_a_subscriber_comes(bus, play, tmp_path):
 
 
 def test_a_scenario_follows_the_pace(bus, play, tmp_path):
-    """A robot that waits, and is slower than it is told, ends where the file ends."""
+    """A robot that waits, and is slower than commanded, ends where the file ends."""
     circle = {"type": "circle", **STAY, "y_cp": 1, "angle": 1.5, "radius": 0.5, "x_sign": 1, "y_sign": 1}
     pattern = [{"type": "speed", "motions": [[3, 3, 0.4]]}, circle, {"type": "wait", "steps": 20}]
     scenario = made(tmp_path, pattern, vel=0.02, y_cp_ref=[[0.0] * 4, [0.05, -0.05, 0.05, -0.05]])
     own = Player(scenario)
     while own.step():
         pass
-    base, told = DrivenBase(bus), Told(bus)
+    base, recorded = DrivenBase(bus), Told(bus)
     start = base.pose.copy()
     base.pace = lambda: 0.0 if bus.time < 3.0 else 0.5 + 0.5 * math.sin(bus.time)
     assert play(scenario).run() == 0
     np.testing.assert_allclose(base.pose - start, (own.base - scenario.base)[[0, 1, 3]], atol=0.02)
     np.testing.assert_allclose(base.vertices, own.vertices - scenario.vertices, atol=0.01)
-    messages = told.messages()
+    messages = recorded.messages()
     paces = [message["pace"] for message in messages if not message["waits"]]
     assert min(paces[:20]) == 0.0 and max(paces) > 0.9
     assert messages[-1]["elapsed"] == pytest.approx(scenario.duration, abs=0.1) and bus.time > 1.5 * scenario.duration
@@ -360,11 +360,11 @@ def test_a_base_that_is_located_elsewhere_goes_on_from_there(bus):
     )
     x, y, heading = correction.pose(base.pose, bus.time)
     assert math.dist((x, y), (4.0, 3.0)) < 0.03 and abs(heading) < 0.02
-    assert arrived[0] + 2.0 * SMOOTHED <= bus.time < arrived[0] + 6.0 * SMOOTHED
+    assert arrived[0] + 2.0 * CORRECTION_TIME <= bus.time < arrived[0] + 6.0 * CORRECTION_TIME
 
 
 def test_without_a_localisation_it_stops_and_says_what_is_missing(bus):
-    base, told = DrivenBase(bus), Told(bus)
+    base, recorded = DrivenBase(bus), Told(bus)
     correction, node = Correction(bus, 1), MemoryMiddleware(bus, "navigation")
     follower = WaypointFollower([Waypoint(3.0, 2.0)], DriveLimits())
     course = WaypointCourse(node, follower, "wheeled_motion", "odometry/odom", correction)
@@ -374,4 +374,4 @@ def test_without_a_localisation_it_stops_and_says_what_is_missing(bus):
     bus.every(1.0, lambda: moved.append(base.moved))
     assert Navigation(node, course, "navigation", RATE).run() == 0
     assert moved[6] == moved[5] > 0.0 and moved[-1] > moved[6]
-    assert "a transform from 'map' to 'odom'" in {message["waits"] for message in told.messages()}
+    assert "a transform from 'map' to 'odom'" in {message["waits"] for message in recorded.messages()}

@@ -7,7 +7,6 @@ import pytest
 
 from solfer.errors import SolferError
 from solfer.navigation import DriveLimits, Waypoint, WaypointFollower
-from solfer.navigation.waypoints import PASSED, WAYPOINT_ARRIVAL_DISTANCE, WAYPOINT_TURN_LIMIT
 
 PERIOD = 0.02  # [s]
 
@@ -48,18 +47,18 @@ def test_it_passes_way_points_and_stops_at_the_last(seed, lag):
     follower, start = WaypointFollower(goals, limits), random.uniform(-2.0, 2.0, 3)
     poses, velocities, lefts = drive(follower, start, lag)
     assert not any(follower.velocity) and follower.left == 0.0
-    assert math.dist(poses[-1, :2], places[-1]) <= WAYPOINT_ARRIVAL_DISTANCE + limits.speed * lag
+    assert math.dist(poses[-1, :2], places[-1]) <= WaypointFollower.ARRIVAL_DISTANCE + limits.speed * lag
     if headings[-1] is not None:
-        assert abs(math.remainder(poses[-1, 2] - headings[-1], math.tau)) <= WAYPOINT_TURN_LIMIT + 0.5 * lag
+        assert abs(math.remainder(poses[-1, 2] - headings[-1], math.tau)) <= WaypointFollower.ARRIVAL_ANGLE + 0.5 * lag
     for place in places:
-        assert np.linalg.norm(poses[:, :2] - place, axis=1).min() <= PASSED
+        assert np.linalg.norm(poses[:, :2] - place, axis=1).min() <= WaypointFollower.PASSING_DISTANCE
     speeds = np.linalg.norm(velocities[:, :2], axis=1)
     assert speeds.max() <= limits.speed + 1e-9 and np.abs(velocities[:, 2]).max() <= limits.turn_speed + 1e-9
     change = np.diff(velocities, axis=0) / PERIOD
     assert np.linalg.norm(change[:, :2], axis=1).max() <= limits.acceleration + 1e-9
     assert np.abs(change[:, 2]).max() <= limits.turn_acceleration + 1e-9
     away = distance_to([start[:2], *places], poses[:, :2])
-    assert away.max() <= 3.0 * PASSED
+    assert away.max() <= 3.0 * WaypointFollower.PASSING_DISTANCE
 
 
 def test_the_time_of_a_straight_way_is_that_of_a_trapezoid():
@@ -93,7 +92,7 @@ def test_at_a_pace_of_zero_it_stops_within_its_acceleration_and_goes_on():
     times = np.arange(len(velocities)) * PERIOD
     assert np.all(velocities[(times > 4.1) & (times < 6.0)] == 0.0)
     assert np.abs(np.diff(velocities[:, 0])).max() <= 0.3 * PERIOD + 1e-9
-    assert math.dist(poses[-1, :2], (2.0, 0.0)) <= WAYPOINT_ARRIVAL_DISTANCE
+    assert math.dist(poses[-1, :2], (2.0, 0.0)) <= WaypointFollower.ARRIVAL_DISTANCE
 
 
 def test_it_turns_the_short_way():

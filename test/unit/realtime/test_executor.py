@@ -193,7 +193,7 @@ def test_skipped_periods_count_for_their_cause(layer, lasts, late, skipped, rows
     for component, time in zip(layer.several.components, lasts, strict=True):
         component.lasts = time
     layer.executor.cycle()
-    layer.executor._turn(late, skipped)
+    layer.executor._run_cycle(late, skipped)
     statistics = layer.executor.statistics
     names = [managed.name for managed in layer.executor.plugins]
     row = statistics.row(names.index(rows[0]), STAGES.index("component")) if rows else int(LoopTime.LATENESS)
@@ -207,7 +207,7 @@ def test_what_a_cycle_took_counts_once(layer):
     layer.several.components[0].lasts = 0.012
     layer.executor.cycle()
     layer.several.components[0].lasts = 0.0
-    layer.executor._turn(0.0075, 2)
+    layer.executor._run_cycle(0.0075, 2)
     # two periods were skipped for the cycle before; one of them is what it lasted beyond its own
     assert layer.recorded[-1][1] == round(0.0075e9) - round(1e9 * PERIOD)
 

@@ -17,7 +17,7 @@ WAIT = 30.0  # [s]
 
 @pytest.fixture(autouse=True)
 def _look_at_once(monkeypatch):
-    monkeypatch.setattr(heartbeat, "HEARTBEAT_POLL_PERIOD", 0.0)
+    monkeypatch.setattr(heartbeat.Heartbeat, "POLL_PERIOD", 0.0)
 
 
 def statistics(folder, rate=500.0):

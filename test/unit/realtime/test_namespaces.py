@@ -6,7 +6,7 @@ import time
 import pytest
 
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.realtime.emergency_stop import ESTOP_TEXT_BYTES, EmergencyStopLatch
+from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.namespaces import cure, find, living, no_layer
 from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import RuntimeStatistics
@@ -56,9 +56,9 @@ def test_the_first_reason_of_a_stop_stays(tmp_path):
     mine, other = EmergencyStopLatch(tmp_path), EmergencyStopLatch(tmp_path)
     assert not mine and mine.reason == "" and mine.answered == 0
     before = time.monotonic_ns()
-    other.trip("x" * (ESTOP_TEXT_BYTES + 1))
+    other.trip("x" * (EmergencyStopLatch.TEXT_SIZE + 1))
     mine.trip("later")
-    assert mine and mine.reason == f"{'x' * ESTOP_TEXT_BYTES} (process {os.getpid()})"
+    assert mine and mine.reason == f"{'x' * EmergencyStopLatch.TEXT_SIZE} (process {os.getpid()})"
     assert before <= mine.time <= time.monotonic_ns() and mine.answered == 0
     mine.answer("legs at rest")
     assert mine.time <= other.answered <= time.monotonic_ns()
@@ -73,8 +73,8 @@ def test_the_first_reason_of_a_stop_stays(tmp_path):
 
 def test_a_reason_is_cut_between_any_bytes(tmp_path):
     latch = EmergencyStopLatch(tmp_path)
-    latch.trip(f"x{'é' * ESTOP_TEXT_BYTES}")  # the cut goes through a letter of two bytes
-    assert latch.reason == f"x{'é' * (ESTOP_TEXT_BYTES // 2 - 1)}\ufffd (process {os.getpid()})"
+    latch.trip(f"x{'é' * EmergencyStopLatch.TEXT_SIZE}")  # the cut goes through a letter of two bytes
+    assert latch.reason == f"x{'é' * (EmergencyStopLatch.TEXT_SIZE // 2 - 1)}\ufffd (process {os.getpid()})"
     latch.clear()
     latch.trip("\udcff")  # no letter at all, as of a file's name
     assert latch.reason == f"? (process {os.getpid()})"

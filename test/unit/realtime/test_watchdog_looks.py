@@ -9,8 +9,8 @@ import time
 import pytest
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.processor import ProcessorShare
-from solfer.realtime.watchdog import WATCHDOG_PERIOD, Watchdog
+from solfer.realtime.processor import ProcessorTime
+from solfer.realtime.watchdog import Watchdog
 
 
 class Beats:
@@ -50,7 +50,7 @@ def look(watchdog, heartbeat, count=10):
     """Look repeatedly; the newest beat grows older meanwhile."""
     for _ in range(count):
         watchdog.look()
-        heartbeat.old += WATCHDOG_PERIOD
+        heartbeat.old += Watchdog.PERIOD
 
 
 def test_without_a_process_nothing_happens(watchdog, heartbeat, stop):
@@ -92,14 +92,14 @@ def trips_within(watchdog, heartbeat, stop, most):
     begin = time.monotonic()
     while not stop and time.monotonic() < begin + most:
         watchdog.look()
-        time.sleep(WATCHDOG_PERIOD)
+        time.sleep(Watchdog.PERIOD)
         heartbeat.old = time.monotonic() - begin
     return heartbeat.old
 
 
 def test_a_process_that_gets_little_of_a_processor_does_not_hang(watchdog, heartbeat, stop, monkeypatch):
     """In a second it could go on for a tenth of it at most; after that it may not go on by itself."""
-    monkeypatch.setattr(ProcessorShare, "since", lambda share, elapsed: 0.08 * elapsed)
+    monkeypatch.setattr(ProcessorTime, "since", lambda processor, elapsed: 0.08 * elapsed)
     heartbeat.newest = 1
     look(watchdog, heartbeat, 100)
     assert not stop
@@ -109,17 +109,17 @@ def test_a_process_that_gets_little_of_a_processor_does_not_hang(watchdog, heart
 
 @pytest.mark.parametrize("process", [SPINS, "import time; time.sleep(60)"], indirect=True, ids=["spins", "blocks"])
 def test_only_a_process_that_is_stopped_cannot_go_on(heartbeat, process):
-    share = ProcessorShare(process.pid)
+    processor_time = ProcessorTime(process.pid)
     time.sleep(0.1)
-    assert share.since(0.1) > 0.0
+    assert processor_time.since(0.1) > 0.0
     process.send_signal(signal.SIGSTOP)
     os.waitpid(process.pid, os.WUNTRACED)
-    share.since(0.0)
+    processor_time.since(0.0)
     time.sleep(0.05)
-    assert share.since(0.05) == 0.0
+    assert processor_time.since(0.05) == 0.0
     process.kill()
     process.wait()
-    assert share.since(0.1) == 0.1
+    assert processor_time.since(0.1) == 0.1
 
 
 @pytest.mark.parametrize("process", [SPINS, "import time; time.sleep(60)"], indirect=True, ids=["spins", "blocks"])

@@ -155,8 +155,8 @@ def test_twist_of_odometry_is_in_child_axes(body):
 
 def test_covariances_of_odometry_go_there_and_back(body):
     known = np.arange(1.0, 37.0).reshape(6, 6)
-    told = BodyMessage("odom", "pelvis", pose_covariance=known, twist_covariance=-2.0 * known)
-    read = nav_messages.Odometry().deserialize(sent(body.encode(told)))
+    message = BodyMessage("odom", "pelvis", pose_covariance=known, twist_covariance=-2.0 * known)
+    read = nav_messages.Odometry().deserialize(sent(body.encode(message)))
     assert read.pose.covariance == tuple(known.ravel()) and read.twist.covariance == tuple(-2.0 * known.ravel())
     assert (read.pose.pose.orientation.w, read.twist.twist.linear.x) == (1.0, 0.0)
     back = body.decode(packed(read), "")

@@ -229,7 +229,7 @@ def test_messages_before_the_node_came_are_not_awaited(alive, network, pair):
 
 
 def test_a_message_that_does_not_arrive_is_named(pair, monkeypatch):
-    monkeypatch.setattr(client, "IN_PROGRESS", 0.05)
+    monkeypatch.setattr(client, "LOCKSTEP_TIMEOUT", 0.05)
     join(pair)
     with pytest.raises(MiddlewareError, match="message 1 of /arm on topic /wanted has not arrived"):
         pair.conductor.follow(0.0, lambda: None)

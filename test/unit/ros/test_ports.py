@@ -57,7 +57,7 @@ def test_callers_are_bounded_and_leave_their_places(server, monkeypatch):
     "sent", [b"", b"\x04\0\0", b"\xff\xff\xff\xff", b"\x04\0\0\0" + b"aaaa", b"\x08\0\0\0" + b"\x04\0\0\0=\xff\xff\xff"]
 )
 def test_a_header_is_bounded_in_size_and_time(monkeypatch, sent):
-    monkeypatch.setattr(ports, "PORT_PATIENCE", 0.05)
+    monkeypatch.setattr(ports, "TIMEOUT", 0.05)
     near, far = socket.socketpair()
     with near, far:
         far.sendall(sent)

@@ -72,7 +72,7 @@ MISTAKES = [
     ("type: move", "type: 7", UnknownName, "26:11: pattern.2.type: unknown verb '7'", "one of move, turn, circle"),
     ("type: move\n    ", "", ConfigError, "25:3: pattern.2: the key 'type' is missing", "the verb: move, turn"),
     ("type: move", "tpye: move", ConfigError, "25:3: pattern.2: the key 'type' is missing", "did you mean: type?"),
-    ("vel: 0.1", "vel:", ConfigError, "3:1: vel: the key 'vel' has no value", "share of what is left"),
+    ("vel: 0.1", "vel:", ConfigError, "3:1: vel: the key 'vel' has no value", "fraction of what is left"),
     ("vel: 0.1", "vel: fast", ConfigError, "3:6: vel: expected a number, got 'fast'", ""),
     ("vel: 0.1", "vel: 1.5", ConfigError, "3:6: vel: expected a number of at most 1, got 1.5", ""),
     ("vel: 0.1", "vel: .nan", ConfigError, "3:6: vel: expected a finite number, got nan", ""),

@@ -9,7 +9,7 @@ from support.unit.writers import KIND, LAYOUT
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.segments import lock, presence
-from solfer.segments.header import HEADER_HEADER, VERSION, Word
+from solfer.segments.header import LAYOUT_OFFSET, VERSION, Word
 from solfer.segments.lock import Lock
 from solfer.segments.namespace import Namespace
 from solfer.segments.presence import Presence
@@ -76,7 +76,7 @@ def test_wrong_memory_says_what_is_wrong(path):
     assert attached() == ("shared memory is damaged: its layout is not the one it was made with", owner)
     put(path, Word.LAYOUT, layout)
     Segment.attach(path, KIND, LAYOUT)
-    assert os.path.getsize(path) == size >= HEADER_HEADER + 8
+    assert os.path.getsize(path) == size >= LAYOUT_OFFSET + 8
     segment.close()
 
 
@@ -109,9 +109,9 @@ def test_a_lock_says_who_has_it(path):
     )
     held.release()
     file = path.with_name("pipe.lock")
-    file.write_bytes(b"1" * (lock.LOCK_BYTES + 1))
+    file.write_bytes(b"1" * (lock.PID_SIZE + 1))
     assert refusal(lambda: Lock(path), file) == ("the file is not a lock of solfer", "remove the file")
-    file.write_bytes(b"1" * lock.LOCK_BYTES)  # as long as a number may be
+    file.write_bytes(b"1" * lock.PID_SIZE)  # as long as a number may be
     Lock(path).release()
 
 
@@ -119,11 +119,11 @@ def test_namespaces_say_what_they_refuse(tmp_path):
     """Invalid, damaged, unknown and too long names, at the very limit of what a file system accepts."""
     assert refusal(lambda: Namespace("a b", tmp_path), "") == ("invalid namespace name 'a b'", "letters, digits, _ . -")
     (tmp_path / "solfer-bad").mkdir(mode=0o700)
-    bells = tmp_path / "solfer-bad" / "bells"
-    bells.write_bytes(b"123")
-    bells.chmod(0o600)
-    assert refusal(lambda: Namespace("bad", tmp_path), bells) == (
-        "the file does not hold solfer's bells: 3 bytes",
+    numbers = tmp_path / "solfer-bad" / "bells"
+    numbers.write_bytes(b"123")
+    numbers.chmod(0o600)
+    assert refusal(lambda: Namespace("bad", tmp_path), numbers) == (
+        "the file does not hold solfer's notifications: 3 bytes",
         "remove the file",
     )
     with pytest.raises(UnknownName, match="unknown namespace 'bat'") as unknown:
@@ -138,7 +138,7 @@ def test_namespaces_say_what_they_refuse(tmp_path):
 
 
 def test_a_lost_process_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(presence, "PRESENCE_PERIOD", 0.0)
+    monkeypatch.setattr(presence.Presence, "PERIOD", 0.0)
     space = Namespace("robot", tmp_path)
     here = Presence(space, [segment := Segment.create(space.place("estop"), KIND, LAYOUT, 8)])
     here.require()

@@ -11,7 +11,7 @@ from support.unit.writers import KIND, LAYOUT, hold
 
 from solfer.errors import MiddlewareError
 from solfer.segments import segment as segment_module
-from solfer.segments.header import HEADER_HEADER, Word
+from solfer.segments.header import LAYOUT_OFFSET, Word
 from solfer.segments.segment import Segment
 
 
@@ -137,7 +137,7 @@ def test_a_truncated_segment_is_refused_and_replaced(path, left):
         Segment.attach(path, KIND)
     assert refusal.value.where == str(path)
     owner._lock.release()
-    if left >= HEADER_HEADER:
+    if left >= LAYOUT_OFFSET:
         assert Segment.create(path, KIND, LAYOUT, 8).generation == 2
 
 

@@ -9,7 +9,7 @@ from support.processes import BOUND, process
 from support.unit.writers import KIND, WIDTH, die_in_mid_write, flood
 
 from solfer.segments.segment import Segment
-from solfer.segments.slot import SLOT_STATE, Slot
+from solfer.segments.slot import STATE_WORD, Slot
 
 NEWS = 20_000
 
@@ -48,7 +48,7 @@ def test_an_unfinished_record_is_not_read(pair):
     assert reader.read()
     writer.values[:] = 2.0
     writer.write(2)
-    writer.words[writer._places[0] + SLOT_STATE] = 5  # the slot of record 2 is being written again
+    writer.words[writer._places[0] + STATE_WORD] = 5  # the slot of record 2 is being written again
     assert not reader.read()
     assert reader.values.tolist() == [1.0, 1.0, 1.0]
     assert (reader.sequence, reader.stamp, reader.given_up) == (1, 1, 1)

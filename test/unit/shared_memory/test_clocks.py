@@ -8,7 +8,7 @@ import time
 import pytest
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.clock import CLOCK_RESOLUTION, MonotonicClock, SteppedClock
+from solfer.middleware.shared_memory.clock import MonotonicClock, SteppedClock
 
 
 @pytest.mark.parametrize("library", [None, ctypes.CDLL(None, use_errno=True)], ids=["python", "libc"])
@@ -43,7 +43,7 @@ def test_a_stepped_clock_follows_its_lines():
     sent = []
     clock = SteppedClock(io.StringIO("0.1\n0.05\n0.3\n"), sent.append)
     assert (clock.now(), clock.nanoseconds(), clock.ended) == (0.0, 0, False)
-    clock.sleep_until(0.1 + 0.5 * CLOCK_RESOLUTION)
+    clock.sleep_until(0.1 + 0.5 * SteppedClock.RESOLUTION)
     assert clock.now() == 0.1 and sent == ["0.0"]
     clock.sleep_until(0.1)  # its time is there
     assert sent == ["0.0"]

@@ -34,7 +34,7 @@ def test_what_is_declared_is_found():
     wire.close()
 
 
-def test_segments_are_opened_only_after_a_bell(monkeypatch):
+def test_segments_are_opened_only_after_a_notification(monkeypatch):
     """Looking for topics is cheap while nothing changes: the attached segments are counted."""
     wire = XbotWire()
     node, other = wire.node("arm"), wire.node("base")
@@ -54,7 +54,7 @@ def test_segments_are_opened_only_after_a_bell(monkeypatch):
     wire.close()
 
 
-def test_a_killed_publisher_is_seen_without_a_bell(monkeypatch):
+def test_a_killed_publisher_is_seen_without_a_notification(monkeypatch):
     wire = XbotWire()
     node, other = wire.node("arm"), wire.node("base")
     other.writer("odometry", "nav_msgs/Odometry")

@@ -1,4 +1,4 @@
-"""What callers of services in shared memory are told, word for word."""
+"""What callers of services in shared memory receive, word for word."""
 
 from dataclasses import dataclass
 

@@ -108,24 +108,24 @@ def test_a_full_queue_drops_the_oldest_and_counts(world):
     assert queue.dropped == 197
 
 
-def test_mail_tells_of_messages_that_wait(world):
+def test_pending_reports_messages_that_wait(world):
     """It stays true until all is read, ignores other topics, and sees messages with more joints than before."""
     node, sender = world.node("receiver"), world.node("sender")
     queues = [node.queue(topic, COMMAND) for topic in ("one", "two")]
-    mail = node.mail(queues)
-    assert not mail()
+    pending = node.pending(queues)
+    assert not pending()
     writers = [sender.writer(topic, COMMAND) for topic in ("one", "two", "three")]
     message = JointMessage.empty(("a",), ("position",))
     for _ in range(3):
         for writer, queue in zip(writers, queues, strict=False):
             writer.write(message)
-            assert mail() and mail()
+            assert pending() and pending()
             assert len(queue.drain()) == 1
-            assert not mail()
+            assert not pending()
         writers[2].write(message)  # a topic that nobody waits for
-        assert not mail()
+        assert not pending()
     writers[1].write(JointMessage.empty(("a", "b"), ("position",)))
-    assert mail()
+    assert pending()
 
 
 def test_only_a_reader_gets_an_earlier_message(world):
@@ -320,17 +320,17 @@ def test_ten_thousand_cycles_keep_no_memory(world):
     assert sys.getallocatedblocks() - before < 100
 
 
-def test_a_bell_rings_until_it_is_acknowledged(tmp_path):
-    mine, other = Namespace("x", tmp_path).bell("pipes", "a"), Namespace("x", tmp_path).bell("pipes", "a")
-    elsewhere = Namespace("x", tmp_path).bell("pipes", "b")
-    assert mine.rung()  # what was made before it was there has to be found, too
+def test_a_notification_is_pending_until_it_is_acknowledged(tmp_path):
+    mine, other = (Namespace("x", tmp_path).notification("pipes", "a") for _ in range(2))
+    elsewhere = Namespace("x", tmp_path).notification("pipes", "b")
+    assert mine.is_pending()  # what was made before it was there has to be found, too
     mine.acknowledge()
-    elsewhere.ring()
-    assert not mine.rung()
-    other.ring()
-    assert mine.rung() and mine.rung()
+    elsewhere.send()
+    assert not mine.is_pending()
+    other.send()
+    assert mine.is_pending() and mine.is_pending()
     mine.acknowledge()
-    assert not mine.rung()
+    assert not mine.is_pending()
 
 
 def test_topics_lists_all_other_nodes(tmp_path):

@@ -17,7 +17,7 @@ from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter
 from solfer.telemetry.drain import RecordDrain, writer_of
 from solfer.telemetry.recorder import Recorder
-from solfer.telemetry.rows import EVENT_WIDTH, RECORDER_EVENTS
+from solfer.telemetry.rows import EVENT_COUNT, EVENT_WIDTH
 
 WAIT = 60.0  # [s]
 
@@ -131,10 +131,10 @@ def test_only_some_plugins_are_drained(tmp_path, loop):
 def test_events_that_are_overwritten_do_no_harm(tmp_path, loop):
     recorder = Recorder(tmp_path, loop.sources, 1000.0)
     drain = RecordDrain(tmp_path)
-    for number in range(RECORDER_EVENTS + 10):
+    for number in range(EVENT_COUNT + 10):
         recorder.event(Event(1e-3 * number, "arm", "hold", str(number)))
     texts = [event.text for event in drain.events()]
-    assert texts[-1] == str(RECORDER_EVENTS + 9) and len(texts) >= RECORDER_EVENTS - 2
+    assert texts[-1] == str(EVENT_COUNT + 9) and len(texts) >= EVENT_COUNT - 2
 
 
 def test_a_missing_recording_is_an_error(tmp_path):

@@ -12,8 +12,8 @@ from solfer.recording.reader import read
 from solfer.segments.lock import Lock
 from solfer.segments.namespace import Namespace
 from solfer.telemetry.recorder import Recorder
-from solfer.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep, write_kept
-from solfer.telemetry.rows import RECORDER_FILE
+from solfer.telemetry.recordings import CRASH_AGE, YOUNG_AGE, keep, recordings, sweep, write_kept
+from solfer.telemetry.rows import RECORDING
 
 
 def test_memory_of_ended_node_becomes_a_file(tmp_path, monkeypatch):
@@ -68,9 +68,9 @@ def test_recordings_of_another_user_are_passed_over(tmp_path):
 def test_what_dead_nodes_of_other_masters_left_is_swept(tmp_path):
     """What a living process owns stays, and the own master's, a layer's, a new one, and a crash of today."""
 
-    def leave(name, age=2.0 * YOUNG, crash=None):
+    def leave(name, age=2.0 * YOUNG_AGE, crash=None):
         """Make a namespace of some age [s] with the lock of a node and, after a crash, its recording."""
-        file = Namespace(name, tmp_path).place("recordings", "arm", RECORDER_FILE)
+        file = Namespace(name, tmp_path).place("recordings", "arm", RECORDING)
         lock = Lock(file)
         if crash is not None:
             file.write_bytes(b"seconds")
@@ -82,9 +82,9 @@ def test_what_dead_nodes_of_other_masters_left_is_swept(tmp_path):
     living = leave("ros.1")
     for name in ("ros.2", "ros.3", "layer"):
         leave(name).release()
-    leave("ros.4", age=0.5 * YOUNG).release()
-    leave("ros.5", crash=0.5 * CRASHED).release()
-    leave("ros.6", crash=2.0 * CRASHED).release()
+    leave("ros.4", age=0.5 * YOUNG_AGE).release()
+    leave("ros.5", crash=0.5 * CRASH_AGE).release()
+    leave("ros.6", crash=2.0 * CRASH_AGE).release()
     sweep("ros.3", tmp_path)
     kept = sorted(folder.name.removeprefix("solfer-") for folder in tmp_path.iterdir())
     assert kept == ["layer", "ros.1", "ros.3", "ros.4", "ros.5"]

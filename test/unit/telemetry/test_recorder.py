@@ -10,7 +10,7 @@ from solfer.recording.log import Logger
 from solfer.segments.ring import Ring
 from solfer.segments.segment import Segment
 from solfer.telemetry.recorder import Recorder
-from solfer.telemetry.rows import RECORDER_FILE, RECORDER_KIND
+from solfer.telemetry.rows import RECORDING
 
 SIGNALLING = 0x7FF0000000000001
 """Bits of a NaN that most arithmetic would change."""
@@ -24,7 +24,7 @@ def made(folder, arrays: list[np.ndarray]) -> tuple[Recorder, Ring]:
     for index, array in enumerate(arrays):
         log.add(str(index), array)
     recorder = Recorder(folder, log.sources, COUNT, seconds=1.0)
-    segment = Segment.attach(folder / RECORDER_FILE, RECORDER_KIND)
+    segment = Segment.attach(folder / RECORDING, RECORDING)
     return recorder, Ring(segment.data, sum(array.size for array in arrays), COUNT)
 
 

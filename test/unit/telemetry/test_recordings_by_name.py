@@ -40,7 +40,7 @@ def record(tmp_path):
         yield record
 
 
-def told(call, kind=MiddlewareError):
+def refused(call, kind=MiddlewareError):
     with pytest.raises(kind) as error:
         call()
     return error.value.what, error.value.where, error.value.expected or ", ".join(error.value.names)
@@ -53,12 +53,12 @@ def test_recordings_are_found_by_plugins(record, tmp_path):
     (drain,) = of_plugins(["leg"], root=tmp_path)
     assert tuple(drain.plugins) == ("leg",)
     assert [tuple(drain.plugins) for drain in of_plugins(["arm"], "two", tmp_path)] == [("arm",)]
-    assert told(lambda: of_plugins(["arm"], root=tmp_path)) == (
+    assert refused(lambda: of_plugins(["arm"], root=tmp_path)) == (
         "2 processes record a plugin 'arm'",
         "",
         "NAMESPACE of the one that is meant",
     )
-    assert told(lambda: of_plugins(["lge"], root=tmp_path), UnknownName) == (
+    assert refused(lambda: of_plugins(["lge"], root=tmp_path), UnknownName) == (
         "unknown plugin 'lge'",
         "what is recorded now",
         "leg",
@@ -67,7 +67,7 @@ def test_recordings_are_found_by_plugins(record, tmp_path):
 
 def test_recordings_are_found_by_namespace(record, tmp_path):
     record_all = "unknown namespace that records"
-    assert told(lambda: of_namespace("", tmp_path), UnknownName) == (
+    assert refused(lambda: of_namespace("", tmp_path), UnknownName) == (
         f"{record_all} 'solfer'",
         str(tmp_path),
         "plugins that run",
@@ -76,9 +76,9 @@ def test_recordings_are_found_by_namespace(record, tmp_path):
     record("one", "leg", beside="node")
     assert [tuple(drain.plugins) for drain in of_namespace("", tmp_path)] == [("arm",), ("leg",)]
     record("two", "arm")
-    assert told(lambda: of_namespace("", tmp_path)) == ("2 namespaces record", "", "NAMESPACE, one of one, two")
+    assert refused(lambda: of_namespace("", tmp_path)) == ("2 namespaces record", "", "NAMESPACE, one of one, two")
     assert [tuple(drain.plugins) for drain in of_namespace("two", tmp_path)] == [("arm",)]
-    assert told(lambda: of_namespace("too", tmp_path), UnknownName) == (f"{record_all} 'too'", str(tmp_path), "two")
+    assert refused(lambda: of_namespace("too", tmp_path), UnknownName) == (f"{record_all} 'too'", str(tmp_path), "two")
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_master_has_a_namespace(monkeypatch, uri, namespace):
 
 def test_a_file_needs_a_folder(tmp_path):
     file = tmp_path / "none" / "a.mcap"
-    assert told(lambda: FileRecorder("one", ("arm",), file), RecordingError) == (
+    assert refused(lambda: FileRecorder("one", ("arm",), file), RecordingError) == (
         "no file can be made there",
         str(file),
         "a folder that exists, and that you may write to",
@@ -105,14 +105,16 @@ def test_a_file_needs_a_folder(tmp_path):
 
 
 def test_a_file_recorder_waits_for_its_process(monkeypatch, tmp_path, caplog):
-    monkeypatch.setattr(recordings, "_MAIN", "import sys, time; time.sleep(60 * (sys.argv[-2] == 'slow')); sys.exit(3)")
-    monkeypatch.setattr(FileRecorder, "PATIENCE", 30.0)
+    monkeypatch.setattr(
+        recordings.FileRecorder, "PROGRAM", "import sys, time; time.sleep(60 * (sys.argv[-2] == 'slow')); sys.exit(3)"
+    )
+    monkeypatch.setattr(FileRecorder, "TIMEOUT", 30.0)
     recorder = FileRecorder("quick", ("arm", "leg"), tmp_path / "a.mcap", 2.5)
     words = recorder.process.args[3:]
     assert words == ["record", "-n", "arm", "-n", "leg", "--whole", "--wait", "2.5", "quick", f"{tmp_path}/a.mcap"]
     recorder.close()
     assert recorder.process.poll() == 3 and caplog.messages == []
-    monkeypatch.setattr(FileRecorder, "PATIENCE", 0.01)
+    monkeypatch.setattr(FileRecorder, "TIMEOUT", 0.01)
     recorder = FileRecorder("slow", ("arm",), tmp_path / "a.mcap")
     assert recorder.process.poll() is None
     recorder.close()
@@ -146,7 +148,7 @@ def test_a_watchdog_looks_until_it_is_lost(tmp_path, monkeypatch):
     with pytest.raises(MiddlewareError, match="the folder is gone"):
         Watchdog(heartbeat, stop, presence=Lost(4)).run(lambda: True)
     assert stop.reason.startswith("the folder is gone (")
-    assert len(slept) == 4 and all(0.0 <= each <= watchdog.WATCHDOG_PERIOD for each in slept)
+    assert len(slept) == 4 and all(0.0 <= each <= watchdog.Watchdog.PERIOD for each in slept)
     looks = iter([True, True, False])
     Watchdog(heartbeat, stop).run(lambda: next(looks))
     assert len(slept) == 6

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.clock import MonotonicClock, SteppedClock
 from solfer.plugins import PluginState
-from solfer.telemetry.histograms import HISTOGRAM_WORDS, bucket_of, quantile, since, upper_edge
+from solfer.telemetry.histograms import ROW_WORDS, bucket_of, quantile, since, upper_edge
 from solfer.telemetry.kernel import count_durations
 from solfer.telemetry.statistics import LOOP_HISTOGRAMS, LoopCount, PluginCount, RuntimeStatistics
 
@@ -31,7 +31,7 @@ def test_buckets_are_at_most_a_sixteenth_wide(nanoseconds):
 
 @pytest.mark.parametrize("nanoseconds", [-5, 10**12])
 def test_times_out_of_range_count_in_outer_buckets(nanoseconds):
-    histograms = np.zeros((1, HISTOGRAM_WORDS), dtype=np.int64)
+    histograms = np.zeros((1, ROW_WORDS), dtype=np.int64)
     count(histograms, 0, nanoseconds)
     assert histograms[0, 0] == 1
     assert histograms[0, 1] == max(nanoseconds, 0)
@@ -39,7 +39,7 @@ def test_times_out_of_range_count_in_outer_buckets(nanoseconds):
 
 def test_quantiles_are_those_of_numpy_within_a_bucket():
     times = np.random.default_rng(3).lognormal(11.0, 1.0, 20000).astype(int)
-    histograms = np.zeros((2, HISTOGRAM_WORDS), dtype=np.int64)
+    histograms = np.zeros((2, ROW_WORDS), dtype=np.int64)
     count(histograms, 1, *times)
     assert histograms[0, 0] == quantile(histograms[0], 0.5) == 0
     assert histograms[1, 0] == 20000 and histograms[1, 1] == times.max()
@@ -50,7 +50,7 @@ def test_quantiles_are_those_of_numpy_within_a_bucket():
 
 
 def test_a_zero_counts_for_the_loop_only():
-    histograms = np.zeros((3, HISTOGRAM_WORDS), dtype=np.int64)
+    histograms = np.zeros((3, ROW_WORDS), dtype=np.int64)
     count_durations(histograms, np.array([0, 0, 70]), 1)
     assert [histograms[row, 0] for row in range(3)] == [1, 0, 1]
 
@@ -119,7 +119,7 @@ def test_the_monotonic_clock_never_wakes_early():
 
 
 def test_counts_since_a_snapshot():
-    histograms = np.zeros((1, HISTOGRAM_WORDS), dtype=np.int64)
+    histograms = np.zeros((1, ROW_WORDS), dtype=np.int64)
     count(histograms, 0, 10**6)
     before = histograms.copy()
     count(histograms, 0, 1000, 1000, 1000)

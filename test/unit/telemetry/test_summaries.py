@@ -115,7 +115,7 @@ def test_lateness_is_a_warning_once(statistics, observer):
 def test_a_layer_without_cycles_is_an_error(statistics, observer, tmp_path, monkeypatch):
     cycle(statistics)
     before = observer.look()
-    assert layer_report(before, None).level == Health.GOOD  # a first look cannot tell
+    assert layer_report(before, None).level == Health.GOOD  # a first summary cannot show it
     report = layer_report(observer.look(), before)
     assert report.level == Health.ERROR and "does not cycle" in report.summary
     EmergencyStopLatch(tmp_path).trip("a hand")

@@ -9,7 +9,7 @@ PERIOD = 1.0 / RATE
 
 
 class Clock:
-    """Sleeps until a deadline, and so much longer as it is told."""
+    """Sleeps until a deadline, and so much longer as a test says."""
 
     def __init__(self, time=0.0):
         self.time, self.oversleeps = time, {}

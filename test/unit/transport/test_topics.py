@@ -11,7 +11,7 @@ from solfer.interfaces.geometry import Header as Stamp
 from solfer.interfaces.geometry import Vector as Coordinates
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
-from solfer.transport.declared.topics import STREAM_SILENCE
+from solfer.transport.declared.topics import SoleSender
 
 KINDS = {
     "geometry_msgs/Twist": Twist,
@@ -74,7 +74,7 @@ def test_a_stream_has_one_sender(caplog):
     assert caplog.messages == ["topic base/right: messages of other are ignored while stick sends"]
     wire.pass_time(0.4)
     assert send("other", "stick") == (2, 0)
-    wire.pass_time(STREAM_SILENCE - 0.01)
+    wire.pass_time(SoleSender.TIMEOUT - 0.01)
     assert send("other") == (2, 0)
     wire.pass_time(0.02)
     assert send("other") == (2, 1)
@@ -144,7 +144,7 @@ def test_another_class_than_declared_is_refused():
 
 
 def test_messages_of_pipes_alone_cannot_be_declared():
-    topic = TopicIn("told", "sensor_msgs/JointState", Twist, print)
+    topic = TopicIn("base", "sensor_msgs/JointState", Twist, print)
     with pytest.raises(MiddlewareError, match="JointState cannot be declared"):
         bind("stick", (topic,), MemoryWire().middleware, Inbox())
 

@@ -11,10 +11,10 @@ from solfer.config.records.live import saved
 from solfer.errors import ConfigError, MiddlewareError, SolferError, UnknownName
 from solfer.interfaces.declaration import Accepted
 from solfer.transport.parameters import (
+    GET_INTERFACE,
     GET_PARAMETERS,
-    GETTING,
+    SET_INTERFACE,
     SET_PARAMETERS,
-    SETTING,
     GetParameters,
     ParametersReply,
     SetParameters,
@@ -74,7 +74,7 @@ def put(options: argparse.Namespace, caller: Caller) -> None:
             raise ConfigError(f"'{name}' has no value", expected="NAME=VALUE, such as speed=0.8")
     request = SetParameters(tuple(name for name, _, _ in pairs), tuple(value for _, _, value in pairs))
     plugin = _known(options.running, caller.plugins())
-    _answered(caller.call(f"{plugin}/{SET_PARAMETERS}", SETTING, request, Accepted, CALLER_PATIENCE))
+    _answered(caller.call(f"{plugin}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, CALLER_PATIENCE))
 
 
 def save(options: argparse.Namespace, caller: Caller) -> None:
@@ -131,7 +131,7 @@ def _known(plugin: str, plugins: list[str]) -> str:
 
 def _parameters(caller: Caller, plugin: str, names: Iterable[str] = ()) -> Iterator[_Parameter]:
     request = GetParameters(tuple(names))
-    reply = caller.call(f"{plugin}/{GET_PARAMETERS}", GETTING, request, ParametersReply, CALLER_PATIENCE)
+    reply = caller.call(f"{plugin}/{GET_PARAMETERS}", GET_INTERFACE, request, ParametersReply, CALLER_PATIENCE)
     _answered(reply)
     columns = (reply.names, reply.types, reply.values, reply.configured, reply.defaults, reply.units, reply.minimums,
                reply.maximums, reply.descriptions)  # fmt: skip

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator
 from typing import Any, Protocol
 
-from solfer.transport.parameters import GET_PARAMETERS, GETTING
+from solfer.transport.parameters import GET_INTERFACE, GET_PARAMETERS
 
 CALLER_PATIENCE = 3.0
 """Longest time until a service answers [s]; a plugin whose loop stands still answers after 2 s."""
@@ -41,7 +41,7 @@ def caller(namespace: str) -> Iterator[Caller]:
 
     class _LayerCaller(XbotMiddleware):
         def plugins(self) -> list[str]:
-            found = (each.name for each in services(self.namespace) if each.interface == GETTING)
+            found = (each.name for each in services(self.namespace) if each.interface == GET_INTERFACE)
             return [name.removesuffix(f"/{GET_PARAMETERS}") for name in found]
 
     with contextlib.closing(_LayerCaller(find(namespace), f"solfer_params_{os.getpid()}")) as made:

@@ -70,9 +70,7 @@ class ReferenceInterface:
             )
             for target in self._list
         )
-        published = TopicOut(
-            "references", "solfer/TaskReferences", TaskReferences, collect=self._due_references
-        )
+        published = TopicOut("references", "solfer/TaskReferences", TaskReferences, collect=self._due_references)
         return (*received, published)
 
     def actions(self) -> tuple[Action, ...]:

@@ -16,22 +16,10 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-BRIDGE_PERIOD = 0.005
-"""Period of the bridge's cycle [s]."""
-
-BRIDGE_POLL_PERIOD = 0.5
-"""Time between two searches for new services and topics [s]."""
-
-REPORT_PERIOD = 1.0
-"""Time between two health reports [s]."""
-
-BRIDGE_HEALTH = "xbot_bridge"
-"""Name of the health report."""
-
 
 @dataclass(frozen=True)
 class BridgeSearch:
-    """What a bridge finds at present inside; called every `BRIDGE_POLL_PERIOD` with the names that may be left out.
+    """What a bridge finds at present inside; called every `Bridge.SEARCH_PERIOD` with the names that may be left out.
 
     Attributes:
         offers: Returns the services that are offered.
@@ -62,6 +50,15 @@ class Bridge:
         forwarding: The services that are forwarded.
     """
 
+    PERIOD = 0.005
+    """Period of the cycle [s]."""
+
+    SEARCH_PERIOD = 0.5
+    """Time between two searches for new services and topics [s]."""
+
+    REPORT_PERIOD = 1.0
+    """Time between two health reports [s]."""
+
     def __init__(
         self,
         inside: Middleware,
@@ -82,7 +79,7 @@ class Bridge:
         self.crossings: dict[str, ForwardedTopic] = {}
         self._open(inwards, outside, inside, forwards=self._forwards_in)
         self._open(outwards, inside, outside, forwards=self._forwards_out)
-        self._next_look = self._next_report = -float("inf")
+        self._next_search = self._next_report = -float("inf")
         self._published = 0
         self._reports: dict[str, Any] = {}
         self._throttle = Throttle(logger)
@@ -93,11 +90,11 @@ class Bridge:
         self.publish()
 
     def receive(self) -> None:
-        """Run the first half of a cycle: topics that go in, and requests; search every `BRIDGE_POLL_PERIOD`."""
+        """Run the first half of a cycle: topics that go in, and requests; search every `SEARCH_PERIOD`."""
         now = self._outside.now()
-        if now >= self._next_look:
-            self._next_look = now + BRIDGE_POLL_PERIOD
-            self._look()
+        if now >= self._next_search:
+            self._next_search = now + self.SEARCH_PERIOD
+            self._find()
         for crossing in self._forwards_in:
             crossing.run()
         self.forwarding.run()
@@ -111,7 +108,7 @@ class Bridge:
         self.forwarding.run()
         now = self._outside.now()
         if now >= self._next_report:
-            self._next_report = now + REPORT_PERIOD
+            self._next_report = now + self.REPORT_PERIOD
             self._report()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
@@ -119,11 +116,11 @@ class Bridge:
 
         Half a period lies between the halves of a cycle: what the layer answers meanwhile goes out in the same cycle.
         """
-        loop = FixedRateLoop(self._outside, 1.0 / BRIDGE_PERIOD)
+        loop = FixedRateLoop(self._outside, 1.0 / self.PERIOD)
 
         def cycle(_late: float, _skipped: int) -> None:
             self.receive()
-            self._outside.sleep_until(loop.deadline + 0.5 * BRIDGE_PERIOD)
+            self._outside.sleep_until(loop.deadline + 0.5 * self.PERIOD)
             self.publish()
 
         loop.run(cycle, lambda: self._outside.running() and not until())
@@ -141,7 +138,7 @@ class Bridge:
                 forwards.append(ForwardedTopic(route, source, target))
                 self.crossings[route.topic] = forwards[-1]
 
-    def _look(self) -> None:
+    def _find(self) -> None:
         """Start forwarding topics and services that are new inside since the last search."""
         try:
             self._open(self._search.topics(self.crossings), self._inside, self._outside, forwards=self._forwards_out)
@@ -167,4 +164,4 @@ class Bridge:
                 self._reports[name] = report
                 self._outside.report(name, report.level, report.summary, report.values)
         level, summary = (Health.WARNING, f"{news} messages refused") if news else (Health.GOOD, "running")
-        self._outside.report(BRIDGE_HEALTH, level, summary, values)
+        self._outside.report("xbot_bridge", level, summary, values)

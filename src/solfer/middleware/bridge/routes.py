@@ -7,9 +7,6 @@ from solfer.config import AnyPipeRecord, Configuration
 from solfer.errors import MiddlewareError
 from solfer.transport.messages import canonical
 
-OTHER_LAYER = "NRT"
-"""Layer at the other end of a pipe that crosses the border."""
-
 
 @dataclass(frozen=True)
 class Route:
@@ -54,7 +51,7 @@ def routes(configurations: Iterable[Configuration]) -> tuple[list[Route], list[R
 
 
 def _add(known: dict[str, Route], pipe: AnyPipeRecord, topic: str | None) -> None:
-    if pipe.layer != OTHER_LAYER or not topic:
+    if pipe.layer != "NRT" or not topic:
         return
     route = Route(topic.lstrip("/"), canonical(pipe.travels_as, pipe.where("message")))
     before = known.setdefault(route.topic, route)

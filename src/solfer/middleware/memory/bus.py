@@ -11,7 +11,7 @@ from typing import Any
 
 from solfer.errors import MiddlewareError, SolferError, UnknownName, described, raise_all
 from solfer.interfaces.declaration import Service
-from solfer.middleware.memory.faults import TIE, FaultsRecord, Line, Stalls, TopicFaultsRecord, fits
+from solfer.middleware.memory.faults import TIME_TOLERANCE, FaultsRecord, Line, Stalls, TopicFaultsRecord, fits
 from solfer.transport.messages import Message
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.topics import Topics
@@ -145,7 +145,8 @@ class Bus:
     """
 
     def __init__(self, parameters: Mapping[str, Any] | None = None, faults: FaultsRecord | None = None):
-        self.time, self.faults = 0.0, faults or FaultsRecord()
+        self.time = 0.0
+        self.faults = faults or FaultsRecord()
         self.parameters = dict(parameters or {})
         self.reports: dict[str, HealthReport] = {}
         self.ended = False
@@ -292,7 +293,7 @@ class Bus:
     def _arrive(self, end: float) -> None:
         """Deliver what is due at `end` [s] or before."""
         deliveries = self._deliveries
-        while deliveries and deliveries[0].due <= end + TIE and not self.ended:
+        while deliveries and deliveries[0].due <= end + TIME_TOLERANCE and not self.ended:
             delivery = heapq.heappop(deliveries)
             self.time = max(self.time, min(delivery.due, end))
             delivery.arrive(self.time)

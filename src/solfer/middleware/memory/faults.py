@@ -14,21 +14,23 @@ from pydantic import Field
 from solfer.config import Record, read
 from solfer.config.records.bounds import SEED, Bounds
 
-TIME: Bounds = {"ge": 0.0, "le": 10.0}
-SHARE: Bounds = {"ge": 0.0, "le": 1.0}
+DURATION: Bounds = {"ge": 0.0, "le": 10.0}
+RATIO: Bounds = {"ge": 0.0, "le": 1.0}
 
-TIE = 1e-9
+TIME_TOLERANCE = 1e-9
 """Times that differ by less are one: sums of periods do not meet to the last bit [s]."""
 
 
 class TopicFaultsRecord(Record):
     """What happens to the messages of a topic."""
 
-    delay: float = Field(default=0.0, **TIME, description="time that every message takes [s]")
-    jitter: float = Field(default=0.0, **TIME, description="largest time on top, uniform from zero on [s]")
-    loss: float = Field(default=0.0, **SHARE, description="share of the messages that never arrive")
+    delay: float = Field(default=0.0, **DURATION, description="time that every message takes [s]")
+    jitter: float = Field(default=0.0, **DURATION, description="largest time on top, uniform from zero on [s]")
+    loss: float = Field(default=0.0, **RATIO, description="fraction of the messages that never arrive")
     bunch: float = Field(
-        default=0.0, **TIME, description="messages wait, and arrive together at multiples of this time [s]; 0: none do"
+        default=0.0,
+        **DURATION,
+        description="messages wait, and arrive together at multiples of this time [s]; 0: none do",
     )
     reorder: bool = Field(default=False, description="whether a message may overtake an earlier one of its topic")
     clock: float = Field(default=0.0, ge=-10.0, le=10.0, description="what is added to the sender's stamps [s]")
@@ -37,11 +39,13 @@ class TopicFaultsRecord(Record):
 class LoopFaultsRecord(Record):
     """What happens to the cycles of a loop."""
 
-    skip: float = Field(default=0.0, **SHARE, description="share of the cycles that are left out")
+    skip: float = Field(default=0.0, **RATIO, description="fraction of the cycles that are left out")
     stalls: float = Field(
         default=0.0, ge=0.0, le=100.0, description="how often the whole loop stands still, on average [1/s]"
     )
-    stall: float = Field(default=0.0, **TIME, description="longest time for which it does, uniform from zero on [s]")
+    stall: float = Field(
+        default=0.0, **DURATION, description="longest time for which it does, uniform from zero on [s]"
+    )
 
 
 class FaultsRecord(Record):
@@ -85,7 +89,7 @@ class Line:
         if not faults.reorder:
             due = max(due, self._last)
         if faults.bunch:
-            due = max(due, math.ceil((due - TIE) / faults.bunch) * faults.bunch)
+            due = max(due, math.ceil((due - TIME_TOLERANCE) / faults.bunch) * faults.bunch)
         self._last = due
         return due
 

@@ -16,12 +16,9 @@ import rospy
 
 from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
 from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.node.waiting import WAIT_STEP, wait_for
+from solfer.middleware.ros.node.waiting import CHECK_PERIOD, wait_for
 
 logger = logging.getLogger(__name__)
-
-PROBE_TIMEOUT = 0.5
-"""Longest time to find out whether a service is alive [s]."""
 
 
 def provider(resolved: str) -> str | None:
@@ -44,7 +41,7 @@ def alive(resolved: str, uri: str) -> bool:
     """Check whether a registered service is really there; a killed node leaves its registration behind."""
     probe = {"probe": "1", "md5sum": "*", "callerid": rospy.get_name(), "service": resolved}
     try:
-        with socket.create_connection(rospy.core.parse_rosrpc_uri(uri), PROBE_TIMEOUT) as connection:
+        with socket.create_connection(rospy.core.parse_rosrpc_uri(uri), timeout=0.5) as connection:
             rosgraph.network.write_ros_handshake_header(connection, probe)
     except OSError:
         return False
@@ -67,7 +64,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
     Raises:
         ServiceUnavailable: There was no such service within `timeout`.
         MiddlewareError: There was no reply within `timeout`.
-        Ended: The node has to end.
+        ShutdownRequested: The node has to end.
     """
     resolved = rospy.resolve_name(name)
     ros_class = service_class(interface)
@@ -84,7 +81,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         failure = f"fails: {reply.exception()}"
         if time.monotonic() >= end:
             break
-        time.sleep(WAIT_STEP)
+        time.sleep(CHECK_PERIOD)
     if failure:
         raise MiddlewareError(
             f"service {resolved} {failure} (waited {timeout:g} s)", expected="a node that offers it and runs"

@@ -11,9 +11,6 @@ from solfer.middleware.ros.node.master import require_master
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
-DIAGNOSTICS_PERIOD = 1.0
-"""Shortest time between two reports of one part while its level stays the same [s]."""
-
 
 @contextmanager
 def watched() -> Iterator[Callable[[], Mapping[str, HealthReport]]]:
@@ -39,6 +36,9 @@ class Diagnostics:
         node: Name of the node, the first half of every status' name.
     """
 
+    PERIOD = 1.0
+    """Shortest time between two reports of one part while its level stays the same [s]."""
+
     def __init__(self, node: str):
         self._node = node.lstrip("/")
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
@@ -49,9 +49,9 @@ class Diagnostics:
     def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """Publish one status; see `Middleware.report`."""
         now = time.monotonic()
-        last_time, last_level = self._last.get(name, (-DIAGNOSTICS_PERIOD, level))
+        last_time, last_level = self._last.get(name, (-self.PERIOD, level))
         # A report that comes once a period must not be left out because it is a little early.
-        if level == last_level and now - last_time < 0.9 * DIAGNOSTICS_PERIOD:
+        if level == last_level and now - last_time < 0.9 * self.PERIOD:
             return
         self._last[name] = (now, level)
         pairs = [KeyValue(key, _text(value)) for key, value in values.items()]

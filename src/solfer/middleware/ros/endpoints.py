@@ -20,25 +20,18 @@ from solfer.errors import MiddlewareError, PipeError
 from solfer.middleware.ros.codecs.bounded import bound_messages
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 from solfer.middleware.ros.codecs.table import Codec, codec
-from solfer.middleware.ros.node.attendance import Attendance
+from solfer.middleware.ros.node.expected_publishers import ExpectedPublishers
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.throttle import Throttle
 from solfer.transport import MessageStatus, Queue, Reader, Writer
 from solfer.transport.backlog import SENDERS, Backlog
-from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, Publisher
+from solfer.transport.endpoints import NEW, NONE, OLD, PUBLISHER_TIMEOUT, Publisher
 from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
 
-MASTER_REPLY_PERIOD = 0.1
-"""Longest wait for the answer of the master in a cycle [s]."""
-
-IN_PROGRESS = 5.0
+LOCKSTEP_TIMEOUT = 5.0
 """Longest time that an answer, a message or a connection takes in lock-step [s]."""
-
-WAITING_MESSAGES = 256
-"""Messages without a header that may wait between two runs of rospy's receiving thread, where only the newest is read:
-they have no number, so that all are counted."""
 
 
 class Arrival(NamedTuple):
@@ -210,19 +203,19 @@ class RosReader(Reader):
         self._now = now
         self._lock = threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
-        # of messages that are counted none may be left out
-        size = 1 if codec(message).ros_class._has_header and not kept else max(kept, WAITING_MESSAGES)
+        # messages without a header have no number, and are counted: none may be left out
+        size = 1 if codec(message).ros_class._has_header and not kept else max(kept, 256)
         self._backlog: Backlog[tuple[Arrival, RosPublisher]] | None = Backlog(kept) if kept else None
         self._waiting = deque[tuple[Arrival, RosPublisher]]()
         self.subscription = Subscription(topic, message, size, store=self._store, now=now)
         self._decode = self.subscription.codec.decode
         self.topic = self.subscription.topic
         self.carries = self.subscription.codec.ros_class._type
-        self._attendance = Attendance(
+        self._expected = ExpectedPublishers(
             self.topic,
             self.subscription.senders,
             now=now if in_lockstep else time.monotonic,
-            patience=IN_PROGRESS if in_lockstep else MASTER_REPLY_PERIOD,
+            timeout=LOCKSTEP_TIMEOUT if in_lockstep else 0.1,  # a cycle of real time cannot wait longer
         )
 
     def _store(self, arrival: Arrival) -> None:
@@ -240,7 +233,7 @@ class RosReader(Reader):
     def _add(self, name: str) -> RosPublisher:
         """Add a node that publishes for the first time; those that have not published for long are dropped."""
         with self._lock:
-            recent = self._now() - RIVALRY
+            recent = self._now() - PUBLISHER_TIMEOUT
             self._by_name = {each: known for each, known in self._by_name.items() if known.arrival >= recent}
             publisher = RosPublisher(name)
             if len(self._by_name) < SENDERS:
@@ -277,7 +270,7 @@ class RosReader(Reader):
 
     def awaited(self) -> list[str]:
         """See `Reader.awaited`."""
-        return self._attendance.awaited(self._by_name)
+        return self._expected.awaited(self._by_name)
 
     def _receive(self, arrival: Arrival) -> MessageStatus:
         try:

@@ -36,18 +36,6 @@ from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
 
-FLUSH = 0.5
-"""Longest time to wait for the last messages to leave [s]."""
-
-ANSWERED = 1.0
-"""Longest time to wait at the end for the replies to requests [s]."""
-
-ROSPY_SETTLING_TIME = 0.05
-"""Time that rospy's sending threads get for what they have already taken [s]."""
-
-SETTER = re.compile(r"(?:\n<!--| #) set by process (\d+) of (\S+?)(?: -->)?\s*$")
-"""The comment, of XML or YAML, with the node that has set a parameter: it goes with the text when another one does."""
-
 Endpoint = TypeVar("Endpoint", RosReader, RosQueue, RosWriter)
 
 
@@ -196,7 +184,7 @@ class RosMiddleware(Middleware):
         """See `Middleware._first_order`.
 
         Raises:
-            Ended: The node has to end.
+            ShutdownRequested: The node has to end.
         """
         reader = RosReader(topic, message)
         try:
@@ -211,7 +199,7 @@ class RosMiddleware(Middleware):
 
         Raises:
             MiddlewareError: No node offers the service, or no answer came in time.
-            Ended: The node has to end.
+            ShutdownRequested: The node has to end.
         """
         return replied(call(name, interface, request, timeout=timeout, running=self.running), reply)
 
@@ -261,11 +249,11 @@ class RosMiddleware(Middleware):
             MiddlewareError: The node has ended because its master was lost.
         """
         writers = [endpoint for endpoint in self._endpoints if isinstance(endpoint, RosWriter)]
-        end = time.monotonic() + FLUSH
+        end = time.monotonic() + 0.5
         while not all(writer.flush() for writer in writers) and time.monotonic() < end:
             time.sleep(0.005)
-        time.sleep(ROSPY_SETTLING_TIME)
-        wait(self._requests, ANSWERED)
+        time.sleep(0.05)  # rospy's sending threads send what they have already taken
+        wait(self._requests, timeout=1.0)
         parts = (*filter(None, (self._follower,)), *self._services, *self._endpoints, self._diagnostics)
         for part in () if self.loss else parts:  # without a master there is nothing to unregister from
             try:
@@ -287,7 +275,9 @@ class RosMiddleware(Middleware):
 
 def _living(value: Any) -> Any:
     """Return the value of a parameter as it was set; None if its node has ended without another one that sets it."""
-    setter = SETTER.search(value) if isinstance(value, str) else None
+    # a comment of XML or YAML names the node: it goes with the text when another one sets the parameter
+    comment = r"(?:\n<!--| #) set by process (\d+) of (\S+?)(?: -->)?\s*$"
+    setter = re.search(comment, value) if isinstance(value, str) else None
     if setter is None:
         return value
     return value[: setter.start()] if lives(setter[2], int(setter[1])) else None

@@ -15,26 +15,17 @@ from dynamic_reconfigure.msg import Config, ConfigDescription, Group, GroupState
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from solfer.middleware.ros.codecs.bounded import Rate, bound_requests
-from solfer.middleware.ros.services import FAST, RosService
+from solfer.middleware.ros.services import QUICK_LIMIT, RosService
 from solfer.srv import GetParametersRequest, SetParametersRequest
 from solfer.throttle import Throttle
 
 logger = logging.getLogger(__name__)
 
-RECONFIGURE_NAME = "parameters"
+NAME = "parameters"
 """Where they are below the plugin, whose own `set_parameters` is another service."""
 
 FAILURES = (rospy.ROSException, rospy.ServiceException, rosgraph.MasterException, OSError)
 """What may go wrong where a service or a topic is made."""
-
-_PARAMETERS_TYPES = {"number": "double", "whole number": "int", "true or false": "bool"}
-_RANGES: dict[str, tuple[Any, Any]] = {
-    "double": (-math.inf, math.inf),
-    "int": (-(2**31), 2**31 - 1),
-    "bool": (False, True),
-    "str": ("", ""),
-}
-_WORDS = {"number", "whole number", "true", "false", "text", "list", "none"}
 
 
 @dataclass(frozen=True)
@@ -43,42 +34,50 @@ class _Row:
 
     Attributes:
         type: bool, int, double or str.
-        least: Least value; empty for a text.
-        most: Largest value, likewise.
+        lower: Smallest value; empty for a text.
+        upper: Largest value, likewise.
         choices: The texts that it may be; empty: any.
         is_text: Whether it is text and not YAML.
     """
 
     name: str
     type: str
-    least: Any
-    most: Any
+    lower: Any
+    upper: Any
     choices: tuple[str, ...]
     is_text: bool
 
     @classmethod
     def of(cls, name: str, kind: str, minimum: str, maximum: str) -> "_Row":
+        types = {"number": "double", "whole number": "int", "true or false": "bool"}
+        ranges: dict[str, tuple[Any, Any]] = {
+            "double": (-math.inf, math.inf),
+            "int": (-(2**31), 2**31 - 1),
+            "bool": (False, True),
+            "str": ("", ""),
+        }
         words = tuple(kind.split(" or "))
-        choices = () if _WORDS.intersection(words) else words
-        type_ = _PARAMETERS_TYPES.get(kind, "str")
-        least, most = (
+        is_kind = {"number", "whole number", "true", "false", "text", "list", "none"}.intersection(words)
+        choices = () if is_kind else words
+        type_ = types.get(kind, "str")
+        lower, upper = (
             limit if type_ in ("bool", "str") or not text else type(limit)(float(text.rpartition(" ")[2]))
-            for text, limit in zip((minimum, maximum), _RANGES[type_], strict=True)
+            for text, limit in zip((minimum, maximum), ranges[type_], strict=True)
         )
-        return cls(name, type_, least, most=most, choices=choices, is_text=kind == "text" or bool(choices))
+        return cls(name, type_, lower, upper=upper, choices=choices, is_text=kind == "text" or bool(choices))
 
     def read(self, text: str) -> Any:
         """Read the text of a value."""
         if self.type == "str":
             return text
         if not text:  # a value that has to be given has no default
-            return self.least if self.type == "bool" else type(self.least)(0)
-        return type(self.least)(json.loads(text))
+            return self.lower if self.type == "bool" else type(self.lower)(0)
+        return type(self.lower)(json.loads(text))
 
     def write(self, value: Any) -> str:
         """Write a value, within its range, as YAML; one of another type is for the plugin to refuse."""
         if self.type in ("int", "double") and isinstance(value, int | float):
-            value = min(max(value, self.least), self.most)
+            value = min(max(value, self.lower), self.upper)
         is_yaml = self.type == "str" and not self.is_text and isinstance(value, str)
         return value if is_yaml else json.dumps(value)
 
@@ -148,7 +147,7 @@ class ReconfigureServer:
             return
         texts = zip(found.names, found.types, found.minimums, found.maximums, strict=True)
         self._rows = {row.name: row for row in (_Row.of(*each) for each in texts)}
-        prefix = f"{self._owner}/{RECONFIGURE_NAME}"
+        prefix = f"{self._owner}/{NAME}"
         described, self._updates = (
             rospy.Publisher(f"{prefix}/{name}", kind, latch=True, queue_size=1)
             for name, kind in (("parameter_descriptions", ConfigDescription), ("parameter_updates", Config))
@@ -160,7 +159,9 @@ class ReconfigureServer:
         self._setting.done = self._publish
         self._server = rospy.Service(f"{prefix}/set_parameters", Reconfigure, self._set)
         busy = object()
-        bound_requests(self._server.protocol, self._setting.largest, Rate(*FAST), instead=lambda size: busy, busy=busy)
+        bound_requests(
+            self._server.protocol, self._setting.largest, Rate(*QUICK_LIMIT), instead=lambda size: busy, busy=busy
+        )
 
     def _set(self, request: Any) -> ReconfigureResponse:
         if isinstance(request, Reconfigure._request_class):
@@ -174,7 +175,7 @@ class ReconfigureServer:
         texts = [self._rows[name].write(value) if name in self._rows else "" for name, value in changed.items()]
         reply = self._setting.answer(SetParametersRequest(list(changed), texts))
         if not reply.success:
-            self._throttle.warning("refused", "%s/%s: refused: %s", self._owner, RECONFIGURE_NAME, reply.message)
+            self._throttle.warning("refused", "%s/%s: refused: %s", self._owner, NAME, reply.message)
 
     def _values(self) -> dict[str, Any]:
         found = self._getting.answer(GetParametersRequest())
@@ -190,7 +191,7 @@ class ReconfigureServer:
             for name, value in values.items():
                 kept = self._rows[name].kept(value)
                 if self._kept[name] not in (value, kept):
-                    rospy.set_param(f"{self._owner}/{RECONFIGURE_NAME}/{name}", kept)
+                    rospy.set_param(f"{self._owner}/{NAME}/{name}", kept)
                 self._kept[name] = kept
 
     def _description(self, found: Any) -> ConfigDescription:
@@ -202,16 +203,16 @@ class ReconfigureServer:
         defaults = zip(found.names, found.defaults, strict=True)
         return ConfigDescription(
             [Group("Default", "", described, 0, 0)],
-            _message({row.name: row.most for row in rows}),
-            _message({row.name: row.least for row in rows}),
+            _message({row.name: row.upper for row in rows}),
+            _message({row.name: row.lower for row in rows}),
             _message({name: self._rows[name].read(text) for name, text in defaults}),
         )
 
 
 def first_values(owner: str) -> dict[str, Any]:
     """Return the values that a plugin's live parameters have on the parameter server."""
-    found = rospy.get_param(f"{owner}/{RECONFIGURE_NAME}", {})
-    return found if isinstance(found, dict) else {RECONFIGURE_NAME: found}
+    found = rospy.get_param(f"{owner}/{NAME}", {})
+    return found if isinstance(found, dict) else {NAME: found}
 
 
 def _message(values: dict[str, Any]) -> Config:

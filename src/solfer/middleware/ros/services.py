@@ -12,7 +12,7 @@ import rospy
 from solfer.errors import ComponentError, MiddlewareError, Overtaken, SolferError, described, located
 from solfer.interfaces.declaration import Service
 from solfer.middleware.ros.calls import alive, plain, provider
-from solfer.middleware.ros.codecs.bounded import READ_PATIENCE, Rate, bound_requests
+from solfer.middleware.ros.codecs.bounded import RATE_TIMEOUT, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class
 from solfer.transport.middleware import Submit
 
@@ -21,13 +21,8 @@ logger = logging.getLogger(__name__)
 REQUESTS = Rate(500.0, 50)
 """Requests that this node decodes, in a second and at once."""
 
-FAST, QUICK_SERVICE_LIMIT = (100.0, 20), (2.0, 4)
-"""The same for each service that is urgent or quick, and for each that prepares what takes long."""
-
-SERVICE_TRIES = 3
-"""How often a request is tried that others overtake, in whose threads they are prepared."""
-
-TOO_MANY = f"too many requests: its turn does not come within {READ_PATIENCE:g} s"
+QUICK_LIMIT = (100.0, 20)
+"""The same for each service that is urgent or quick."""
 
 
 class _Instead:
@@ -79,8 +74,14 @@ class RosService:
             )
         self._server = rospy.Service(name, self._interface, self.answer)
         is_slow = service.prepare is not None and not service.quick
-        rate = Rate(*QUICK_SERVICE_LIMIT) if is_slow else Rate(*FAST) if service.urgent or service.quick else REQUESTS
-        bound_requests(self._server.protocol, service.largest, rate, instead=self._too_large, busy=_Instead(TOO_MANY))
+        if is_slow:
+            rate = Rate(2.0, 4)
+        elif service.urgent or service.quick:
+            rate = Rate(*QUICK_LIMIT)
+        else:
+            rate = REQUESTS
+        busy = _Instead(f"too many requests: its turn does not come within {RATE_TIMEOUT:g} s")
+        bound_requests(self._server.protocol, service.largest, rate, instead=self._too_large, busy=busy)
 
     def close(self) -> None:
         """Unregister."""
@@ -109,7 +110,7 @@ class RosService:
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
         future: Future[Any] = Future()
         try:
-            for left in reversed(range(SERVICE_TRIES)):
+            for left in reversed(range(3)):  # others may overtake it, in whose threads they are prepared
                 future = self._submit(self._service.prepared(self._service.request(**fields)))
                 try:
                     reply = future.result(self._service.timeout)

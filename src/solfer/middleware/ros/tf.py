@@ -9,10 +9,7 @@ from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, MESSAGE_
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.transport import BodyMessage, Middleware
 
-TRANSFORM_RATE = 200.0
-"""Transforms for each second of the sender's clock [Hz]."""
-
-TRANSFORM_POSE = struct.Struct("<7d")
+POSE = struct.Struct("<7d")
 """Translation, then quaternion (x, y, z, w)."""
 
 
@@ -44,7 +41,7 @@ class BaseTransform:
         rate: Transforms for each second of the sender's clock [Hz].
     """
 
-    def __init__(self, prefix: str = "", rate: float = TRANSFORM_RATE):
+    def __init__(self, prefix: str = "", rate: float = 200.0):
         self._topic_publisher = TopicPublisher("/tf", TFMessage)
         self._prefix = prefix
         self._rate = rate
@@ -72,6 +69,6 @@ def pack(message: BodyMessage, stamp: tuple[int, int], prefix: str = "") -> byte
             frame,
             MESSAGE_LENGTH.pack(len(child)),
             child,
-            TRANSFORM_POSE.pack(*message.position, *message.orientation),
+            POSE.pack(*message.position, *message.orientation),
         )
     )

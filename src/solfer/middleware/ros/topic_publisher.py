@@ -6,7 +6,6 @@ waits.
 """
 
 import socket
-import struct
 from dataclasses import dataclass, field
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -18,7 +17,6 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.ros.codecs.packed_message import PackedMessage
 
 SEND_FLAGS = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
-COUNT = struct.Struct("<I")
 
 
 @dataclass
@@ -40,7 +38,9 @@ class SendBacklog:
 
     def subtract(self, count: int) -> None:
         """Forget the first `count` bytes: they are in progress."""
-        self.rest, count = self.rest[count:], count - len(self.rest)
+        before = len(self.rest)
+        self.rest = self.rest[count:]
+        count -= before
         while count > 0:
             message = self.newest.pop(next(iter(self.newest)))
             self.rest = message[count:]

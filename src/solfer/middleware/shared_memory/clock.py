@@ -9,12 +9,6 @@ from typing import TextIO
 
 from solfer.errors import MiddlewareError
 
-CLOCK_MONOTONIC = 1
-TIMER_ABSTIME = 1
-
-CLOCK_RESOLUTION = 1e-9
-"""Times that differ by less are one time of a stepped clock: sums of periods are not exact [s]."""
-
 
 class _Timespec(ctypes.Structure):
     _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
@@ -45,7 +39,8 @@ class MonotonicClock:
             return
         seconds = int(deadline)
         until = _Timespec(seconds, int(1e9 * (deadline - seconds)))
-        while self._libc.clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, ctypes.byref(until), None):
+        # 1, 1: CLOCK_MONOTONIC, TIMER_ABSTIME
+        while self._libc.clock_nanosleep(1, 1, ctypes.byref(until), None):
             if time.monotonic() >= deadline:  # else a signal came: sleep on
                 return
 
@@ -62,6 +57,9 @@ class SteppedClock:
     Attributes:
         ended: Whether no more lines come; then `sleep_until` returns at once.
     """
+
+    RESOLUTION = 1e-9
+    """Times that differ by less are one: sums of periods are not exact [s]."""
 
     def __init__(self, lines: TextIO, send: Callable[[str], object]):
         self._lines = lines
@@ -83,7 +81,7 @@ class SteppedClock:
         Raises:
             MiddlewareError: A line is not a time.
         """
-        while self._now < deadline - CLOCK_RESOLUTION and not self.ended:
+        while self._now < deadline - self.RESOLUTION and not self.ended:
             self._send(repr(self._now))
             line = self._lines.readline()
             try:

@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.rpc.services import SERVICES, offered
-from solfer.middleware.shared_memory.topics.ears import EAR_KIND as EAR
-from solfer.middleware.shared_memory.topics.ears import EARS
+from solfer.middleware.shared_memory.topics import subscriptions
 from solfer.middleware.shared_memory.topics.sender_segment import PIPES, SENDER_KIND, sender_of
 from solfer.segments.namespace import Namespace
 from solfer.segments.segment import Segment
@@ -17,9 +16,6 @@ from solfer.transport.topics import Topics
 
 Opened: TypeAlias = dict[str, dict[str, Segment]]
 """Segments by their names, for each topic."""
-
-COMMAND_SUFFIX = "/command"
-"""End of the names of topics of the lower level's controllers."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +57,7 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
     """
     found = {}
     for topic in namespace.present(PIPES):
-        if topic.endswith(COMMAND_SUFFIX) or topic in known:
+        if topic.endswith("/command") or topic in known:
             continue
         for message in _living(namespace, PIPES, SENDER_KIND, topic=topic).values():
             found[topic] = PublishedTopic(topic, message)
@@ -71,10 +67,10 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
 def declared_topics(namespace: Namespace, known: Container[str] = ()) -> list[PublishedTopic]:
     """List the topics that a component of the namespace receives and declares; see `published_topics`."""
     found = {}
-    for topic in namespace.present(EARS):
+    for topic in namespace.present(subscriptions.FOLDER):
         if topic in known:
             continue
-        for content in _contents(namespace, EARS, EAR, topic=topic).values():
+        for content in _contents(namespace, subscriptions.FOLDER, subscriptions.KIND, topic=topic).values():
             if content.get("declared"):
                 found[topic] = PublishedTopic(topic, content["message"])
     return list(found.values())
@@ -90,15 +86,17 @@ class Survey:
     """
 
     def __init__(self, namespace: Namespace):
-        self._namespace, self._bell = namespace, namespace.any_bell()
+        self._namespace = namespace
+        self._notification = namespace.any_notification()
         self._published: Opened = {}
         self._received: Opened = {}
 
     def topics_beside(self, node: str) -> Topics:
         """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
-        if self._bell.rung():
-            self._bell.acknowledge()
-            self._published, self._received = self._open(PIPES, SENDER_KIND), self._open(EARS, EAR)
+        if self._notification.is_pending():
+            self._notification.acknowledge()
+            self._published = self._open(PIPES, SENDER_KIND)
+            self._received = self._open(subscriptions.FOLDER, subscriptions.KIND)
         return Topics(*(_beside(node, opened) for opened in (self._published, self._received)))
 
     def _open(self, folder: str, kind: str) -> Opened:

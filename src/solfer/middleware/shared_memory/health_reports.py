@@ -14,8 +14,6 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-REPORT_KIND = "report"
-REPORTS = "reports"
 REPORT_SIZE = 8192
 """Longest report [B]; figures at its end that do not fit are left out."""
 
@@ -24,7 +22,8 @@ class _Page:
     """The report of one part."""
 
     def __init__(self, segment: Segment):
-        self.segment, self.slot = segment, Slot(segment.data, Text.width(REPORT_SIZE))
+        self.segment = segment
+        self.slot = Slot(segment.data, Text.width(REPORT_SIZE))
         self.text = Text(self.slot.values)
 
 
@@ -35,8 +34,12 @@ class Reports:
         namespace: Where.
     """
 
+    KIND = "report"
+    FOLDER = "reports"
+
     def __init__(self, namespace: Namespace):
-        self._namespace, self._bell = namespace, namespace.bell(REPORTS)
+        self._namespace = namespace
+        self._notification = namespace.notification(self.FOLDER)
         self._own: dict[str, _Page | None] = {}
         self._others: dict[str, _Page] = {}
         self._received: dict[str, HealthReport] = {}
@@ -59,8 +62,8 @@ class Reports:
 
     def read(self) -> Mapping[str, HealthReport]:
         """Return the newest report of each part, of those that have ended, too."""
-        if self._bell.rung():
-            self._bell.acknowledge()
+        if self._notification.is_pending():
+            self._notification.acknowledge()
             self._find()
         for name, page in self._others.items():
             if page.slot.read():
@@ -73,27 +76,27 @@ class Reports:
         for page in filter(None, self._own.values()):
             page.segment.close()
         if self._own:
-            self._bell.ring()
+            self._notification.send()
 
     def _open(self, name: str) -> _Page | None:
         try:
-            path = self._namespace.place(REPORTS, name)
-            page = _Page(Segment.create(path, REPORT_KIND, name.encode(), size=Slot.size(Text.width(REPORT_SIZE))))
+            path = self._namespace.place(self.FOLDER, name)
+            page = _Page(Segment.create(path, self.KIND, name.encode(), size=Slot.size(Text.width(REPORT_SIZE))))
         except MiddlewareError as error:
             logger.warning("the health of '%s' is not reported: %s", name, error)
             return None
-        self._bell.ring()
+        self._notification.send()
         return page
 
     def _find(self) -> None:
         """Attach the reports of new parts."""
-        for name in self._namespace.present(REPORTS):
+        for name in self._namespace.present(self.FOLDER):
             page = self._others.get(name)
             if page is not None and not page.segment.retired:
                 continue
             self._others.pop(name, None)
             try:
-                segment = Segment.attach(self._namespace.path(REPORTS, name), REPORT_KIND)
+                segment = Segment.attach(self._namespace.path(self.FOLDER, name), self.KIND)
             except MiddlewareError as error:
                 logger.debug("the health of '%s' is not read: %s", name, error)
                 continue

@@ -13,8 +13,8 @@ from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
 from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
-from solfer.middleware.shared_memory.topics.ears import Ears
-from solfer.middleware.shared_memory.topics.endpoints import XbotMail, XbotQueue, XbotReader, XbotWriter
+from solfer.middleware.shared_memory.topics.endpoints import PendingMessages, XbotQueue, XbotReader, XbotWriter
+from solfer.middleware.shared_memory.topics.subscriptions import Subscriptions
 from solfer.segments.lock import locked
 from solfer.segments.namespace import Namespace
 from solfer.segments.segment import Segment
@@ -23,8 +23,9 @@ from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
-PARAMETERS = "provided"
-PARAMETER_KIND = "parameter"
+PROVIDED = "provided"
+"""Folder of the parameters."""
+
 CHECK_PERIOD = 1e-3
 """Time between two checks of a condition that is waited for [s]."""
 
@@ -40,7 +41,7 @@ class ClockProtocol(Protocol):
 
 
 class _ServedCalls:
-    """Services of a node, which receive their calls as soon as a bell of the namespace rings.
+    """Services of a node, which receive their calls as soon as a notification of the namespace is sent.
 
     Args:
         namespace: The namespace.
@@ -48,7 +49,7 @@ class _ServedCalls:
 
     def __init__(self, namespace: Namespace):
         self._servers: list[ServiceServer] = []
-        self._bell = namespace.any_bell()
+        self._notification = namespace.any_notification()
         self._busy = True
 
     def add(self, server: ServiceServer) -> None:
@@ -58,9 +59,9 @@ class _ServedCalls:
 
     def poll(self) -> None:
         """Receive calls. Does not block."""
-        bell = self._bell
-        if self._busy or bell.words[bell.place] != bell.received:
-            bell.acknowledge()
+        notification = self._notification
+        if self._busy or notification.words[notification.place] != notification.received:
+            notification.acknowledge()
             for server in self._servers:
                 server.poll()
             self._busy = any(server.busy for server in self._servers)
@@ -106,7 +107,7 @@ class XbotMiddleware(Middleware):
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._provided: dict[str, Segment] = {}
-        self._ears = Ears(self.namespace, name) if listens else None
+        self._subscriptions = Subscriptions(self.namespace, name) if listens else None
         self._served = _ServedCalls(self.namespace)
         self._survey = Survey(self.namespace)
         self._calls = Calls(self.namespace, name, self.now)
@@ -150,19 +151,19 @@ class XbotMiddleware(Middleware):
         """See `Middleware.parameter`; the node's own, else one that a living node has set with `provide`."""
         if name.lstrip("/") in self._parameters:
             return self._parameters[name.lstrip("/")]
-        path = self.namespace.path(PARAMETERS, name)
+        path = self.namespace.path(PROVIDED, name)
         try:
-            segment = Segment.attach(path, PARAMETER_KIND) if path.exists() else None
+            segment = Segment.attach(path, "parameter") if path.exists() else None
         except MiddlewareError as error:
             raise error.at(where) from None
         if segment is None or not segment.owned():
-            present = [each for each in self.namespace.present(PARAMETERS) if self._is_provided(each)]
+            present = [each for each in self.namespace.present(PROVIDED) if self._is_provided(each)]
             raise UnknownName("parameter", name, (*self._parameters, *present), where=where)
         return json.loads(segment.layout)
 
     def _is_provided(self, name: str) -> bool:
         """Return whether a living node provides a parameter."""
-        return locked(self.namespace.path(PARAMETERS, name))
+        return locked(self.namespace.path(PROVIDED, name))
 
     def provide(self, name: str, value: Any) -> None:
         """Set a parameter of the namespace, which lasts as long as this node.
@@ -175,12 +176,10 @@ class XbotMiddleware(Middleware):
         if key in self._provided:
             self._provided[key] = self._provided[key].recreate(content, 0)
         else:
-            self._provided[key] = Segment.create(
-                self.namespace.place(PARAMETERS, name), PARAMETER_KIND, content, size=0
-            )
+            self._provided[key] = Segment.create(self.namespace.place(PROVIDED, name), "parameter", content, size=0)
 
     def reader(self, topic: str, message: str, kept: int = 0) -> XbotReader:
-        """See `Middleware.reader`; of a sender no more are kept than `DEPTH`."""
+        """See `Middleware.reader`; of a sender no more are kept than its segment holds."""
         return self._keep(XbotReader(self.namespace, topic, message, now=self._clock.now, kept=kept), message)
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> XbotQueue:
@@ -189,13 +188,13 @@ class XbotMiddleware(Middleware):
 
     def declared_queue(self, topic: str, message: str) -> XbotQueue:
         """See `Middleware.declared_queue`; a bridge forwards what is published outside."""
-        if self._ears is not None:
-            self._ears.listen(topic, message, declared=True)
+        if self._subscriptions is not None:
+            self._subscriptions.add(topic, message, declared=True)
         return self.queue(topic, message)
 
-    def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
-        """See `Middleware.mail`."""
-        return XbotMail(cast(Sequence[XbotQueue], queues), self.namespace.any_bell())
+    def pending(self, queues: Sequence[Queue]) -> Callable[[], bool]:
+        """See `Middleware.pending`."""
+        return PendingMessages(cast(Sequence[XbotQueue], queues), self.namespace.any_notification())
 
     def writer(self, topic: str, message: str) -> XbotWriter:
         """See `Middleware.writer`.
@@ -260,7 +259,7 @@ class XbotMiddleware(Middleware):
     def close(self) -> None:
         """See `Middleware.close`; nothing is queued here."""
         owned = (self._served, *self._endpoints, *self._provided.values())
-        for part in (*owned, self._calls, self._reports, *filter(None, (self._ears,))):
+        for part in (*owned, self._calls, self._reports, *filter(None, (self._subscriptions,))):
             part.close()
         self._provided.clear()
         self._endpoints.clear()
@@ -275,6 +274,6 @@ class XbotMiddleware(Middleware):
     def _keep(self, endpoint: Any, received: str = "") -> Any:
         """Keep an endpoint to close, and register it as a subscriber of the message `received`."""
         self._endpoints.append(endpoint)
-        if received and self._ears is not None:
-            self._ears.listen(endpoint.topic, received)
+        if received and self._subscriptions is not None:
+            self._subscriptions.add(endpoint.topic, received)
         return endpoint

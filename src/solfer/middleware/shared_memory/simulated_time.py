@@ -4,10 +4,9 @@ from pathlib import Path
 
 from solfer.segments.latched import latched
 
-SIMULATED_TIME_FILE = "simulated_time"
-SIMULATED_TIME_KIND = "simulated time"
-SIMULATED_TIME_LAYOUT = b'{"words": ["rewinds", "time [ns]"]}'
-REWINDS, TIME = range(2)
+# words of the memory
+REWINDS = 0
+TIME = 1
 
 
 class SimulatedTime:
@@ -17,14 +16,15 @@ class SimulatedTime:
         folder: The namespace's folder.
 
     Attributes:
-        words: The time [ns], and how often it has gone back.
+        words: How often it has gone back, and the time [ns].
 
     Raises:
         MiddlewareError: The folder cannot be used, or a foreign file is in the way.
     """
 
     def __init__(self, folder: Path):
-        self._segment = latched(folder / SIMULATED_TIME_FILE, SIMULATED_TIME_KIND, SIMULATED_TIME_LAYOUT, size=16)
+        layout = b'{"words": ["rewinds", "time [ns]"]}'
+        self._segment = latched(folder / "simulated_time", "simulated time", layout, size=16)
         self.words = self._segment.data[:16].cast("q")
 
     @property

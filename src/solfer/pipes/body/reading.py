@@ -16,7 +16,7 @@ from solfer.numerics.rotations import (
     rotation_from_angles,
     rotation_from_quaternion,
 )
-from solfer.transport.inexact import InexactTurns
+from solfer.transport.inexact import InexactOrientations
 from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
 
 BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
@@ -61,7 +61,7 @@ class BodyReading(abc.ABC):
         self._axes = axes
         self._twist_frame = convention.twist.frame
         orientation = convention.orientation
-        self._inexact = InexactTurns()
+        self._inexact = InexactOrientations()
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
         self.values = np.zeros(13)

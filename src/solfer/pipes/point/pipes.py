@@ -17,7 +17,7 @@ from solfer.pipes.name_order import NameOrder
 from solfer.pipes.point.notation import PointNotation
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
-from solfer.transport.inexact import InexactTurns
+from solfer.transport.inexact import InexactOrientations
 from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
 
 
@@ -68,7 +68,7 @@ class PointFeedbackPipe(FeedbackPipe):
         self._frame = received.frame
         self._notation = received.notation
         self._names = None if received.names is None else NameOrder(received.names, known, self.what)
-        self._inexact = InexactTurns()
+        self._inexact = InexactOrientations()
         self._oriented = port.quantity in ("orientation", "pose")
         self._values = np.zeros_like(port.value)
         self._numbers = self._values.reshape(-1)

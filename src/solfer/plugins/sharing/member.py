@@ -97,9 +97,9 @@ class SpaceMember(Middleware):
         """See `Middleware.declared_queue`; as `queue`."""
         return self._outside.declared_queue(topic, message)
 
-    def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
-        """See `Middleware.mail`."""
-        return self._outside.mail(queues)
+    def pending(self, queues: Sequence[Queue]) -> Callable[[], bool]:
+        """See `Middleware.pending`."""
+        return self._outside.pending(queues)
 
     def require_fields(self, interface: str, message: type) -> None:
         """See `Middleware.require_fields`."""

@@ -15,12 +15,6 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-STATUS_PERIOD = 0.2
-"""Time between two messages of status without news [s]; clients take a silent one for dead after some of them."""
-
-ACTION_MEMORY = 20
-"""Goals that have ended, or were cancelled before they came, that are still in the status and known if they come."""
-
 
 class ActionServer:
     """One goal of an action after the other; its states are those that actionlib's SimpleActionServer gives.
@@ -59,7 +53,7 @@ class ActionServer:
         return self._topics.goals, self._topics.cancels
 
     def receive(self, refusal: str) -> None:
-        """Carry out what clients want, between two cycles; with a `refusal` the goal is aborted and others rejected."""
+        """Carry out the requests of clients, between two cycles; a `refusal` aborts the goal and rejects others."""
         now = self._now()
         stamp = self._stamp_time()
         if stamp < self._before:
@@ -161,7 +155,7 @@ class ActionServer:
         """Let a goal that is not in progress be in the status, as the newest one; the oldest is forgotten."""
         self._past.pop(entry.goal_id.id, None)
         self._past[entry.goal_id.id] = entry
-        if len(self._past) > ACTION_MEMORY:
+        if len(self._past) > 20:
             del self._past[next(iter(self._past))]
 
     def _end(self, name: GoalName, state: GoalStatus, text: str, result: Any = None) -> None:
@@ -175,6 +169,6 @@ class ActionServer:
 
     def _publish_status(self) -> None:
         """Publish the states of the goals."""
-        self._next_status = self._now() + STATUS_PERIOD
+        self._next_status = self._now() + 0.2  # without news; clients take a server for dead that is silent longer
         in_progress = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
         self._topics.publish_status((*self._past.values(), *in_progress))

@@ -50,7 +50,7 @@ def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, in
             inbox.sources.append(server.receive)
             queues += server.queues
             publish.append(server.publish)
-    inbox.mail = middleware.mail(queues)
+    inbox.pending = middleware.pending(queues)
     return publish
 
 

@@ -28,17 +28,8 @@ class GoalStatus(enum.IntEnum):
     @property
     def ended(self) -> bool:
         """Whether nothing more happens to the goal."""
-        return self in _ENDED
-
-
-_ENDED = (
-    GoalStatus.PREEMPTED,
-    GoalStatus.SUCCEEDED,
-    GoalStatus.ABORTED,
-    GoalStatus.REJECTED,
-    GoalStatus.RECALLED,
-    GoalStatus.LOST,
-)
+        open_ = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
+        return self not in open_
 
 
 @dataclass(frozen=True)

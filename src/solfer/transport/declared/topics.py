@@ -12,18 +12,12 @@ from solfer.transport.stamp_faults import StreamClock
 
 logger = logging.getLogger(__name__)
 
-STREAM_REPEAT_PERIOD = 0.05
-"""Time between two messages of rest [s]: one may be lost."""
-
-MOST_CLOCKS = 32
-"""Most senders whose clocks are kept; those whose name changes each time do not fill the memory."""
-
-STREAM_SILENCE = 0.5
-"""Time without a message after which another sender of a stream counts [s]."""
-
 
 class SoleSender:
     """Admits one sender of a stream at a time: the first, until it is silent."""
+
+    TIMEOUT = 0.5
+    """Time without a message after which another sender counts [s]."""
 
     def __init__(self) -> None:
         self.name = ""
@@ -31,7 +25,7 @@ class SoleSender:
 
     def admits(self, sender: str, now: float) -> bool:
         """Decide whether a message that is received `now` [s] counts."""
-        if sender != self.name and now - self._newest <= STREAM_SILENCE:
+        if sender != self.name and now - self._newest <= self.TIMEOUT:
             return False
         self.name = sender
         self._newest = now
@@ -97,7 +91,7 @@ class DeclaredIn:
     def _check_stamp(self, stamp: float, sender: str, arrival: float) -> None:
         clock = self._clocks.get(sender)
         if clock is None:
-            if len(self._clocks) == MOST_CLOCKS:
+            if len(self._clocks) == 32:  # senders whose name changes each time do not fill the memory
                 self._clocks.clear()
             clock = self._clocks[sender] = StreamClock()
         if not clock.accepts(stamp, arrival):
@@ -146,5 +140,5 @@ class DeclaredOut:
     def rest(self, refusal: str) -> None:
         """Publish now and then, while a component that has worked does not (a `refusal`), what is declared for that."""
         if refusal and self._has_worked and self._now() >= self._next:
-            self._next = self._now() + STREAM_REPEAT_PERIOD
+            self._next = self._now() + 0.05  # repeated: a message may be lost
             self._writer.write(message_of(self._topic.interface, self._topic.rest))

@@ -12,7 +12,7 @@ from sensor_msgs.msg import Imu
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH, PackedMessage
 from solfer.numerics.rotations import normalize, rotation_from_quaternion
-from solfer.transport.inexact import InexactTurns
+from solfer.transport.inexact import InexactOrientations
 from solfer.transport.messages import (
     BODY_MESSAGES,
     IMU_MESSAGES,
@@ -24,8 +24,6 @@ from solfer.transport.messages import (
 
 NOT_MEASURED = -1.0
 """First number of the covariance of a quantity that an inertial measurement unit does not measure."""
-
-COVARIANCES = ("orientation_covariance", "angular_velocity_covariance", "linear_acceleration_covariance")
 
 
 class NumbersBuffer:
@@ -43,7 +41,8 @@ class NumbersBuffer:
         """Return the numbers of a message with these names, a live view; zero where nothing was ever written to."""
         if (frame, child) != self._names:
             name = b"" if child is None else MESSAGE_LENGTH.pack(len(child.encode())) + child.encode()
-            self._names, self._frame = (frame, child), PackedMessage(name + bytes(8 * self._count), frame)
+            self._names = (frame, child)
+            self._frame = PackedMessage(name + bytes(8 * self._count), frame)
             self._numbers = self._frame.numbers(len(name), self._count)
         return self._numbers
 
@@ -60,16 +59,18 @@ class BodyCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Odometry)
-        self._inexact = InexactTurns()
+        self._inexact = InexactOrientations()
         self._out = NumbersBuffer(85)  # pose and its covariance, twist and its covariance
 
     def encode(self, message: BodyMessage) -> PackedMessage:
         """See `Codec.encode`."""
         numbers = self._out.view(message.frame, message.child)
         rotation = rotation_from_quaternion(message.orientation)
-        numbers[0:3], numbers[3:7] = message.position, message.orientation
+        numbers[0:3] = message.position
+        numbers[3:7] = message.orientation
         numbers[7:43] = message.pose_covariance.ravel()
-        numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
+        numbers[43:46] = message.linear @ rotation
+        numbers[46:49] = message.angular @ rotation
         numbers[49:85] = message.twist_covariance.ravel()
         return self._out.stamped(message.stamp)
 
@@ -98,20 +99,22 @@ class ImuCodec(Codec):
     """sensor_msgs/Imu: orientation of the sensor, angular velocity and specific force in its axes.
 
     Covariances are diagonal with equal entries, those of one sample. All zeros: nothing is known. A first entry of
-    UNKNOWN: the sensor does not measure the quantity, whose numbers are NaN then.
+    NOT_MEASURED: the sensor does not measure the quantity, whose numbers are NaN then.
     """
 
     messages = IMU_MESSAGES
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Imu)
-        self._inexact = InexactTurns()
+        self._inexact = InexactOrientations()
         self._out = NumbersBuffer(37)  # each quantity with its covariance, row by row
 
     def encode(self, message: ImuMessage) -> PackedMessage:
         """See `Codec.encode`."""
         numbers = self._out.view(message.frame)
-        numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
+        numbers[0:4] = message.orientation
+        numbers[13:16] = message.angular
+        numbers[25:28] = message.acceleration
         for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
             numbers[begin : begin + 9 : 4] = deviation * deviation
         for begin, end in ((0, 4), (13, 16), (25, 28)):
@@ -123,7 +126,7 @@ class ImuCodec(Codec):
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
         """See `Codec.decode`."""
         imu = unpack(Imu, packed)
-        covariances = [getattr(imu, name) for name in COVARIANCES]
+        covariances = (imu.orientation_covariance, imu.angular_velocity_covariance, imu.linear_acceleration_covariance)
         lacks_orientation, lacks_angular, lacks_force = (covariance[0] == NOT_MEASURED for covariance in covariances)
         lacks_orientation = lacks_orientation or not any(_get(imu.orientation))
         deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
@@ -150,7 +153,8 @@ class WrenchCodec(Codec):
     def encode(self, message: WrenchMessage) -> PackedMessage:
         """See `Codec.encode`."""
         numbers = self._out.view(message.frame)
-        numbers[:3], numbers[3:] = message.force, message.torque
+        numbers[:3] = message.force
+        numbers[3:] = message.torque
         return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> WrenchMessage:
@@ -163,7 +167,7 @@ class WrenchCodec(Codec):
         )
 
 
-def _orientation(element: genpy.Message, inexact: InexactTurns, sender: str) -> np.ndarray:
+def _orientation(element: genpy.Message, inexact: InexactOrientations, sender: str) -> np.ndarray:
     """Read a unit quaternion (x, y, z, w) of a sender, shape (4,); report an inexact one."""
     orientation = _get(element)
     if normalize(orientation):

@@ -15,15 +15,9 @@ from rospy.impl.tcpros_base import TCPROSTransportProtocol
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 
 CHUNK = 65536  # bytes that are thrown away at once
-BUFFER = 4096  # bytes of the smallest buffer of a connection
-HOPELESS = 2**26
-"""Announced size from which on a connection is closed instead of being read to the message's end."""
 
-READ_MESSAGES, READ_PAUSE = 16, 200e-6
-"""Messages that one read may return; if it returns more, a rest for each of them [s]."""
-
-READ_PATIENCE = 1.0
-"""Longest time that a request waits for its turn [s]."""
+RATE_TIMEOUT = 1.0
+"""Longest time that a request waits until the rate allows it [s]."""
 
 Instead = Callable[[int], Any]
 """Returns what replaces a message of that size in bytes; None: nothing."""
@@ -43,16 +37,16 @@ class Rate:
         self._next = 0.0
         self._lock = threading.Lock()
 
-    def wait(self, patience: float = READ_PATIENCE) -> bool:
-        """Wait for the caller's turn; returns False, at once, if that takes longer than `patience` [s]."""
+    def wait(self, timeout: float = RATE_TIMEOUT) -> bool:
+        """Wait until the rate allows a call; returns False, at once, if that takes longer than `timeout` [s]."""
         with self._lock:
             now = time.monotonic()
-            turn = max(self._next, now - self._ahead)
-            if turn - now > patience:
+            start = max(self._next, now - self._ahead)
+            if start - now > timeout:
                 return False
-            self._next = turn + self._period
-        if turn > now:
-            time.sleep(turn - now)
+            self._next = start + self._period
+        if start > now:
+            time.sleep(start - now)
         return True
 
 
@@ -62,8 +56,8 @@ def bound_messages(protocol: TCPROSTransportProtocol, largest: int, instead: Ins
 
     def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
         read(buffer, queue, sock)
-        if len(queue) > READ_MESSAGES:
-            time.sleep(READ_PAUSE * len(queue))
+        if len(queue) > 16:
+            time.sleep(200e-6 * len(queue))
 
     protocol.read_messages = read_messages
 
@@ -93,14 +87,14 @@ def bound_requests(protocol: TCPROSTransportProtocol, largest: int, rate: Rate, 
 
 def _bounded(protocol: TCPROSTransportProtocol, largest: int, instead: Instead) -> Callable[..., None]:
     read = protocol.read_messages
-    protocol.buff_size = max(BUFFER, min(protocol.buff_size, MESSAGE_LENGTH.size + largest))
+    protocol.buff_size = max(4096, min(protocol.buff_size, MESSAGE_LENGTH.size + largest))
 
     def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
         size = _announced(buffer)
         if size <= largest:
             read(buffer, queue, sock)
             return
-        if size > HOPELESS:
+        if size > 2**26:  # the connection is closed instead of being read to the message's end
             raise TransportTerminated(f"a message of {size} bytes")
         _skip(buffer, sock, size)
         found = instead(size)

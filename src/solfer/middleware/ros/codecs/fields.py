@@ -16,7 +16,6 @@ from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, PackedMe
 from solfer.transport.messages import FieldsMessage
 
 _TIMES = {"time": genpy.Time, "duration": genpy.Duration}
-_BYTES = ("uint8", "char")
 
 
 class FieldsCodec(Codec):
@@ -113,7 +112,7 @@ def _to_ros(kind: str, value: Any) -> Any:
     """Convert the value of a field to what a type of ROS holds."""
     element, bracket, _ = kind.partition("[")
     if bracket:
-        return bytes(value) if element in _BYTES else [_to_ros(element, each) for each in value]
+        return bytes(value) if element in ("uint8", "char") else [_to_ros(element, each) for each in value]
     if kind in _TIMES:
         return _TIMES[kind].from_sec(value)
     return value if "/" not in kind else _filled(message_class(kind), value)

@@ -19,9 +19,6 @@ NO_VALUES = np.zeros(0)
 
 FLOAT64 = np.dtype("<f8")
 
-LAYOUTS = 4
-"""Number of layouts that a decoder remembers: publishers of a topic may have different joints."""
-
 
 class JointLayout:
     """What messages share with one that was decoded: all between their header and their end, but the numbers.
@@ -173,7 +170,7 @@ class JointCodec(Codec):
 
     def _remember(self, length: int, start: int, layout: JointLayout | None) -> None:
         if layout is not None:
-            if len(self._layouts) == LAYOUTS:
+            if len(self._layouts) == 4:  # several: publishers of a topic may have different joints
                 self._layouts.clear()
             self._layouts[length, start] = layout
 

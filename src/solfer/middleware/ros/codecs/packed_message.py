@@ -9,8 +9,11 @@ from rospy.rostime import get_rostime, is_wallclock
 MESSAGE_LENGTH = struct.Struct("<I")
 MESSAGE_HEADER = struct.Struct("<IIII")
 """Sequence number, seconds, nanoseconds, and length of the frame's name that follows."""
-SEQUENCE_OFFSET, STAMP_OFFSET = MESSAGE_LENGTH.size, MESSAGE_LENGTH.size + 4
-"""Where the sequence number and the stamp stand, behind the length of the whole message."""
+SEQUENCE_OFFSET = MESSAGE_LENGTH.size
+"""Where the sequence number stands, behind the length of the whole message [B]."""
+
+STAMP_OFFSET = MESSAGE_LENGTH.size + 4
+"""Where the stamp stands [B]."""
 TIME = struct.Struct("<II")
 NANOSECONDS = 1_000_000_000
 """Nanoseconds of a second."""

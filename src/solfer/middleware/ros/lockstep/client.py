@@ -14,41 +14,39 @@ import rospy
 
 from solfer.errors import ConfigError, MiddlewareError
 from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.endpoints import IN_PROGRESS, RosQueue, RosReader, RosWriter
+from solfer.middleware.ros.endpoints import LOCKSTEP_TIMEOUT, RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.waiting import ShutdownRequested, wait_for
 
 logger = logging.getLogger(__name__)
 
-FOLLOWERS_PARAMETER = "/lockstep"
-"""Parameter that names the nodes that follow, in the order of their cycles: 'upper_body, lower_body'."""
+TICK = "solfer/Tick"
+"""Interface of the service by which a node follows."""
 
-TICK, SERVICE = "solfer/Tick", "lockstep/tick"
-"""Interface and name, behind the node's, of the service by which a node follows."""
+SERVICE = "lockstep/tick"
+"""Its name, behind the node's."""
 
 Endpoint = RosReader | RosQueue | RosWriter
 Numbers = dict[tuple[str, str], int]
 """Number of the newest message on a topic by a sender."""
 
-NONE: Numbers = {}
+NO_NUMBERS: Numbers = {}
 
 
 def followers() -> tuple[str, ...]:
     """Read the full names of the nodes that follow the simulation; empty: there is no lock-step.
 
+    The parameter `/lockstep` names them in the order of their cycles: 'upper_body, lower_body'.
+
     Raises:
         ConfigError: The parameter is not a list of names, or names a node twice.
     """
-    value = rospy.get_param(FOLLOWERS_PARAMETER, "")
+    value = rospy.get_param("/lockstep", "")
     if not isinstance(value, str):
-        raise ConfigError(
-            f"not a list of nodes: '{value}'", where=f"parameter {FOLLOWERS_PARAMETER}", expected="NAME, NAME, ..."
-        )
+        raise ConfigError(f"not a list of nodes: '{value}'", where="parameter /lockstep", expected="NAME, NAME, ...")
     names = tuple(rosgraph.names.resolve_name(name.strip(), "/") for name in value.split(",") if name.strip())
     if len(set(names)) < len(names):
-        raise ConfigError(
-            f"a node twice in '{value}'", where=f"parameter {FOLLOWERS_PARAMETER}", expected="each node once"
-        )
+        raise ConfigError(f"a node twice in '{value}'", where="parameter /lockstep", expected="each node once")
     return names
 
 
@@ -60,7 +58,7 @@ def published_counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
 
 
 def wait_for_messages(
-    endpoints: Iterable[Endpoint], numbers: Numbers, running: Callable[[], bool], before: Numbers = NONE
+    endpoints: Iterable[Endpoint], numbers: Numbers, running: Callable[[], bool], before: Numbers = NO_NUMBERS
 ) -> None:
     """Wait until the endpoints have received the messages of `numbers`, as far as these are on their topics.
 
@@ -72,7 +70,7 @@ def wait_for_messages(
 
     Raises:
         MiddlewareError: One does not arrive.
-        Ended: The node has to end.
+        ShutdownRequested: The node has to end.
     """
     for endpoint in endpoints:
         if isinstance(endpoint, RosWriter):
@@ -86,9 +84,9 @@ def _wait_for_message(
     endpoint: RosReader | RosQueue, sender: str, number: int, running: Callable[[], bool], before: int
 ) -> None:
     subscription = endpoint.subscription
-    if not wait_for(lambda: subscription.number(sender, before) == number, IN_PROGRESS, running, step=1e-4):
+    if not wait_for(lambda: subscription.number(sender, before) == number, LOCKSTEP_TIMEOUT, running, step=1e-4):
         raise MiddlewareError(
-            f"message {number} of {sender} on topic {endpoint.topic} has not arrived within {IN_PROGRESS:g} s",
+            f"message {number} of {sender} on topic {endpoint.topic} has not arrived within {LOCKSTEP_TIMEOUT:g} s",
             expected="in lock-step every message to arrive",
         )
 
@@ -97,7 +95,7 @@ def wait_for_connections(endpoints: Iterable[Endpoint], name: str, running: Call
     """Wait until all nodes that write what node `name` reads, or read what it writes, are connected to it.
 
     Raises:
-        Ended: The node has to end.
+        ShutdownRequested: The node has to end.
     """
     publishers, subscribers, _ = rosgraph.Master(name).getSystemState()
     writing = dict(publishers)
@@ -120,7 +118,7 @@ def wait_for_connections(endpoints: Iterable[Endpoint], name: str, running: Call
 
 def _wait_for_nodes(nodes: set[str], connected: Callable[[], set[str]], running: Callable[[], bool]) -> set[str]:
     """Wait until the nodes are connected; returns those that are not connected in time."""
-    wait_for(lambda: nodes <= connected(), IN_PROGRESS, running)
+    wait_for(lambda: nodes <= connected(), LOCKSTEP_TIMEOUT, running)
     return nodes - connected()
 
 

@@ -19,16 +19,10 @@ from solfer.middleware.ros.lockstep.client import (
     wait_for_connections,
     wait_for_messages,
 )
-from solfer.middleware.ros.lockstep.step_clock import CLOCK_CLOSENESS
+from solfer.middleware.ros.lockstep.step_clock import TIME_TOLERANCE
 from solfer.throttle import Throttle
 
 logger = logging.getLogger(__name__)
-
-FOLLOWER_REPLY_PERIOD = 1e-3
-"""Time between two checks for other requests while a follower makes its cycle [s]."""
-
-FOLLOWER_SLOWNESS = 2.0
-"""Time of a cycle from which on the log names the follower [s]."""
 
 
 class LockstepMember:
@@ -87,11 +81,12 @@ class LockstepMember:
             [self.before.get(key, 0) for key in received],
         )
         answer = self._thread.submit(self._proxy, request)
-        slow = time.monotonic() + FOLLOWER_SLOWNESS
-        while not wait((answer,), FOLLOWER_REPLY_PERIOD).done and running():
+        warning_period = 2.0  # [s]
+        next_warning = time.monotonic() + warning_period
+        while not wait((answer,), 1e-3).done and running():
             meanwhile()
-            if time.monotonic() > slow:
-                slow += FOLLOWER_SLOWNESS
+            if time.monotonic() > next_warning:
+                next_warning += warning_period
                 logger.warning("lock-step: time stands still until %s has made its cycle", self.name)
         if not answer.done():
             return {}
@@ -147,7 +142,7 @@ class LockstepServer:
 
     def follow(self, now: float, meanwhile: Callable[[], None]) -> None:
         """Return when the nodes have made the cycles that are due at `now` [s], and what they sent has arrived here."""
-        due = [member for member in self._members if member.there and now >= member.due - CLOCK_CLOSENESS]
+        due = [member for member in self._members if member.there and now >= member.due - TIME_TOLERANCE]
         for member in due:
             published = member.tick(now, self._newest(), meanwhile, self._running)
             if not member.there:

@@ -5,11 +5,11 @@ from collections.abc import Callable
 
 from rospy.rostime import _set_rostime as set_ros_time
 
-from solfer.middleware.ros.node.clock import CLOCK_POLL_PERIOD, RosClock, ros_time
+from solfer.middleware.ros.node.clock import POLL_PERIOD, RosClock, ros_time
 from solfer.middleware.ros.node.waiting import ShutdownRequested
 
-CLOCK_CLOSENESS = 1e-9
-"""Times that are as near as this are the same [s]."""
+TIME_TOLERANCE = 1e-9
+"""Times that differ by less are the same [s]."""
 
 
 class StepClock(RosClock):
@@ -27,8 +27,10 @@ class StepClock(RosClock):
         super().__init__(running)
         self._time = 0.0
         self._granted = False
-        self._published = self._ahead = 0.0
-        """Newest simulated time, and by how much `now` is ahead of it since that went back [s]."""
+        self._published = 0.0
+        """Newest simulated time [s]."""
+        self._ahead = 0.0
+        """By how much `now` is ahead of it since that went back [s]."""
         self._deadline: float | None = None
         self._moved = threading.Condition()
 
@@ -42,7 +44,7 @@ class StepClock(RosClock):
             self._deadline = deadline
             self._moved.notify_all()
             while not self._granted and self._running():
-                self._moved.wait(CLOCK_POLL_PERIOD)
+                self._moved.wait(POLL_PERIOD)
             self._granted = False
             self._deadline = None
 
@@ -54,15 +56,15 @@ class StepClock(RosClock):
             prepare: Called before the cycle, while the loop still sleeps.
 
         Raises:
-            Ended: The node has to end.
+            ShutdownRequested: The node has to end.
         """
         with self._moved:
             deadline = self._sleeping()
-            if time < self._published - CLOCK_CLOSENESS:
+            if time < self._published - TIME_TOLERANCE:
                 self.rewinds += 1
                 self._ahead += self._published - time
             self._published = time
-            if time + self._ahead >= deadline - CLOCK_CLOSENESS:
+            if time + self._ahead >= deadline - TIME_TOLERANCE:
                 set_ros_time(ros_time(time))
                 self._time = time + self._ahead
                 prepare()
@@ -77,5 +79,5 @@ class StepClock(RosClock):
         while self._deadline is None:
             if not self._running():
                 raise ShutdownRequested("ended in lock-step")
-            self._moved.wait(CLOCK_POLL_PERIOD)
+            self._moved.wait(POLL_PERIOD)
         return self._deadline

@@ -19,14 +19,8 @@ from solfer.middleware.ros.node.master import refuse_second
 from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 
-CLOCK_PATIENCE = 20.0
-"""Longest wait for the first time on /clock [s]: a simulator that starts beside this node needs up to 10 s."""
-
-CLOCK_POLL_PERIOD = 0.1
+POLL_PERIOD = 0.1
 """Time between two checks for a requested end, while simulated time stands still [s]."""
-
-CLOCK_RATE = 500.0
-"""Times published for each simulated second [Hz]."""
 
 
 def ros_time(seconds: float) -> genpy.Time:
@@ -72,6 +66,9 @@ class PublishingClock(RosClock):
         MiddlewareError: Another node publishes the time.
     """
 
+    RATE = 500.0
+    """Times published for each simulated second [Hz]."""
+
     def __init__(self, running: Callable[[], bool]):
         super().__init__(running)
         self._topic_publisher = TopicPublisher("/clock", ClockMessage, latch=True)
@@ -80,8 +77,8 @@ class PublishingClock(RosClock):
         self._send(0.0)
 
     def publish(self, simulated: float) -> None:
-        """Publish the simulated time [s]: RATE times in a simulated second, and when it goes back."""
-        if simulated < self._published or simulated - self._published >= 1.0 / CLOCK_RATE - 1e-9:
+        """Publish the simulated time [s]: `RATE` times in a simulated second, and when it goes back."""
+        if simulated < self._published or simulated - self._published >= 1.0 / self.RATE - 1e-9:
             self._send(simulated)
         else:
             set_ros_time(ros_time(simulated))
@@ -108,7 +105,8 @@ class SubscribingClock(RosClock):
         self._moved = threading.Condition()
         set_ros_time(genpy.Time())
         rospy.Subscriber("/clock", ClockMessage, self._receive, queue_size=1, tcp_nodelay=True)
-        if not wait_for(lambda: self._newest is not None, CLOCK_PATIENCE, running):
+        timeout = 20.0  # [s]: a simulator that starts beside this node needs up to 10 s
+        if not wait_for(lambda: self._newest is not None, timeout, running):
             raise MiddlewareError(
                 "use_sim_time is true but nothing publishes /clock",
                 expected="a simulator that runs, or rosparam set /use_sim_time false",
@@ -122,7 +120,7 @@ class SubscribingClock(RosClock):
         """See `Middleware.sleep_until`; returns as well when the end was requested."""
         with self._moved:
             while self._passed < deadline - 1e-9 and self._running():
-                self._moved.wait(CLOCK_POLL_PERIOD)
+                self._moved.wait(POLL_PERIOD)
 
     def _receive(self, message: ClockMessage) -> None:
         published = message.clock
@@ -146,7 +144,7 @@ def make_clock(running: Callable[[], bool], publishes: bool) -> RosClock:
     Raises:
         MiddlewareError: The node has to follow /clock, and no node publishes the time; or it simulates, and another
             node publishes the time.
-        Ended: The node has to end meanwhile.
+        ShutdownRequested: The node has to end meanwhile.
     """
     if not rospy.get_param("/use_sim_time", False):
         return RosClock(running)

@@ -41,7 +41,7 @@ class Launch:
         port: Port of the master.
 
     Attributes:
-        patience: Time for the nodes to end [s]; those that are left then are killed.
+        timeout: Time for the nodes to end [s]; those that are left then are killed.
         uri: URI of the master; this process uses it, too.
     """
 
@@ -50,7 +50,7 @@ class Launch:
         self._log = log
         self._port = port
         self._process: subprocess.Popen | None = None
-        self.patience = 10.0
+        self.timeout = 10.0
         self._checked = 0.0
         self.uri = f"http://localhost:{port}"
 
@@ -84,19 +84,19 @@ class Launch:
         nodes = descendants(self._process.pid)
         if not self._checked:
             self.request_end()
-        self._wait(self._checked + self.patience - time.monotonic())
+        self._wait(self._checked + self.timeout - time.monotonic())
         if self._process.poll() is None:
             self._process.terminate()
-            self._wait(0.5 * self.patience)
+            self._wait(0.5 * self.timeout)
         if self._process.poll() is None:  # its nodes have sessions of their own
             for each in (*nodes, self._process.pid):
                 with suppress(ProcessLookupError):
                     os.kill(each, signal.SIGKILL)
             self._process.wait()
 
-    def _wait(self, patience: float) -> None:
+    def _wait(self, timeout: float) -> None:
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(max(0.0, patience))
+            self._process.wait(max(0.0, timeout))
 
     def check(self) -> None:
         """Raise if the system has ended.

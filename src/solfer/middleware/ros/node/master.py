@@ -37,7 +37,7 @@ class Graph:
 
 
 class _Bounded(xmlrpc.client.Transport):
-    """A connection to a server that waits for no operation of the network longer than TIMEOUT."""
+    """A connection to a server that waits for no operation of the network longer than CALL_TIMEOUT."""
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         connection = super().make_connection(host)

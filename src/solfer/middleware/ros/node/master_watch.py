@@ -12,15 +12,6 @@ from solfer.middleware.ros.node.master import require_master
 
 logger = logging.getLogger(__name__)
 
-MASTER_PERIOD = 1.0
-"""Time between two calls [s]."""
-
-MASTER_PATIENCE = 5.0
-"""Time without an answer after which the master is gone for good [s]."""
-
-FAILED_CALLS = 3
-"""Calls that have to fail in that time: a process that stood still itself has not called often enough."""
-
 
 class MasterWatch:
     """Checks the master's number, and that it knows this node, periodically, in a thread of its own.
@@ -34,7 +25,7 @@ class MasterWatch:
         number: Returns a number that changes when the master starts again; MiddlewareError: it does not answer.
         known: Returns whether the master knows this node; raises MiddlewareError in the same way.
         period: Time between two calls [s].
-        patience: Time without an answer after which the master is lost [s].
+        timeout: Time without an answer after which the master is lost [s].
 
     Attributes:
         loss: What happened to the master, in one line; empty while all is well.
@@ -48,14 +39,14 @@ class MasterWatch:
         lost: Callable[[], None] = lambda: None,
         number: Callable[[], int] = require_master,
         known: Callable[[], bool] = lambda: True,
-        period: float = MASTER_PERIOD,
-        patience: float = MASTER_PATIENCE,
+        period: float = 1.0,
+        timeout: float = 5.0,
     ):
         self._request = number
         self._known = known
         self._lost = lost
         self._period = period
-        self._patience = patience
+        self._timeout = timeout
         self.loss = ""
         self._number = number()
         self._registered = False
@@ -74,7 +65,7 @@ class MasterWatch:
     def _watch(self) -> None:
         while not self._end.wait(self._period):
             try:
-                loss = self._look()
+                loss = self._check()
             except MiddlewareError as error:
                 loss = self._count(error.what)
             else:
@@ -86,7 +77,7 @@ class MasterWatch:
                 self._lost()
                 return
 
-    def _look(self) -> str:
+    def _check(self) -> str:
         """Describe what is wrong with a master that answers; empty: nothing."""
         if self._request() != self._number:
             return f"another ROS master answers at {rosgraph.get_master_uri()}, which does not know this node"
@@ -101,6 +92,7 @@ class MasterWatch:
         now = time.monotonic()
         if not self._failures:
             self._since = now
-            logger.warning("%s; if that stays so for %g s this node ends", failure, self._patience)
+            logger.warning("%s; if that stays so for %g s this node ends", failure, self._timeout)
         self._failures += 1
-        return failure if self._failures >= FAILED_CALLS and now - self._since >= self._patience else ""
+        # three failures at least: a process that stood still itself has not called often enough
+        return failure if self._failures >= 3 and now - self._since >= self._timeout else ""

@@ -25,9 +25,6 @@ from solfer.process import ProcessEnd
 
 logger = logging.getLogger(__name__)
 
-GRACE = 3.0
-"""Longest time that `rosnode kill` waits for the loop to bring the robot to rest [s]."""
-
 
 class RosNode:
     """A started node.
@@ -51,6 +48,9 @@ class RosNode:
         MiddlewareError: No master answers, a living node has this name, or /use_sim_time is true and no node publishes
             the time.
     """
+
+    SHUTDOWN_TIMEOUT = 3.0
+    """Longest time that `rosnode kill` waits for the loop to bring the robot to rest [s]."""
 
     def __init__(self, name: str, argv: Sequence[str] | None = None, publishes_time: bool = False):
         argv = list(sys.argv if argv is None else argv)
@@ -110,7 +110,7 @@ class RosNode:
         socket.setdefaulttimeout(CALL_TIMEOUT)  # rospy would wait for a master that hangs; new connections are not made
         rospy.signal_shutdown("end")
         # When `rosnode kill` began the shutdown, another thread is still at it.
-        self._gone.wait(GRACE)
+        self._gone.wait(self.SHUTDOWN_TIMEOUT)
         if self.loss:
             raise MiddlewareError(
                 f"node {self.name} ends: {self.loss}; start it again",
@@ -130,7 +130,7 @@ class RosNode:
         """Keep rospy from closing the topics before the loop has sent its last command."""
         self._ends.set()
         if threading.current_thread() is not threading.main_thread():
-            self._closing.wait(GRACE)
+            self._closing.wait(self.SHUTDOWN_TIMEOUT)
 
 
 def arguments(argv: Sequence[str]) -> list[str]:
@@ -159,7 +159,8 @@ class OneLine(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Pass a record on."""
         flat = copy.copy(record)
-        flat.msg, flat.args = "; ".join(line.strip() for line in record.getMessage().splitlines()), None
+        flat.msg = "; ".join(line.strip() for line in record.getMessage().splitlines())
+        flat.args = None
         for handler in logging.getLogger("rosout").handlers:
             handler.handle(flat)
 

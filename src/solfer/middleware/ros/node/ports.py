@@ -25,14 +25,14 @@ LARGEST_CALL = 2**20
 LARGEST_HEADER = 2**16
 """Bytes of the header of a connection."""
 
-PORT_PATIENCE = 10.0
+TIMEOUT = 10.0
 """Longest time that a caller may be silent, and that the header of a connection takes [s]."""
 
-CALLERS, CONNECTING, ADDRESSES = 128, 64, 256
-"""Connections of callers, connections whose headers are awaited, and publishers that are called, at the same time."""
+CALLERS = 128
+"""Connections of callers at the same time."""
 
-REST = 0.1
-"""Time after which connections are accepted again, if the process has no descriptor left [s]."""
+ADDRESSES = 256
+"""Publishers that are called at the same time."""
 
 _throttle = Throttle(logger)
 
@@ -40,7 +40,7 @@ _throttle = Throttle(logger)
 class BoundedCalls(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
     """Answers XML-RPC calls of a bounded size."""
 
-    timeout = PORT_PATIENCE
+    timeout = TIMEOUT
 
     def do_POST(self) -> None:  # noqa: N802 the name is that of the base class
         """Answer a call."""
@@ -83,7 +83,7 @@ def bound_ports() -> None:
         return
     rosgraph.xmlrpc.ThreadingXMLRPCServer = BoundedCallServer
     server = tcpros_base.TCPROSServer
-    server._tcp_server_callback = _in_threads(server._tcp_server_callback, CONNECTING)
+    server._tcp_server_callback = _in_threads(server._tcp_server_callback, most=64)
     tcpros_base.TCPServer.run = _until_shutdown(tcpros_base.TCPServer.run)
     tcpros_base.read_ros_handshake_header = read_header
     tcpros_base.logwarn = lambda text, *values: _throttle.warning("port", "%.300s", text % values if values else text)
@@ -98,7 +98,7 @@ def read_header(sock: socket.socket, buffer: BytesIO, size: int) -> dict[str, st
         ROSHandshakeException: It is too large, is no header, or does not come in time.
     """
     before = sock.gettimeout()
-    end = time.monotonic() + PORT_PATIENCE
+    end = time.monotonic() + TIMEOUT
     try:
         head = _received(sock, 4, end)
         (length,) = struct.unpack("<I", head)
@@ -170,7 +170,7 @@ def _until_shutdown(run: Callable[[Any], None]) -> Callable[[Any], None]:
                 return run(self)
             except OSError as error:
                 _throttle.warning("accept", "no connection can be accepted: %s", error)
-            time.sleep(REST)
+            time.sleep(0.1)  # until the process may have a descriptor left
             if self.is_shutdown:
                 return
 

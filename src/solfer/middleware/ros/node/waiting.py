@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-WAIT_STEP = 0.02
+CHECK_PERIOD = 0.02
 """Time between two checks [s]."""
 
 
@@ -12,12 +12,12 @@ class ShutdownRequested(Exception):
 
 
 def wait_for(
-    condition: Callable[[], object], timeout: float, running: Callable[[], bool], step: float = WAIT_STEP
+    condition: Callable[[], object], timeout: float, running: Callable[[], bool], step: float = CHECK_PERIOD
 ) -> bool:
     """Wait until `condition` holds; returns False if it does not within `timeout` [s].
 
     Raises:
-        Ended: The node has to end.
+        ShutdownRequested: The node has to end.
     """
     end = time.monotonic() + timeout
     while not condition():

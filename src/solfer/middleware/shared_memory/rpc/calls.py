@@ -7,7 +7,7 @@ from typing import Any
 
 from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
 from solfer.middleware.shared_memory.rpc.channel import DONE, RpcChannel, interface_of, packed, unpacked
-from solfer.middleware.shared_memory.rpc.services import RPC_CALLS, SERVICES, client_name, offered, services_of
+from solfer.middleware.shared_memory.rpc.services import CALLS, SERVICES, client_name, offered, services_of
 from solfer.segments.namespace import Namespace
 from solfer.segments.segment import Segment
 
@@ -40,7 +40,9 @@ class Calls:
     """
 
     def __init__(self, namespace: Namespace, node: str, now: Callable[[], float]):
-        self._namespace, self._client, self._now = namespace, client_name(node), now
+        self._namespace = namespace
+        self._client = client_name(node)
+        self._now = now
         self._offers: dict[str, Segment] = {}
         self._channels: dict[tuple[str, bytes], RpcChannel] = {}
         self.open: list[_PendingCall] = []
@@ -89,7 +91,7 @@ class Calls:
         self.open = []
         for (name, _), channel in self._channels.items():
             channel.segment.close(for_good=True)
-            self._namespace.bell(SERVICES, name).ring()
+            self._namespace.notification(SERVICES, name).send()
 
     def _advance(self, pending: _PendingCall) -> None:
         if pending.answer.done():
@@ -134,9 +136,9 @@ class Calls:
     def _channel(self, pending: _PendingCall) -> RpcChannel:
         key = pending.name, pending.interface
         if key not in self._channels:
-            path = self._namespace.place(SERVICES, pending.name, RPC_CALLS, self._client)
+            path = self._namespace.place(SERVICES, pending.name, CALLS, self._client)
             self._channels[key] = RpcChannel.open(path, pending.interface)
-            self._namespace.bell(SERVICES, pending.name).ring()
+            self._namespace.notification(SERVICES, pending.name).send()
         return self._channels[key]
 
     def _answer(self, number: int, content: Any) -> None:

@@ -8,23 +8,19 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.segments.header import HEADER_LINE
+from solfer.segments.header import CACHE_LINE
 from solfer.segments.ring import Ring
 from solfer.segments.segment import Segment
 from solfer.segments.text import Text
 
-CHANNEL_KIND = "calls"
-OPEN = 4
-"""Calls of a client that may wait for the service."""
+REQUEST_SIZE = 16384
+"""Longest request [B]."""
 
-REQUEST_SIZE, REPLY_SIZE = 16384, 131072
-"""Longest request and reply [B]."""
-
-CALL_NUMBER, CALL_COLUMNS = 0, 1
-"""Column of a call's number, in front of its text."""
+REPLY_SIZE = 131072
+"""Longest reply [B]."""
 
 DONE = "done"
-FAILED_REPLY = "failed"
+FAILED = "failed"
 
 
 def interface_of(interface: str, request: type, reply: type) -> bytes:
@@ -44,7 +40,7 @@ class MessageRing:
 
     def __init__(self, memory: memoryview, longest: int, count: int):
         self._ring = Ring(memory, self._width(longest), count, refuse=True)
-        self._text = Text(self._ring.values[CALL_COLUMNS:])
+        self._text = Text(self._ring.values[1:])
 
     @classmethod
     def size(cls, longest: int, count: int) -> int:
@@ -57,7 +53,7 @@ class MessageRing:
         Raises:
             MiddlewareError: It is longer than the longest text.
         """
-        self._ring.values[CALL_NUMBER] = number
+        self._ring.values[0] = number
         self._text.write(json.dumps(content, default=_plain).encode())
         return self._ring.write(number)
 
@@ -69,11 +65,11 @@ class MessageRing:
         """Read the next number and its content; None if there is none."""
         if not self._ring.read():
             return None
-        return int(self._ring.values[CALL_NUMBER]), json.loads(self._text.read())
+        return int(self._ring.values[0]), json.loads(self._text.read())
 
     @staticmethod
     def _width(longest: int) -> int:
-        return CALL_COLUMNS + Text.width(longest)
+        return 1 + Text.width(longest)  # the number of a call is in front of its text
 
 
 class RpcChannel:
@@ -85,10 +81,15 @@ class RpcChannel:
         replies: From the service.
     """
 
+    KIND = "calls"
+
+    DEPTH = 4
+    """Calls of the client that may wait for the service."""
+
     def __init__(self, segment: Segment):
         self.segment = segment
-        size = -(-MessageRing.size(REQUEST_SIZE, OPEN) // HEADER_LINE) * HEADER_LINE
-        self.requests = MessageRing(segment.data[:size], REQUEST_SIZE, OPEN)
+        size = -(-MessageRing.size(REQUEST_SIZE, self.DEPTH) // CACHE_LINE) * CACHE_LINE
+        self.requests = MessageRing(segment.data[:size], REQUEST_SIZE, self.DEPTH)
         self.replies = MessageRing(segment.data[size:], REPLY_SIZE, 2)
 
     @classmethod
@@ -98,8 +99,8 @@ class RpcChannel:
         Raises:
             MiddlewareError: The segment cannot be made.
         """
-        size = MessageRing.size(REQUEST_SIZE, OPEN) + HEADER_LINE + MessageRing.size(REPLY_SIZE, 2)
-        return cls(Segment.create(path, CHANNEL_KIND, interface, size=size))
+        size = MessageRing.size(REQUEST_SIZE, cls.DEPTH) + CACHE_LINE + MessageRing.size(REPLY_SIZE, 2)
+        return cls(Segment.create(path, cls.KIND, interface, size=size))
 
     @classmethod
     def join(cls, path: Path, interface: bytes) -> "RpcChannel":
@@ -108,7 +109,7 @@ class RpcChannel:
         Raises:
             MiddlewareError: There is no such segment, or its client expects another interface.
         """
-        channel = cls(Segment.attach(path, CHANNEL_KIND, interface, writable=True))
+        channel = cls(Segment.attach(path, cls.KIND, interface, writable=True))
         channel.replies.resume()
         return channel
 

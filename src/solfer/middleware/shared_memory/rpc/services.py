@@ -9,7 +9,7 @@ from typing import Any
 
 from solfer.errors import MiddlewareError, SolferError, described, located
 from solfer.interfaces.declaration import Service
-from solfer.middleware.shared_memory.rpc.channel import DONE, FAILED_REPLY, RpcChannel, interface_of, packed, unpacked
+from solfer.middleware.shared_memory.rpc.channel import DONE, FAILED, RpcChannel, interface_of, packed, unpacked
 from solfer.segments.lock import remove
 from solfer.segments.namespace import Namespace
 from solfer.segments.segment import Segment
@@ -20,8 +20,8 @@ logger = logging.getLogger(__name__)
 
 SERVICES = "services"
 OFFER = "offer"
-RPC_CALLS = "calls"
-RPC_KIND = "service"
+CALLS = "calls"
+KIND = "service"
 
 
 @dataclass
@@ -78,15 +78,15 @@ class ServiceServer:
         self._now = now
         self._worker = worker
         self._interface = interface_of(service.interface, service.request, service.reply)
-        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), RPC_KIND, self._interface, size=0)
+        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), KIND, self._interface, size=0)
         self._channels: dict[str, RpcChannel] = {}
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
-        self._bell = namespace.bell(SERVICES, self.name)
+        self._notification = namespace.notification(SERVICES, self.name)
 
     def poll(self) -> None:
         """Receive calls, and answer those that are done. To be called by the loop's thread."""
-        if self._bell.rung():
+        if self._notification.is_pending():
             self._find()
         for channel in self._channels.values():
             while (request := channel.requests.receive()) is not None:
@@ -100,7 +100,7 @@ class ServiceServer:
 
     @property
     def busy(self) -> bool:
-        """Whether there are clients, so that calls may come without a bell."""
+        """Whether there are clients, so that calls may come without a notification."""
         return bool(self._channels)
 
     def close(self) -> None:
@@ -109,10 +109,10 @@ class ServiceServer:
 
     def _find(self) -> None:
         """Join clients that are new, and clean up after those that have ended."""
-        self._bell.acknowledge()
+        self._notification.acknowledge()
         found = {}
-        for name in self._namespace.present(SERVICES, self.name, RPC_CALLS):
-            path = self._namespace.path(SERVICES, self.name, RPC_CALLS, name)
+        for name in self._namespace.present(SERVICES, self.name, CALLS):
+            path = self._namespace.path(SERVICES, self.name, CALLS, name)
             try:
                 channel = self._channels.get(name)
                 if channel is None or not channel.segment.owned():  # a client of the same name may be another one
@@ -162,9 +162,7 @@ class ServiceServer:
         try:
             return call.channel.replies.send(call.number, [DONE, packed(reply)])
         except BaseException as error:  # a component has made the reply, and may have made anything
-            return call.channel.replies.send(
-                call.number, [FAILED_REPLY, f"its reply cannot be sent: {described(error)}"]
-            )
+            return call.channel.replies.send(call.number, [FAILED, f"its reply cannot be sent: {described(error)}"])
 
     def _result(self, answer: "Future[Any]") -> Any:
         """Return the reply; a failure becomes a refusal with its message."""
@@ -189,7 +187,7 @@ def _failed(error: BaseException) -> "Future[Any]":
 def offered(namespace: Namespace, name: str) -> Segment | None:
     """Attach the offer of a service by a living process; None if there is none."""
     try:
-        segment = Segment.attach(namespace.path(SERVICES, name, OFFER), RPC_KIND)
+        segment = Segment.attach(namespace.path(SERVICES, name, OFFER), KIND)
     except MiddlewareError:
         return None
     return segment if segment.owned() else None

@@ -21,7 +21,7 @@ from solfer.middleware.shared_memory.topics.sender_segment import (
     require_message,
 )
 from solfer.middleware.shared_memory.topics.wire_records import WireRecord
-from solfer.segments.namespace import Bell, Namespace
+from solfer.segments.namespace import Namespace, Notification
 from solfer.segments.ring import Ring
 from solfer.segments.segment import Segment
 from solfer.segments.slot import NEWEST, Slot
@@ -52,7 +52,7 @@ class XbotReader(Reader):
         self._now = now
         self._kept = kept
         self._sender_segments = SenderSegments(namespace, topic, message, end=Ring if kept else Slot)
-        self._bell = self._sender_segments.bell
+        self._notification = self._sender_segments.notification
         self.publishers: list[SenderSegment] = []
         self._sources: list[SenderSegment] = []  # with those that have ended, until all of theirs is read
         if kept:
@@ -69,8 +69,8 @@ class XbotReader(Reader):
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
         news = None
-        bell = self._bell
-        quiet = bell.words[bell.place] == bell.received
+        notification = self._notification
+        quiet = notification.words[notification.place] == notification.received
         for sender_segment in self.publishers if quiet else self.update():
             if sender_segment.end.read():
                 sent = sender_segment.arrival = sender_segment.record.sent
@@ -85,7 +85,7 @@ class XbotReader(Reader):
     def update(self) -> Sequence[SenderSegment]:
         """See `Reader.update`."""
         sender_segments = self._sender_segments
-        if self._bell.words[self._bell.place] == self._bell.received:
+        if self._notification.words[self._notification.place] == self._notification.received:
             return sender_segments.current
         before = sender_segments.current
         sender_segments.update()
@@ -108,7 +108,7 @@ class XbotReader(Reader):
 
     def read_next(self) -> SenderSegment | None:
         """See `Reader.read_next`."""
-        if self._bell.words[self._bell.place] != self._bell.received:
+        if self._notification.words[self._notification.place] != self._notification.received:
             current = self.update()
             self._sources = [*(source for source in self._sources if source not in current), *current]
         oldest = None
@@ -159,7 +159,7 @@ class XbotQueue(Queue):
     def __init__(self, namespace: Namespace, topic: str, message: str, size: int):
         self.topic = topic
         self._sender_segments = SenderSegments(namespace, topic, message, end=Ring)
-        self._bell = self._sender_segments.bell
+        self._notification = self._sender_segments.notification
         self._messages: deque[Any] = deque(maxlen=size)
         self._sender_segments.update()
         for sender_segment in self._sender_segments.current:
@@ -167,7 +167,7 @@ class XbotQueue(Queue):
 
     @property
     def ends(self) -> "list[Slot | Ring]":
-        """The ends from which the messages come, until the bell of the topic rings."""
+        """The ends from which the messages come, until the notification of the topic is sent."""
         return [sender_segment.end for sender_segment in self._sender_segments.current]
 
     @property
@@ -176,8 +176,8 @@ class XbotQueue(Queue):
         return self
 
     def __bool__(self) -> bool:
-        bell = self._bell
-        if self._messages or bell.words[bell.place] != bell.received:
+        notification = self._notification
+        if self._messages or notification.words[notification.place] != notification.received:
             return True
         for sender_segment in self._sender_segments.current:
             if sender_segment.end.words[NEWEST] != sender_segment.end.sequence:
@@ -211,32 +211,33 @@ class XbotQueue(Queue):
             self.dropped += sender_segment.end.lost - lost
 
 
-class XbotMail:
+class PendingMessages:
     """Reports whether messages may wait in any of several queues, in one call.
 
     Args:
         queues: The queues.
-        bell: Rings with each bell of their namespace.
+        notification: Sent with each notification of their namespace.
     """
 
-    def __init__(self, queues: Sequence[XbotQueue], bell: Bell):
+    def __init__(self, queues: Sequence[XbotQueue], notification: Notification):
         self._queues = tuple(queues)
-        self._words = bell.words
-        self._rung = bell.place
-        self._count, self._ends = -1, tuple[Slot | Ring, ...]()
+        self._words = notification.words
+        self._place = notification.place
+        self._count = -1
+        self._ends = tuple[Slot | Ring, ...]()
 
     def __call__(self) -> bool:
         """Return it; true as well if a sender of any topic has started or ended."""
         for end in self._ends:
             if end.words[NEWEST] != end.sequence:
                 return True
-        number = self._words[self._rung]
+        number = self._words[self._place]
         if number == self._count:
             return False
         for queue in self._queues:
             if queue:
                 return True
-        # nothing has rung for these queues since they were emptied
+        # nothing was sent for these queues since they were emptied
         self._count = number
         self._ends = tuple(end for queue in self._queues for end in queue.ends)
         return False
@@ -260,7 +261,9 @@ class XbotWriter(Writer):
     def __init__(
         self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float], *, number: int = 0
     ):
-        self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
+        self.topic = topic
+        self._message = message
+        self._notification = namespace.notification(PIPES, topic)
         self.carries = message
         self._sender = sender
         self._now = now
@@ -297,7 +300,7 @@ class XbotWriter(Writer):
     def close(self) -> None:
         """Retire the segment, so that readers know that nothing more comes."""
         self._segment.close()
-        self._bell.ring()
+        self._notification.send()
 
     def _lay_out(self, message: Message) -> None:
         layout = kind_of(self._message).from_message(message)
@@ -306,4 +309,4 @@ class XbotWriter(Writer):
         self._end = Ring(self._segment.data, layout.width, SENDER_DEPTH)
         self._record = layout.bind(type_of(self._message), self._end.values, self._sender)
         self._layout = layout
-        self._bell.ring()
+        self._notification.send()

@@ -20,12 +20,6 @@ from solfer.middleware.shared_memory.topics.wire_records import (
 from solfer.segments.text import Text
 from solfer.transport.messages import FieldsMessage, Message, RefusalMessage, type_of
 
-TEXT_SIZE = 2048
-"""Longest text of a message without numbers [B]."""
-
-ROOM_MINIMUM, ROOM_MAXIMUM = 4096, 65536
-"""Bounds of the room for a message of fields [B]: a sender makes room for twice what its first one needs."""
-
 
 class NumbersLayout:
     """Layout of messages with the same names, frames and sizes.
@@ -95,7 +89,7 @@ class NumbersLayout:
 class TextLayout:
     """Layout of messages of texts, the same for all messages of a type."""
 
-    width = WIRE_COLUMNS + Text.width(TEXT_SIZE)
+    width = WIRE_COLUMNS + Text.width(2048)  # the longest text [B]
 
     @classmethod
     def from_message(cls, _message: Message) -> "TextLayout":
@@ -131,7 +125,8 @@ class FieldsLayout:
     """
 
     def __init__(self, size: int):
-        self.size, self.width = size, WIRE_COLUMNS + Text.width(size)
+        self.size = size
+        self.width = WIRE_COLUMNS + Text.width(size)
 
     @classmethod
     def from_message(cls, message: Message) -> "FieldsLayout":
@@ -141,9 +136,10 @@ class FieldsLayout:
             MiddlewareError: It is longer than the longest one.
         """
         needed = len(fields_text(message))
-        if needed > ROOM_MAXIMUM:
-            raise MiddlewareError(f"a message of {needed} bytes of text", expected=f"at most {ROOM_MAXIMUM}")
-        return cls(min(max(ROOM_MINIMUM, 2 * needed), ROOM_MAXIMUM))
+        largest = 65536  # [B]
+        if needed > largest:
+            raise MiddlewareError(f"a message of {needed} bytes of text", expected=f"at most {largest}")
+        return cls(min(max(4096, 2 * needed), largest))  # room for twice what the first message of a sender needs
 
     def fits(self, message: Message) -> bool:
         """Return whether there is room for a message."""

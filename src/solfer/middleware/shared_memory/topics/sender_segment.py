@@ -23,18 +23,18 @@ SENDER_DEPTH = 64
 """Messages that a sender keeps for readers of every one."""
 
 
-FURTHER = "#"
+SEPARATOR = "#"
 """In the file's name of a segment, between its node and the number of a further writer of that node."""
 
 
 def file_of(sender: str, number: int) -> str:
     """Return the name of the file of a node's writer: it may have several on a topic, counted from 0."""
-    return f"{sender}{FURTHER}{number}" if number else sender
+    return f"{sender}{SEPARATOR}{number}" if number else sender
 
 
 def sender_of(file: str) -> str:
     """Return the node that a segment's file belongs to; see `file_of`."""
-    return file.partition(FURTHER)[0]
+    return file.partition(SEPARATOR)[0]
 
 
 def header(message: str, sender: str, layout: Layout | None) -> bytes:
@@ -78,7 +78,7 @@ class SenderSegments:
 
     Attributes:
         changed: Whether `update` has something to do.
-        bell: Rings when it has.
+        notification: Sent when it has.
         current: The segments, in the order of their names.
         refused: Number of segments that are damaged, or carry another message.
 
@@ -92,13 +92,15 @@ class SenderSegments:
         self._message = message
         self._end = end
         self.current: list[SenderSegment] = []
-        self.refused, self._throttle, self.bell = 0, Throttle(logger), namespace.bell(PIPES, topic)
-        self.changed = self.bell.rung
+        self.refused = 0
+        self._throttle = Throttle(logger)
+        self.notification = namespace.notification(PIPES, topic)
+        self.changed = self.notification.is_pending
         require_message(namespace, topic, message)
 
     def update(self) -> None:
         """Open segments that are new, and drop those that have ended."""
-        self.bell.acknowledge()
+        self.notification.acknowledge()
         known = {
             sender_segment.segment.path: sender_segment
             for sender_segment in self.current

@@ -11,8 +11,14 @@ import numpy as np
 from solfer.segments.text import Text
 from solfer.transport.messages import JOINT_FIELDS, FieldsMessage, JointMessage, Message, copied
 
-SENT_COLUMN, STAMP_COLUMN, WIRE_COLUMNS = 0, 1, 2
-"""Columns in front of those of the message: when it was sent and its own stamp, both [s]; number of these columns."""
+SENT_COLUMN = 0
+"""Column in front of those of the message: when it was sent [s]."""
+
+STAMP_COLUMN = 1
+"""Column in front of those of the message: its own stamp [s]."""
+
+WIRE_COLUMNS = 2
+"""Number of these columns."""
 
 SEPARATE_FIELDS = ("stamp", "sender", "rows", "block")
 """Fields that are kept apart: those that every message has, and how its numbers lie."""

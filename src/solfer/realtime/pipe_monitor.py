@@ -8,16 +8,10 @@ from typing import Protocol
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware
 
-LOOKOUT_PERIOD = 1.0
-"""Time between two looks [s]."""
-
-LOOKOUT_PAUSE = 0.002
-"""Time between the reports of two pipes [s]: the loop needs the interpreter meanwhile."""
-
 Reports = Iterable[tuple[str, HealthReport]]
 
 
-class Looking(Protocol):
+class PeerSearch(Protocol):
     """Looks for the peers of a plugin; see `solfer.plugins.peers.Peers`.
 
     Attributes:
@@ -35,7 +29,7 @@ class Looking(Protocol):
         """Return what is wrong, in one line; empty: nothing."""
 
 
-class Lookout:
+class PipeMonitor:
     """A thread that looks for peers, reports missing ones as `<plugin> pipes`, and the health of each pipe.
 
     Args:
@@ -44,7 +38,10 @@ class Lookout:
         pipes: Yields the names and the health of the pipes, for each plugin.
     """
 
-    def __init__(self, peers: Mapping[str, Looking], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
+    PERIOD = 1.0
+    """Time between two checks [s]."""
+
+    def __init__(self, peers: Mapping[str, PeerSearch], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
         self._peers = dict(peers)
         self._middleware = middleware
         self._pipes = pipes
@@ -59,14 +56,14 @@ class Lookout:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._end.wait(LOOKOUT_PERIOD):
+        while not self._end.wait(self.PERIOD):
             for name, peers in self._peers.items():
                 if not peers.done:
                     peers.look()
                     self._report(name, peers.warning())
             for part, report in chain.from_iterable(pipes() for pipes in self._pipes):
                 self._middleware.report(part, report.level, report.summary, report.values)
-                if self._end.wait(LOOKOUT_PAUSE):
+                if self._end.wait(0.002):  # the loop needs the interpreter between two reports
                     return
 
     def _report(self, name: str, warning: str) -> None:

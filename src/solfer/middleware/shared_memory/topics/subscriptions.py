@@ -6,11 +6,11 @@ from solfer.errors import MiddlewareError
 from solfer.segments.namespace import Namespace
 from solfer.segments.segment import Segment
 
-EAR_KIND = "ear"
-EARS = "ears"
+KIND = "ear"
+FOLDER = "ears"
 
 
-class Ears:
+class Subscriptions:
     """The topics to which a node subscribes: an empty segment for each, which lives as long as the node.
 
     Args:
@@ -23,7 +23,7 @@ class Ears:
         self._name = name
         self._segments: dict[str, Segment | None] = {}
 
-    def listen(self, topic: str, message: str, declared: bool = False) -> None:
+    def add(self, topic: str, message: str, declared: bool = False) -> None:
         """Register this node as a subscriber of a message; no effect if one of its name is.
 
         Args:
@@ -34,10 +34,10 @@ class Ears:
         if topic in self._segments:
             return
         try:
-            path = self._namespace.place(EARS, topic, self._name)
+            path = self._namespace.place(FOLDER, topic, self._name)
             content = json.dumps({"message": message, "declared": declared}).encode()
-            self._segments[topic] = Segment.create(path, EAR_KIND, content, size=0)
-            self._namespace.bell(EARS, topic).ring()
+            self._segments[topic] = Segment.create(path, KIND, content, size=0)
+            self._namespace.notification(FOLDER, topic).send()
         except MiddlewareError:
             self._segments[topic] = None
 
@@ -46,5 +46,5 @@ class Ears:
         for topic, segment in self._segments.items():
             if segment is not None:
                 segment.close()
-                self._namespace.bell(EARS, topic).ring()
+                self._namespace.notification(FOLDER, topic).send()
         self._segments.clear()

@@ -4,8 +4,7 @@ import time
 
 import pytest
 
-from solfer.realtime import lookout
-from solfer.realtime.lookout import Lookout
+from solfer.realtime.pipe_monitor import PipeMonitor
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
@@ -13,20 +12,20 @@ WAIT = 30.0  # [s]
 
 
 class Peers:
-    """Peers that complain as a test says, look by look, and are found after that."""
+    """Peers that are missing as a test says, look by look, and are found after that."""
 
-    def __init__(self, *complaints):
-        self._complaints, self.looks = list(complaints), 0
+    def __init__(self, *warnings):
+        self._warnings, self.looks = list(warnings), 0
 
     @property
     def done(self):
-        return self.looks == len(self._complaints)
+        return self.looks == len(self._warnings)
 
     def look(self):
-        self.looks = min(self.looks + 1, len(self._complaints))
+        self.looks = min(self.looks + 1, len(self._warnings))
 
     def warning(self):
-        return self._complaints[self.looks - 1]
+        return self._warnings[self.looks - 1]
 
 
 class Reports:
@@ -48,13 +47,13 @@ def until(condition):
 
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch):
-    monkeypatch.setattr(lookout, "LOOKOUT_PERIOD", 0.001)
+    monkeypatch.setattr(PipeMonitor, "PERIOD", 0.001)
 
 
-def test_each_new_complaint_is_reported_once():
+def test_each_new_warning_is_reported_once():
     reports = Reports()
     peers = {"one": Peers("no topic", "no topic", "no node", ""), "two": Peers("", ""), "three": Peers("late")}
-    seen = Lookout(peers, reports, ())
+    seen = PipeMonitor(peers, reports, ())
     until(lambda: all(each.done for each in peers.values()))
     seen.close()
     assert [report for report in reports.all if report[0] == "one pipes"] == [
@@ -67,10 +66,10 @@ def test_each_new_complaint_is_reported_once():
     ]
 
 
-def test_close_ends_a_lookout_that_still_looks(monkeypatch):
-    monkeypatch.setattr(lookout, "LOOKOUT_PERIOD", WAIT)
+def test_close_ends_a_monitor_that_still_looks(monkeypatch):
+    monkeypatch.setattr(PipeMonitor, "PERIOD", WAIT)
     peers = Peers("missing", "missing")
-    seen = Lookout({"one": peers}, Reports(), ())
+    seen = PipeMonitor({"one": peers}, Reports(), ())
     seen.close()
     assert peers.looks == 0 and not seen._thread.is_alive()
 
@@ -82,7 +81,7 @@ def test_pipes_are_reported_again_and_again_also_when_all_peers_are_found():
         yield "one feedback imu", HealthReport(Health.WARNING, "late", {"messages": next(figures)})
         yield "one controller left", HealthReport(Health.GOOD, "sent", {})
 
-    seen = Lookout({"one": Peers("")}, reports, [pipes])
+    seen = PipeMonitor({"one": Peers("")}, reports, [pipes])
     until(lambda: len(reports.all) >= 4)
     seen.close()
     assert reports.all[:3] == [
