@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.cli.tables.scenario import ScenarioTrace
 from solfer.recording.review import (
-    DESIRED_LINE_COLOR,
+    DESIRED_COLOR,
     FIRST_COLOR,
     SECOND_COLOR,
     draw,
@@ -31,7 +31,7 @@ def scenario_page(trace: ScenarioTrace) -> "Figure":
         along = trace.vertices[:, leg, 0]
         across = trace.vertices[:, leg, 1]
         above.plot(
-            x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED_LINE_COLOR, linewidth=0.7
+            x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED_COLOR, linewidth=0.7
         )
     above.plot(x, y, color=FIRST_COLOR)
     ends = np.cumsum((0, *trace.scenario.periods))

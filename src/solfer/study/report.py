@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.errors import StudyError, UnknownName
-from solfer.recording.review import CANVAS_FONT, FIRST_COLOR, WRONG, check_suffix, new_figure, save
+from solfer.recording.review import FIRST_COLOR, FONT_SIZE, WRONG_COLOR, check_suffix, new_figure, save
 from solfer.study.folder import RECORDING, RUNS, StudyFolder, write_whole
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _histogram(rows: Sequence[Row], name: str) -> str:
     figure = new_figure(3.4, 2.2)
     axes = figure.add_subplot()
     parts = [values[counts & ~failed], values[counts & failed]]
-    axes.hist(parts, bins=30, stacked=True, color=[FIRST_COLOR, WRONG])
+    axes.hist(parts, bins=30, stacked=True, color=[FIRST_COLOR, WRONG_COLOR])
     axes.set_xlabel(name)
     axes.set_ylabel("runs")
     return _picture(figure)
@@ -234,9 +234,9 @@ def _plot(folder: StudyFolder, run_id: str) -> str:
     for place, (name, column) in enumerate(zip(names, values, strict=True)):
         axes = figure.add_subplot(down, across, place + 1)
         axes.plot(times, column, color=FIRST_COLOR, linewidth=1.0)
-        axes.set_title(name, fontsize=CANVAS_FONT)
-        axes.tick_params(labelsize=CANVAS_FONT)
-    axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
+        axes.set_title(name, fontsize=FONT_SIZE)
+        axes.tick_params(labelsize=FONT_SIZE)
+    axes.set_xlabel("time [s]", fontsize=FONT_SIZE)
     recorded = (
         f"<p>recording: <code>{html.escape(str(run / RECORDING))}</code></p>" if (run / RECORDING).exists() else ""
     )

@@ -123,13 +123,13 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
     Raises:
         RecordingError: The picture cannot be written.
     """
-    from solfer.recording.review import REPLAY_ROWS, replay_page, save
+    from solfer.recording.review import MAX_REPLAY_ROWS, replay_page, save
 
     recorded = recorded_commands(replay)
     rows = replay.rows
-    chosen = [(each.channel, each.column) for each in found.different[:REPLAY_ROWS]] or [
+    chosen = [(each.channel, each.column) for each in found.different[:MAX_REPLAY_ROWS]] or [
         (name, column) for name, channel in replay.commands.items() if name in recorded for column in channel.columns
-    ][:REPLAY_ROWS]
+    ][:MAX_REPLAY_ROWS]
     both = replay.running & rows.running
     tracks = []
     for name, column in chosen:
