@@ -110,10 +110,10 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
     yield from aligned([head, *lines], "  ")
     if len(found.different) > TABLE_LINES:
         yield f"  ... and {len(found.different) - TABLE_LINES} more"
-    doubts = list(replay.doubts())
-    for text in doubts:
+    unrepeated = list(replay.unrepeated_inputs())
+    for text in unrepeated:
         yield f"cannot be repeated: {text}"
-    if not doubts:
+    if not unrepeated:
         yield "all inputs were repeated: it is the component that differs, or it reads the clock or random numbers"
 
 
