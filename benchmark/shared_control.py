@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from form import Figures, parser_of
 
-from solfer.demo.story import MOVE_JOINTS, MoveJoints, Reply
+from solfer.demo.story import MoveJoints, Reply
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
 from solfer.supervision import supervise
@@ -79,7 +79,7 @@ def measure(middleware: RosMiddleware, seconds: float, rate: float, figures: Fig
     time.sleep(1.0)
     for plugin, (joint, goal) in JOINTS.items():
         request = MoveJoints(joints=(joint,), positions=(goal,), speed=SPEED)
-        middleware.call(f"{plugin}/trajectory", MOVE_JOINTS, request, Reply, 3.0)
+        middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply, 3.0)
     before, start = processor_times(), time.monotonic()
     time.sleep(seconds)
     after, passed = processor_times(), time.monotonic() - start

@@ -7,7 +7,7 @@ from typing import Any
 from solfer.config import CheckReport, Notice
 from solfer.errors import SolferError
 
-FINDING_PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*))?", re.DOTALL)
+_PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*))?", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def _of_notice(notice: Notice) -> Finding:
 
 
 def _place(where: str) -> tuple[str, int | None, int | None, str]:
-    match = FINDING_PLACE.fullmatch(where)
+    match = _PLACE.fullmatch(where)
     if match is None:
         return where, None, None, ""
     return match["file"], int(match["line"]), int(match["column"]), match["path"] or ""

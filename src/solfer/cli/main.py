@@ -42,8 +42,6 @@ SUB_COMMANDS = {
 MOST_ERRORS = 20
 """Largest number of errors of one input that are printed."""
 
-PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE ended
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
@@ -59,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         finally:
             sys.stdout.flush()
     except BrokenPipeError:  # the reader, such as `head`, has ended
-        code = PIPE_CLOSED
+        code = 141  # that a shell reports for a process that SIGPIPE ended
     except OSError as error:  # such as a full disk behind the output
         failure = SolferError(
             error.strerror or str(error),

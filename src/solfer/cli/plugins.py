@@ -18,16 +18,13 @@ from solfer.robot import robot_files
 
 _LOG = logging.getLogger(__name__)
 
-_DECLARED_KINDS = {
+_KINDS = {
     Service: "service",
     TopicIn: "topic in",
     TopicOut: "topic out",
     Action: "action",
     Parameter: "parameter",
 }
-
-DECLARED_EMPTY = "solfer.components:Component"
-"""The component that does nothing: its plugin maps what its pipes receive."""
 
 
 def report_of(options: argparse.Namespace) -> CheckReport:
@@ -69,7 +66,7 @@ def component_of(configuration: Configuration) -> str:
     """Return the name of a configuration's component: its class, or the known plugin that the configuration is for."""
     module = configuration.module
     registry = Registry()
-    if module.class_ == DECLARED_EMPTY:
+    if module.class_ == "solfer.components:Component":  # its plugin maps what its pipes receive
         return "no algorithm"
     if module.class_ is not None:
         return module.class_.rpartition(":")[2]
@@ -131,7 +128,7 @@ def known_declarations(configuration: Configuration) -> tuple[Declared, ...]:
 
 def _printed(owner: str, declaration: Declaration) -> Declared:
     interface = declaration.kind.__name__ if isinstance(declaration, Parameter) else declaration.interface
-    return Declared(_DECLARED_KINDS[type(declaration)], full_name(owner, declaration.name), interface)
+    return Declared(_KINDS[type(declaration)], full_name(owner, declaration.name), interface)
 
 
 def network_of(file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()) -> Network:

@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.cli.tables.scenario import ScenarioTrace
 from solfer.recording.review import (
-    DESIRED_LINE_COLOR,
+    DESIRED_COLOR,
     FIRST_COLOR,
     SECOND_COLOR,
     draw,
@@ -30,9 +30,7 @@ def scenario_page(trace: ScenarioTrace) -> "Figure":
     for leg in range(trace.scenario.legs):
         along = trace.vertices[:, leg, 0]
         across = trace.vertices[:, leg, 1]
-        above.plot(
-            x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED_LINE_COLOR, linewidth=0.7
-        )
+        above.plot(x + cos * along - sin * across, y + sin * along + cos * across, color=DESIRED_COLOR, linewidth=0.7)
     above.plot(x, y, color=FIRST_COLOR)
     ends = np.cumsum((0, *trace.scenario.periods))
     above.plot(x[ends], y[ends], "o", color=SECOND_COLOR, markersize=3)

@@ -15,18 +15,10 @@ from solfer.simulation.rendering.renderer import Renderer
 from solfer.transport import Middleware
 
 LOW = "mammal_wide_straight"
+"""Named state with straight legs, in which the robot begins."""
+
 HIGH = "mammal_wide_high"
-DISTANCE = 0.5
-"""Distance that the robot drives [m]."""
-
-UPPER_BODY_GOAL = {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}
-"""Goal of the upper body while the legs rise [rad]."""
-
-DRAWN_JOINTS = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
-"""Joints whose tracking is drawn."""
-
-SIMULATION_REPORT = "simulation"
-"""Name of its health report."""
+"""Named state in which the legs have risen."""
 
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ended."""
@@ -48,12 +40,12 @@ class Progress:
 
     def __call__(self, title: str, passed: float, duration: float) -> None:
         """Show that `passed` of `duration` [s] of a step are over."""
-        part = 1.0 if duration <= 0.0 else min(1.0, passed / duration)
-        line = f"  {title:<26} [{'#' * round(24 * part):<24}] {passed:4.1f} s"
+        fraction = 1.0 if duration <= 0.0 else min(1.0, passed / duration)
+        line = f"  {title:<26} [{'#' * round(24 * fraction):<24}] {passed:4.1f} s"
         if self._live:
-            print(f"\r{line}", end="\n" if part >= 1.0 else "", flush=True)
-            self._open = part < 1.0
-        elif part >= 1.0:
+            print(f"\r{line}", end="\n" if fraction >= 1.0 else "", flush=True)
+            self._open = fraction < 1.0
+        elif fraction >= 1.0:
             print(line, flush=True)
 
     def end(self) -> None:
@@ -100,11 +92,12 @@ def demonstrate(
 def steps_of(robot: Robot, recorder: MotionRecorder) -> list[story.StoryStep]:
     """Return the story: legs rise while the torso turns, both go back, and the robot drives there and back."""
     forward, radius = wheels(robot, recorder)
+    distance = 0.5  # [m]
     return [
-        *story.raised(HIGH, UPPER_BODY_GOAL),
+        *story.raised(HIGH, {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}),
         *story.posture(LOW),
-        *story.drive(DISTANCE, radius, forward),
-        *story.drive(-DISTANCE, radius, forward),
+        *story.drive(distance, radius, forward),
+        *story.drive(-distance, radius, forward),
     ]
 
 
@@ -116,10 +109,11 @@ def conclude(show: story.Show, robot: Robot, recorder: MotionRecorder, plugin: s
     tracking = show.output / "demo_tracking.png"
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
         renderer.save(posture(robot, recorder), picture)
-    report.plot(recorder, DRAWN_JOINTS, tuple(forward), path=tracking)
+    drawn = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
+    report.plot(recorder, drawn, tuple(forward), path=tracking)
     print(
         report.format_table(
-            report.table(recorder, parts(robot), show.middleware.reports(), plugin=plugin, simulator=SIMULATION_REPORT)
+            report.table(recorder, parts(robot), show.middleware.reports(), plugin=plugin, simulator="simulation")
         )
     )
     print(f"pictures: {picture}, {tracking}")

@@ -17,21 +17,8 @@ from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.health import Health
 from solfer.transport.plugin_state import SAFE_STOP
 
-COURSE = "package://solfer/config/figures/course.yaml"
-"""The scenario that is played."""
-
 COURSE_RATE = 50.0
 """Of navigation and of what waves [Hz]."""
-
-BRAKING_TIME, REST_SPEED, MANY = 3.0, 0.05, 20
-"""Longest time in which it comes to rest, on a busy machine [s], and the largest speed of a wheel there [rad/s], in so
-many messages: a body that rocks on its legs turns the wheels to and fro, and they stand for a moment between."""
-
-NEARLY = 0.999
-"""Largest share of the way that is shown before its end."""
-
-FORGIVING = 5.0
-"""How long a part of the system may be in error [s]."""
 
 STEP_TITLES = {
     2: "drives, becomes narrower",
@@ -47,7 +34,7 @@ class RealTimeLost(MiddlewareError):
     """A real-time layer has stopped the robot safely: its cycles took too long for this machine."""
 
 
-class Complaints:
+class ErrorWatch:
     """Ends a demonstration whose robot does not work any more.
 
     Args:
@@ -55,7 +42,8 @@ class Complaints:
     """
 
     def __init__(self, middleware: Middleware):
-        self._middleware, self._since = middleware, dict[str, float]()
+        self._middleware = middleware
+        self._since: dict[str, float] = {}
 
     def check(self) -> None:
         """Look at all reports; to be called several times a second.
@@ -68,7 +56,7 @@ class Complaints:
         reports = {name: report for name, report in self._middleware.reports().items() if report.level is Health.ERROR}
         self._since = {name: self._since.get(name, now) for name in reports}
         for name, since in self._since.items():
-            if now - since <= FORGIVING:
+            if now - since <= 5.0:  # a node may recover
                 continue
             if SAFE_STOP in reports[name].summary:
                 raise RealTimeLost(
@@ -121,7 +109,7 @@ class Driving:
         cycles = 0
         shown = ""
         robot_begin = robot_time(self._recorder)
-        complaints = Complaints(middleware)
+        errors = ErrorWatch(middleware)
 
         def cycle(_: float, skipped: int) -> None:
             nonlocal cycles, shown
@@ -130,14 +118,14 @@ class Driving:
             self._recorder.look()
             if cycles % 10 == 0:
                 check()
-                complaints.check()
+                errors.check()
                 title = (
                     f"waits for {navigation.waits}" if navigation.waits else STEP_TITLES.get(course.number, course.name)
                 )
                 if title != shown:
                     progress.end()
                     shown = title
-                progress(title, min(whole - course.left, NEARLY * whole), whole)
+                progress(title, min(whole - course.left, 0.999 * whole), whole)
             cycles += 1
 
         try:
@@ -153,9 +141,10 @@ class Driving:
 
     def _rest(self, course: ScenarioCourse) -> None:
         """Let the robot come to rest, as far as it does so soon."""
-        end = time.monotonic() + BRAKING_TIME
+        end = time.monotonic() + 3.0  # enough on a busy machine
         looks = 0
-        while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(MANY) >= REST_SPEED):
+        # of many messages: a body that rocks rolls the wheels to and fro, and they stand for a moment between
+        while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(20) >= 0.05):
             course.rest()
             time.sleep(1.0 / COURSE_RATE)
             self._recorder.look()
@@ -198,4 +187,5 @@ def wait_for_robot(
     robot.state.position[:] = posture(robot, recorder)
     robot.update()
     legs = Robot.load(middleware.parameter("/robot_lower_body"))
-    return Driving(middleware, recorder, robot, legs=legs, course=located(COURSE, "."))
+    course = located("package://solfer/config/figures/course.yaml", ".")
+    return Driving(middleware, recorder, robot, legs=legs, course=course)

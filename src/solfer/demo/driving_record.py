@@ -14,9 +14,6 @@ RECORDED_TOPICS = {
 }
 """Topics that are received: topic, message, and what it is for people."""
 
-WHEEL_PREFIX = "j_wheel_"
-"""Beginning of the names of the wheels' joints."""
-
 
 class DrivingRecorder:
     """Collects all messages of the topics; call `look` many times a second.
@@ -64,7 +61,7 @@ class DrivingRecorder:
             for message in self._messages["measured"][-count:]
             if isinstance(message, JointMessage)
             for name, speed in zip(message.names, message.velocity, strict=True)
-            if name.startswith(WHEEL_PREFIX)
+            if name.startswith("j_wheel_")
         )
         return max(wheels, default=0.0)
 

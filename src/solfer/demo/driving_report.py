@@ -13,17 +13,14 @@ from solfer.recording.model import Channel, Recording
 from solfer.robot import Robot
 from solfer.transport.middleware import HealthReport
 
-LIMIT_PERIOD = 0.04
-"""Time between two looks at the robot [s]."""
+SAMPLE_PERIOD = 0.04
+"""Period in which the motion of the robot is sampled [s]."""
 
-RING, TUBE = 0.01, 0.068
-"""Radii of a wheel [m]."""
+RING_RADIUS = 0.01
+"""Radius of a wheel's ring, to the centre of its tube [m]."""
 
-REAL_TIME_FACTOR, LEFT_OUT = 0.95, 0.1
-"""Real-time factor below which, and share of left-out periods above which, real time was not held."""
-
-DRIFT, LIMIT_HEADING, LIMIT_HANDS, LIMIT_TILT = 0.3, 0.8, 50.0, 30.0
-"""Largest figures: odometry against truth [% of the way, degrees], hands [mm], and lean of what stands [degrees]."""
+TUBE_RADIUS = 0.068
+"""Radius of a wheel's tube [m]."""
 
 EXCESS_MARK = "  <-- more than "
 """Marks a figure that is larger than it may be."""
@@ -109,7 +106,7 @@ def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
     rows = []
     last = -math.inf
     for message in recorder.messages("base"):
-        if message.stamp - last < LIMIT_PERIOD or message.stamp > times[-1]:
+        if message.stamp - last < SAMPLE_PERIOD or message.stamp > times[-1]:
             continue
         last = message.stamp
         q = robot.state.position
@@ -121,12 +118,12 @@ def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
         cos = math.cos(heading)
         sin = math.sin(heading)
-        turn = np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))
+        yaw = np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))
         legs.kinematics.update(q[of_legs])
         tracked = legs.kinematics.center_of_mass[:2].copy()
         robot.center_of_mass.update()
-        center = turn.T @ (robot.center_of_mass.value - place)
-        vertices = np.array([(_vertex(robot, wheel) - place) @ turn for wheel in WHEEL_NAMES])[:, :2]
+        center = yaw.T @ (robot.center_of_mass.value - place)
+        vertices = np.array([(_vertex(robot, wheel) - place) @ yaw for wheel in WHEEL_NAMES])[:, :2]
         hands = np.array(list(hands_of(robot).values()))
         rows.append((last, q.copy(), np.array((place[0], place[1], heading)), tracked, center, vertices, hands))
     time, position, base, *others = (np.array(column) for column in zip(*rows, strict=True))
@@ -137,7 +134,7 @@ def _vertex(robot: Robot, wheel: str) -> np.ndarray:
     """Return the lowest point of a wheel in the world [m]."""
     axle = robot.kinematics.rotation(wheel)[:, 2]
     down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
-    return robot.kinematics.position(wheel) - RING * down / np.linalg.norm(down) - (0.0, 0.0, TUBE)
+    return robot.kinematics.position(wheel) - RING_RADIUS * down / np.linalg.norm(down) - (0.0, 0.0, TUBE_RADIUS)
 
 
 def _from_begin(base: np.ndarray) -> np.ndarray:
@@ -180,16 +177,16 @@ def table(
     turned = math.degrees(float(seen.base[-1, 2]))
     moved = np.linalg.norm(seen.center - seen.center[0], axis=1)
     width = seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]
-    lean = math.degrees(float(np.abs(seen.position[:, 3:5]).max()))
+    tilt = math.degrees(float(np.abs(seen.position[:, 3:5]).max()))
     driven = f"{distance:.2f} m, turned by {turned:.0f} degrees"
     rows = [
-        ("driven", driven + bounded(lean, LIMIT_TILT, "degrees of lean: it fell")),
+        ("driven", driven + bounded(tilt, 30.0, "degrees of tilt: it fell")),
         ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
         *((title, _size(each.distances)) for title, each in places.items() if title != "hands"),
-        ("hands", _size(off := places["hands"].distances) + bounded(1e3 * float(off.max()), LIMIT_HANDS, "mm")),
+        ("hands", _size(off := places["hands"].distances) + bounded(1e3 * float(off.max()), 50.0, "mm")),
         ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),
         ("odometry against truth", _drift(recorder, seen, distance)),
-        ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),
+        ("slip, fraction of the way of wheels", f"{_slip(robot, recorder):.1e}"),
         ("forces of the ground", _forces(robot, recorder)),
     ]
     return rows + _health(reports) + layer(reports)
@@ -202,10 +199,10 @@ def _drift(recorder: DrivingRecorder, seen: Seen, distance: float) -> str:
     x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
     off = math.hypot(x, y)
     turned = math.degrees(math.remainder(heading, math.tau))
-    part = 100.0 * off / distance if distance > 0.1 else 0.0
-    share = f", {part:.2f} % of the way" if part else ""
-    figure = f"{1e3 * off:.1f} mm{share}, {turned:.2f} degrees at the end"
-    return figure + bounded(part, DRIFT, "%") + bounded(abs(turned), LIMIT_HEADING, "degrees")
+    percent = 100.0 * off / distance if distance > 0.1 else 0.0
+    of_distance = f", {percent:.2f} % of the way" if percent else ""
+    figure = f"{1e3 * off:.1f} mm{of_distance}, {turned:.2f} degrees at the end"
+    return figure + bounded(percent, 0.3, "%") + bounded(abs(turned), 0.8, "degrees")
 
 
 def bounded(value: float, most: float, unit: str) -> str:
@@ -220,7 +217,7 @@ def _heading(quaternion: np.ndarray) -> float:
 
 
 def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
-    """Compute the displacement of the wheels' material over the ground, as a share of the path of their centres."""
+    """Compute the displacement of the wheels' material over the ground, as a fraction of the path of their centres."""
     joints = recorder.messages("measured")
     times = np.array([each.stamp for each in joints])
     dofs = [robot.dof(name) for name in joints[0].names]
@@ -228,7 +225,7 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
     last = -math.inf
     slid = gone = 0.0
     for message in recorder.messages("base"):
-        if message.stamp - last < LIMIT_PERIOD or message.stamp > times[-1]:
+        if message.stamp - last < SAMPLE_PERIOD or message.stamp > times[-1]:
             continue
         last = message.stamp
         q = robot.state.position
@@ -245,7 +242,7 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
             rates = kinematics.jacobian(wheel) @ v
             center = rates[:3] + linear + np.cross(angular, kinematics.position(wheel) - place)
             spin = rates[3:] + angular
-            material = center + np.cross(spin, (0.0, 0.0, -RING - TUBE))
+            material = center + np.cross(spin, (0.0, 0.0, -RING_RADIUS - TUBE_RADIUS))
             slid += float(np.linalg.norm(material[:2]))
             gone += float(np.linalg.norm(center[:2]))
     return slid / gone if gone else 0.0
@@ -286,17 +283,18 @@ def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waite
     """
     if waited:
         return ""
-    share = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
+    lowest_factor = 0.95
+    factor = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
     lost = float(reports["simulation"].values.get("time lost [s]", 0.0)) if "simulation" in reports else 0.0
     reasons = (
         [f"{lost:.1f} s of simulated time were lost"]
-        if share < REAL_TIME_FACTOR or lost > (1.0 - REAL_TIME_FACTOR) * taken
+        if factor < lowest_factor or lost > (1.0 - lowest_factor) * taken
         else []
     )
     for name in (*PLUGINS, LAYER):
         values = reports[name].values if name in reports else {}
         skipped, cycles = (float(values.get(key, 0.0)) for key in ("skipped periods", "cycles"))
-        if skipped > LEFT_OUT * (skipped + cycles):
+        if skipped > 0.1 * (skipped + cycles):
             reasons.append(f"{name} left out {100.0 * skipped / (skipped + cycles):.0f} % of its periods")
     if not reasons:
         return ""

@@ -6,9 +6,6 @@ import numpy as np
 
 from solfer.transport import BodyMessage, JointMessage, Middleware
 
-CLOCK_WINDOW = 0.5
-"""Time to both sides in which the fastest message counts [s]; it takes a millisecond or two."""
-
 
 class ArrivalClock:
     """Reports when messages arrived, by stamps of a clock that may run more slowly, or have begun at another time."""
@@ -30,8 +27,9 @@ class ArrivalClock:
         known = np.array(self._stamps)
         arrivals = np.array(self._arrivals)
         delays = arrivals - known
-        begins = np.searchsorted(arrivals, arrivals - CLOCK_WINDOW)
-        ends = np.searchsorted(arrivals, arrivals + CLOCK_WINDOW)
+        window = 0.5  # to both sides [s]: the fastest message in it takes a millisecond or two
+        begins = np.searchsorted(arrivals, arrivals - window)
+        ends = np.searchsorted(arrivals, arrivals + window)
         fastest = [delays[begin:end].min() for begin, end in zip(begins, ends, strict=True)]
         return stamps + np.interp(stamps, known, fastest)
 

@@ -15,7 +15,8 @@ Row = tuple[str, str]
 LAYER = "xbotcore"
 """Name of the report of a real-time layer."""
 
-AGE_SUFFIX, GATE_PREFIX = " age [ms]", "gate: "
+_AGE_SUFFIX = " age [ms]"
+_GATE_PREFIX = "gate: "
 """Keys of a plugin's report: ages of its feedbacks, counts of its gates."""
 
 
@@ -99,12 +100,14 @@ def layer(reports: Mapping[str, HealthReport]) -> list[Row]:
 def published(values: Mapping[str, float | str]) -> list[Row]:
     """List the age of the newest message of each feedback, and the counts of the plugin's gate, as far as known."""
     ages = [
-        (f"age of {key.removesuffix(AGE_SUFFIX)}", f"{float(age):.1f} ms")
+        (f"age of {key.removesuffix(_AGE_SUFFIX)}", f"{float(age):.1f} ms")
         for key, age in values.items()
-        if key.endswith(AGE_SUFFIX)
+        if key.endswith(_AGE_SUFFIX)
     ]
     counts = {
-        key.removeprefix(GATE_PREFIX): int(float(count)) for key, count in values.items() if key.startswith(GATE_PREFIX)
+        key.removeprefix(_GATE_PREFIX): int(float(count))
+        for key, count in values.items()
+        if key.startswith(_GATE_PREFIX)
     }
     listed = ", ".join(f"{count} {kind}" for kind, count in counts.items())
     return [*ages, ("held back by the gate", listed)] if listed else ages

@@ -19,9 +19,6 @@ from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.world import find_world, read_world
 from solfer.transport.middleware import HealthReport
 
-COURSE_WORLD = "gate"
-"""The world of the course."""
-
 MISSED = 3
 """Exit code of a demonstration that ran to its end, with figures that are not what they are to be."""
 
@@ -58,7 +55,7 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
     """
     robot = found.robot
     recording = read(file)
-    world = read_world(find_world(COURSE_WORLD))
+    world = read_world(find_world("gate"))
     seen = driving_report.see(robot, found.legs, found.recorder)
     places = driving_report.tracked(found.recorder, seen, recording)
     rows = driving_report.table(robot, found.recorder, seen, places=places, reports=found.reports)

@@ -11,15 +11,6 @@ from solfer.demo.record import MotionRecorder
 from solfer.demo.waving import Waving, hands_of, robot_time
 from solfer.robot import Robot
 
-WAVES = 10.0
-"""How long Fig. 2 waves [s]."""
-
-SQUATS = 12.0
-"""How long it squats [s]: three times."""
-
-ONE = "desired_joints"
-"""The plugin of Fig. 3 that is asked."""
-
 
 @dataclass(frozen=True)
 class Scheme:
@@ -58,12 +49,13 @@ def wave(show: story.Show) -> int:
     def waving(robot: Robot) -> Callable[[float], None]:
         return Waving(show.middleware, "manipulation", hands_of(robot)).send
 
-    return watch(show, "manipulation", "both hands wave", duration=WAVES, actor=waving)
+    return watch(show, "manipulation", "both hands wave", duration=10.0, actor=waving)
 
 
 def squat(show: story.Show) -> int:
     """Squat on torques: no request is sent, the configuration generates the reference."""
-    return watch(show, "squat", "it squats", duration=SQUATS, actor=lambda _: lambda _: None)
+    # three times
+    return watch(show, "squat", "it squats", duration=12.0, actor=lambda _: lambda _: None)
 
 
 def watch(
@@ -102,12 +94,13 @@ def watch(
 
 
 def carry(show: story.Show) -> int:
-    """Fig. 3: one plugin wants joints somewhere, another one carries the robot there."""
+    """Fig. 3: one plugin generates desired joint positions, another one moves the robot there by torques."""
+    desired = "desired_joints"
     steps = [
-        story.StoryStep("legs up", {ONE: MoveJoints(state=centauro.HIGH, speed=0.5)}),
-        story.StoryStep("legs down", {ONE: MoveJoints(state=centauro.LOW, speed=0.5)}),
+        story.StoryStep("legs up", {desired: MoveJoints(state=centauro.HIGH, speed=0.5)}),
+        story.StoryStep("legs down", {desired: MoveJoints(state=centauro.LOW, speed=0.5)}),
     ]
-    return centauro.demonstrate(show, lambda *_: steps, "gravity_compensation", services=(ONE,))
+    return centauro.demonstrate(show, lambda *_: steps, "gravity_compensation", services=(desired,))
 
 
 def joints(plugin: str) -> Callable[[story.Show], int]:

@@ -11,15 +11,11 @@ from solfer.demo.record import MotionRecorder
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.transport import Middleware
 
-MOVE_JOINTS = "solfer/MoveJoints"
-UPPER, LOWER = "upper_body", "lower_body"
-"""The plugins that get the requests."""
+UPPER = "upper_body"
+"""The plugin that moves the upper body."""
 
-STORY_PATIENCE = 3.0
-"""How long a request is repeated that a plugin refuses: the machine may have stood still for a moment [s]."""
-
-STORY_ACCELERATION = 3.0
-"""Configured rate of change of the wheels' speed [rad/s2]."""
+LOWER = "lower_body"
+"""The plugin that moves the lower body."""
 
 
 @dataclass
@@ -88,13 +84,14 @@ def drive(distance: float, radius: float, forward: dict[str, float], speed: floa
         speed: Speed of the wheels [rad/s].
     """
     angle = abs(distance) / radius
-    speed = min(speed, float(np.sqrt(angle * STORY_ACCELERATION)))
+    acceleration = 3.0  # configured limit of the wheels [rad/s2]
+    speed = min(speed, float(np.sqrt(angle * acceleration)))
     joints = tuple(forward)
-    turn = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
+    velocities = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
     direction = "forward" if distance > 0.0 else "back"
     return [
         StoryStep(
-            f"{abs(distance):g} m {direction}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed
+            f"{abs(distance):g} m {direction}", {LOWER: MoveJoints(joints=joints, velocities=velocities)}, angle / speed
         ),
         StoryStep("wheels stop", {LOWER: MoveJoints(joints=joints, velocities=(0.0,) * len(joints))}),
     ]
@@ -139,7 +136,7 @@ class StoryTeller:
             check()
             if self._recorder.newest("measured") is None:
                 continue
-            problem = self._objection()
+            problem = self._missing()
             if not problem:
                 return
         if self._middleware.running():
@@ -156,7 +153,7 @@ class StoryTeller:
         """
         longest = 0.0
         for plugin, request in step.requests.items():
-            reply = self._insist(plugin, request)
+            reply = self._request_until_accepted(plugin, request)
             if not reply.success:
                 raise ComponentError(f"'{step.title}' is refused by {plugin}: {reply.message}")
             longest = max(longest, reply.duration)
@@ -172,7 +169,7 @@ class StoryTeller:
         if self._middleware.running():
             self._progress(title, duration, duration)
 
-    def _objection(self) -> str:
+    def _missing(self) -> str:
         """Return why there can be no motion yet; empty if there can."""
         if self._recorder.newest("desired") is None:
             return "no plugin commands the robot"
@@ -182,9 +179,9 @@ class StoryTeller:
             return str(error)
         return "; ".join(reply.message for reply in replies if not reply.success)
 
-    def _insist(self, plugin: str, request: MoveJoints) -> Reply:
+    def _request_until_accepted(self, plugin: str, request: MoveJoints) -> Reply:
         """Repeat a request until the plugin agrees, or time is up; return its last reply."""
-        end = self._middleware.now() + STORY_PATIENCE
+        end = self._middleware.now() + 3.0  # the machine may have stood still for a moment
         while not (reply := self._request(plugin, request)).success:
             if self._middleware.now() >= end or not self._middleware.running():
                 break
@@ -192,7 +189,7 @@ class StoryTeller:
         return reply
 
     def _request(self, plugin: str, request: MoveJoints) -> Reply:
-        return self._middleware.call(f"{plugin}/trajectory", MOVE_JOINTS, request, Reply, timeout=3.0)
+        return self._middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply, timeout=3.0)
 
     def _pass(self, end: float) -> None:
         self._middleware.sleep_until(end)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.demo.driving_report import Tracked
-from solfer.recording.review import CANVAS_FONT, DESIRED_LINE_COLOR, FIRST_COLOR, draw, dress, new_figure
+from solfer.recording.review import DESIRED_COLOR, FIRST_COLOR, FONT_SIZE, draw, dress, new_figure
 
 if TYPE_CHECKING:
     from solfer.recording.review import Figure
@@ -26,13 +26,13 @@ def tracking_page(times: np.ndarray, places: Mapping[str, Tracked]) -> "Figure":
         dress(left, title, label="m")
         for number, name in enumerate(each.names):
             labels = ("desired", "measured") if number == 0 else (None, None)
-            draw(left, after, each.desired[:, number], color=DESIRED_LINE_COLOR, linewidth=3.0, label=labels[0])
+            draw(left, after, each.desired[:, number], color=DESIRED_COLOR, linewidth=3.0, label=labels[0])
             draw(left, after, each.measured[:, number], color=FIRST_COLOR, linewidth=1.0, label=labels[1])
-            left.annotate(name, (after[-1], each.measured[-1, number]), fontsize=CANVAS_FONT - 2)
-        left.legend(fontsize=CANVAS_FONT - 1, loc="upper left")
+            left.annotate(name, (after[-1], each.measured[-1, number]), fontsize=FONT_SIZE - 2)
+        left.legend(fontsize=FONT_SIZE - 1, loc="upper left")
         dress(right, "distance from the desired place", label="mm")
         for distances in each.distances.T:
             draw(right, after, 1e3 * distances, linewidth=1.0)
     for axes in grid[-1]:
-        axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
+        axes.set_xlabel("time [s]", fontsize=FONT_SIZE)
     return figure

@@ -10,17 +10,11 @@ from solfer.robot import Robot
 from solfer.transport import Middleware
 from solfer.transport.messages import VectorMessage
 
-CIRCLE_HANDS = {"left": "arm1_7", "right": "arm2_7"}
+FRAME = "pelvis"
+"""Link from which the hands are seen."""
+
+HANDS = {"left": "arm1_7", "right": "arm2_7"}
 """Links of the hands, by the tasks that move them."""
-
-CIRCLE_FRAME = "pelvis"
-"""Link from which they are seen."""
-
-CIRCLE_CENTER = (-0.05, 0.08, 0.25)
-"""From where the hands begin to the middle of their circles: forward, outward, upward [m]."""
-
-CIRCLE_RADIUS, CIRCLE_TIME, RAISE = 0.1, 3.0, 2.0
-"""Radius of the circles [m], time of a turn, time in which the hands rise [s]."""
 
 
 class Waving:
@@ -38,7 +32,7 @@ class Waving:
     def __init__(self, middleware: Middleware, target: str, begin: Mapping[str, np.ndarray]):
         self._begin = dict(begin)
         self.desired = {name: np.array(place, float) for name, place in begin.items()}
-        self._messages = {name: VectorMessage(CIRCLE_FRAME, self.desired[name]) for name in begin}
+        self._messages = {name: VectorMessage(FRAME, self.desired[name]) for name in begin}
         self._writers = {
             name: middleware.writer(f"{target}/{name}/reference", "geometry_msgs/PointStamped") for name in begin
         }
@@ -46,14 +40,15 @@ class Waving:
 
     def send(self, passed: float) -> None:
         """Publish where the hands are to be `passed` [s] after the beginning, in the robot's time."""
-        share = min(max(passed / RAISE, 0.0), 1.0)
-        share *= share * (3.0 - 2.0 * share)
-        angle = math.tau * passed / CIRCLE_TIME
+        radius = 0.1  # [m]
+        period = 3.0  # of the circles [s]
+        rise = min(max(passed / 2.0, 0.0), 1.0)
+        rise *= rise * (3.0 - 2.0 * rise)
+        angle = math.tau * passed / period
         for side, (name, begin) in zip((1.0, -1.0), self._begin.items(), strict=True):
-            ahead, outward, up = CIRCLE_CENTER
-            circle = (0.0, CIRCLE_RADIUS * math.sin(angle), side * CIRCLE_RADIUS * math.cos(angle))
-            offset = np.array((ahead, side * outward, up)) + circle
-            self.desired[name][:] = begin + share * offset
+            circle = (0.0, radius * math.sin(angle), side * radius * math.cos(angle))
+            offset = np.array((-0.05, side * 0.08, 0.25)) + circle  # the centre: forward, outward, upward
+            self.desired[name][:] = begin + rise * offset
             self._messages[name].stamp = self._now()
             self._writers[name].write(self._messages[name])
 
@@ -77,6 +72,6 @@ def robot_time(recorder: MeasurementRecorder) -> float:
 def hands_of(robot: Robot) -> dict[str, np.ndarray]:
     """Return where the hands are as seen from the base, by task, each of shape (3,) [m]; the Robot is up to date."""
     kinematics = robot.kinematics
-    place = kinematics.position(CIRCLE_FRAME)
-    rotation = kinematics.rotation(CIRCLE_FRAME)
-    return {name: rotation.T @ (kinematics.position(link) - place) for name, link in CIRCLE_HANDS.items()}
+    place = kinematics.position(FRAME)
+    rotation = kinematics.rotation(FRAME)
+    return {name: rotation.T @ (kinematics.position(link) - place) for name, link in HANDS.items()}

@@ -9,7 +9,7 @@ import numpy as np
 from solfer.errors import ClaimRefused
 from solfer.pipes import JointCommandPipe
 from solfer.plugins.claim_requests import ClaimRequests
-from solfer.recording.model import CLAIMED, LOST_EVENT, RELEASED_EVENT
+from solfer.recording.model import CLAIMED, LOST, RELEASED
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
 from solfer.transport.lower_level import ALL_OWNERS, REFUSALS_TOPIC, TOPIC
@@ -113,7 +113,7 @@ class JointClaim:
             for message in self._refusals.drain():
                 self._receive(message)
             if self.reason != before:
-                self.note(LOST_EVENT, self.reason)
+                self.note(LOST, self.reason)
         return bool(self.reason)
 
     def restarts(self) -> bool:
@@ -150,7 +150,7 @@ class JointClaim:
     def release(self) -> None:
         """Release the joints; does not wait for the answer."""
         if self._requests.commands and (self._granted or self._requests.waits):
-            self.note(RELEASED_EVENT, self._requests.description)
+            self.note(RELEASED, self._requests.description)
             self._requests.release()
         self.lapse()
 

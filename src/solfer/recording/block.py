@@ -13,10 +13,6 @@ from solfer.recording.model import Channel
 
 _RECORD = "<BQHIQQ"  # of a message: opcode, length, channel, sequence, time of the log, time of publication
 _HEADER = struct.calcsize(_RECORD)
-_SEQUENCE = 11
-_LOGGED = 15
-_PUBLISHED = 23
-_BLOCK_SECOND = 1_000_000_000
 
 
 class RecordedTopic:
@@ -112,8 +108,10 @@ class Block:
             data += content.data
         self._row = np.frombuffer(bytes(data), dtype=np.uint8)
         self.size = len(data)
-        self._times = self._bytes(8, _LOGGED, _PUBLISHED)
-        self._numbers, self._stamps = self._bytes(4, _SEQUENCE), self._bytes(8, _HEADER + STAMP_PLACE)
+        # places of the fields of `_RECORD`
+        self._times = self._bytes(8, 15, 23)
+        self._numbers = self._bytes(4, 11)
+        self._stamps = self._bytes(8, _HEADER + STAMP_PLACE)
 
     def _bytes(self, size: int, *places: int) -> np.ndarray:
         """Return the indices of numbers of so many bytes that are at these places of all messages."""
@@ -133,7 +131,7 @@ class Block:
         """
         rows = np.empty((len(times), self.size), dtype=np.uint8)
         rows[:] = self._row
-        stamps = np.stack((times // _BLOCK_SECOND, times % _BLOCK_SECOND), axis=1)
+        stamps = np.stack((times // 1_000_000_000, times % 1_000_000_000), axis=1)
         rows[:, self._times] = _repeated(times.astype("<u8"), len(self._times))
         rows[:, self._numbers] = _repeated(numbers.astype("<u4"), len(self._numbers))
         rows[:, self._stamps] = _repeated(stamps.astype("<u4"), len(self._stamps))

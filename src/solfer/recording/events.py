@@ -5,20 +5,17 @@ import struct
 from solfer.recording.kinds import STAMP_PLACE, Cdr
 from solfer.recording.model import Event
 
-_ERRORS = frozenset({"abort", "aborted", "fault", "lost"})
-_KEY = "kind"
-
 
 def event_message(event: Event, time: int) -> bytes:
     """Make the message of an event at a time [ns]."""
     cdr = Cdr()
     cdr.header("")
     cdr.number("I", 1)
-    cdr.number("B", 2 if event.kind in _ERRORS else 0)
+    cdr.number("B", 2 if event.kind in ("abort", "aborted", "fault", "lost") else 0)
     for text in (event.plugin, event.text, ""):
         cdr.string(text)
     cdr.number("I", 1)
-    cdr.string(_KEY)
+    cdr.string("kind")
     cdr.string(event.kind)
     struct.pack_into("<iI", cdr.data, STAMP_PLACE, *divmod(time, 1_000_000_000))
     return bytes(cdr.data)

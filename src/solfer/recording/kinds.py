@@ -28,7 +28,7 @@ NAMED = {
 }
 """Columns of the kinds that say themselves what each of their numbers is."""
 
-CHANNEL_UNITS = {
+UNITS = {
     **dict.fromkeys(_XYZ, "m"),
     **dict.fromkeys(_TWIST[:3], "m/s"),
     **dict.fromkeys(_TWIST[3:], "rad/s"),
@@ -37,7 +37,7 @@ CHANNEL_UNITS = {
 }
 """Units of these columns; a quaternion has none."""
 
-CHANNEL_KINDS = (COLUMNS_KIND, JOINTS_KIND, *NAMED)
+KINDS = (COLUMNS_KIND, JOINTS_KIND, *NAMED)
 """All kinds of channels."""
 
 EVENT_MESSAGE = "diagnostic_msgs/DiagnosticArray"
@@ -193,8 +193,8 @@ def check(channel: Channel) -> None:
         RecordingError: Its name or its columns are not those of its kind.
     """
     where = f"channel '{channel.name}'"
-    if channel.kind not in CHANNEL_KINDS:
-        raise UnknownName("kind of channel", channel.kind, CHANNEL_KINDS, where=where)
+    if channel.kind not in KINDS:
+        raise UnknownName("kind of channel", channel.kind, KINDS, where=where)
     if channel.kind == JOINTS_KIND and (part_of(channel.name) not in JOINT_PARTS or not topic_of(channel)):
         raise RecordingError(
             "a channel of joints without its field", where=where, expected=f"<name>/{{{','.join(JOINT_PARTS)}}}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solfer.errors import RecordingError, SizeMismatch
-from solfer.recording.kinds import CHANNEL_UNITS, NAMED, check
+from solfer.recording.kinds import NAMED, UNITS, check
 from solfer.recording.model import COLUMNS_KIND, Channel
 
 
@@ -75,7 +75,7 @@ class Logger:
             columns: Name of each number, in the order of the memory; none: those of the kind, or their indices.
             unit: Unit of all numbers, or of each, such as 'rad'; without `columns`, those of the kind by default.
             frame: Frame of the axes.
-            kind: Message that carries it, one of `solfer.recording.kinds.CHANNEL_KINDS`.
+            kind: Message that carries it, one of `solfer.recording.kinds`.
             child: Frame that moves in `frame`.
             factor: See `LogSource`.
 
@@ -87,7 +87,7 @@ class Logger:
         where = f"channel '{self._prefix}/{name}'"
         names = tuple(columns) or NAMED.get(kind) or tuple(str(index) for index in range(array.size))
         if not columns and not unit:
-            unit = with_units(names, CHANNEL_UNITS) if kind in NAMED else ""
+            unit = with_units(names, UNITS) if kind in NAMED else ""
         units = (unit,) * len(names) if isinstance(unit, str) else tuple(unit)
         if len(names) != array.size:
             raise SizeMismatch(f"{len(names)} columns for {array.size} numbers", where=where)

@@ -16,8 +16,17 @@ JOINTS_KIND = "sensor_msgs/JointState"
 REQUEST = "request"
 """Kind of the event that something was asked of a component: its name and fields, as JSON."""
 
-CLAIMED, RELEASED_EVENT, LOST_EVENT, RESET = "claim", "release", "lost", "reset"
-"""Kinds of the events that a plugin got its joints, gave them back or lost them, or reset its component."""
+CLAIMED = "claim"
+"""Kind of the event that a plugin got its joints."""
+
+RELEASED = "release"
+"""Kind of the event that a plugin gave its joints back."""
+
+LOST = "lost"
+"""Kind of the event that a plugin lost its joints."""
+
+RESET = "reset"
+"""Kind of the event that a plugin reset its component."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +35,7 @@ class Channel:
 
     Attributes:
         name: `<plugin>/<what>`, such as `arm/command/direct/position`.
-        kind: Message that carries it in a file, one of `solfer.recording.kinds.CHANNEL_KINDS`.
+        kind: Message that carries it in a file, one of `solfer.recording.kinds`.
         columns: Names of the columns.
         units: Unit of each column, such as 'rad' or 'm/s'; empty: none.
         frame: Frame of the axes; empty: none.

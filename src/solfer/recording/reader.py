@@ -27,14 +27,15 @@ from solfer.recording.writer import END, METADATA
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-_MCAP_CHUNK = struct.Struct("<QQQI")
+_CHUNK = struct.Struct("<QQQI")
 _CONTENT = _HEAD.size + _MESSAGE.size
-_MCAP_LARGEST = 1 << 25  # [B], of a record: solfer's own have some hundred kB
-_MCAP_CHUNK_LARGEST = 1 << 24  # [B], of the messages in a chunk, likewise
-_MCAP_OTHERS = 1 << 27  # [B], of all that is no chunk
-_MCAP_ROOM = 1 << 28, 64  # [B], of all messages; and how many bytes more for each byte of the file
-_MCAP_EXPECTED = "a file that `solfer record` made"
-_DAMAGES = (
+_MAX_RECORD_SIZE = 1 << 25  # [B]: solfer's own have some hundred kB
+_MAX_CHUNK_SIZE = 1 << 24  # [B], of the messages in a chunk, likewise
+_MAX_OTHERS_SIZE = 1 << 27  # [B], of all that is no chunk
+_MAX_UNPACKED_SIZE = 1 << 28  # [B], of all messages, and besides
+_MAX_EXPANSION = 64  # times the size of the file
+_EXPECTED = "a file that `solfer record` made"
+_READ_ERRORS = (
     ValueError,
     TypeError,
     AttributeError,
@@ -44,7 +45,7 @@ _DAMAGES = (
     struct.error,
     McapError,
 )
-_MCAP_ROW = np.dtype([("sequence", "<u4"), ("time", "<u8")])
+_ROW = np.dtype([("sequence", "<u4"), ("time", "<u8")])
 
 
 def read(path: Path) -> Recording:
@@ -67,17 +68,17 @@ def read(path: Path) -> Recording:
             except SolferError as error:
                 where = ": ".join(filter(None, (str(path), reader.place, error.where)))
                 raise RecordingError(error.what, where=where, expected=error.expected) from error
-            except _DAMAGES as error:
+            except _READ_ERRORS as error:
                 what = f"the recording is damaged: {described(error)}"
-                raise RecordingError(what, where=f"{path}: {reader.place}", expected=_MCAP_EXPECTED) from error
+                raise RecordingError(what, where=f"{path}: {reader.place}", expected=_EXPECTED) from error
     except OSError as error:
         raise RecordingError(
-            f"the recording cannot be read: {error.strerror}", where=str(path), expected=_MCAP_EXPECTED
+            f"the recording cannot be read: {error.strerror}", where=str(path), expected=_EXPECTED
         ) from error
 
 
 class _Reader:
-    """One file; see `read`. What its records hold is only looked at: a damaged one raises one of `_DAMAGES`.
+    """One file; see `read`. What its records hold is only looked at: a damaged one raises one of `_READ_ERRORS`.
 
     Attributes:
         place: What is being read, for errors.
@@ -101,7 +102,7 @@ class _Reader:
     def recording(self) -> Recording:
         """Read all records, then put the numbers of each channel together."""
         if self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise RecordingError("this is no MCAP file", expected=_MCAP_EXPECTED)
+            raise RecordingError("this is no MCAP file", expected=_EXPECTED)
         for opcode, content in self._records():
             self._take(opcode, content)
             if opcode == Opcode.DATA_END:
@@ -130,7 +131,7 @@ class _Reader:
             if len(head) < _HEAD.size or length > rest - _HEAD.size:
                 self._missing.append(f"an unfinished record of {rest} bytes at the end")
                 return
-            if not opcode or length > _MCAP_LARGEST:
+            if not opcode or length > _MAX_RECORD_SIZE:
                 raise ValueError(f"a record of the kind {opcode} with {length} bytes")
             yield opcode, self._file.read(length)
             rest -= _HEAD.size + length
@@ -140,8 +141,8 @@ class _Reader:
             self._chunk(content)
             return
         self._others += len(content)
-        if self._others > _MCAP_OTHERS:
-            raise ValueError(f"more than {_MCAP_OTHERS} bytes that are no messages")
+        if self._others > _MAX_OTHERS_SIZE:
+            raise ValueError(f"more than {_MAX_OTHERS_SIZE} bytes that are no messages")
         stream = ReadDataStream(io.BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
@@ -158,15 +159,13 @@ class _Reader:
 
     def _chunk(self, content: bytes) -> None:
         """Take the messages of a chunk; one that is damaged is left out."""
-        first, last, size, checksum = _MCAP_CHUNK.unpack_from(content)
-        stream = ReadDataStream(io.BytesIO(content[_MCAP_CHUNK.size :]))
+        first, last, size, checksum = _CHUNK.unpack_from(content)
+        stream = ReadDataStream(io.BytesIO(content[_CHUNK.size :]))
         packing = stream.read_prefixed_string()
         length = stream.read8()
         packed = stream.read(length)
         try:
-            if size > _MCAP_CHUNK_LARGEST or (
-                packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)
-            ):
+            if size > _MAX_CHUNK_SIZE or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
                 raise zstandard.ZstdError("as much memory would be taken as a damaged number says")
             messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
         except zstandard.ZstdError:
@@ -175,7 +174,7 @@ class _Reader:
             self._missing.append(f"damaged rows between {1e-9 * first:.3f} s and {1e-9 * last:.3f} s")
             return
         self._unpacked += size
-        if self._unpacked > _MCAP_ROOM[0] + _MCAP_ROOM[1] * self._size:
+        if self._unpacked > _MAX_UNPACKED_SIZE + _MAX_EXPANSION * self._size:
             raise ValueError(f"a file of {self._size} bytes that unpacks to more than {self._unpacked} bytes")
         data = np.frombuffer(messages, dtype=np.uint8)
         for number, (places, lengths) in _messages_of(messages).items():
@@ -205,7 +204,7 @@ class _Reader:
             if kind == EVENT_MESSAGE:
                 continue
             if "channels" not in topic.metadata:
-                raise RecordingError("the topic does not say what its columns are", expected=_MCAP_EXPECTED)
+                raise RecordingError("the topic does not say what its columns are", expected=_EXPECTED)
             layout = RecordedTopic(topic.topic[1:], (), RecordedTopic.channels_of(kind, topic.metadata))
             stamps, contents = self._stacked(number, layout)
             gaps = max(gaps, _gaps(stamps["sequence"]))
@@ -219,7 +218,7 @@ class _Reader:
         whole = [(stamps, contents) for stamps, contents in parts if contents.shape[1:] == (size,)]
         if len(whole) < len(parts):
             self._missing.append(f"messages of {layout.name} that do not have the layout of their topic")
-        stamps = np.concatenate([np.zeros(0, _MCAP_ROW), *(stamps for stamps, _ in whole)])
+        stamps = np.concatenate([np.zeros(0, _ROW), *(stamps for stamps, _ in whole)])
         contents = np.concatenate([np.zeros((0, size), np.uint8), *(contents for _, contents in whole)])
         order = np.argsort(stamps["time"], kind="stable")
         return (stamps, contents) if np.all(np.diff(order) == 1) else (stamps[order], contents[order])
@@ -243,7 +242,7 @@ def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
 
 def _stamps(rows: np.ndarray) -> np.ndarray:
     """Return the numbers and times of messages, shape (T,)."""
-    stamps = np.zeros(len(rows), _MCAP_ROW)
+    stamps = np.zeros(len(rows), _ROW)
     stamps["sequence"] = np.ascontiguousarray(rows[:, 11:15]).view("<u4")[:, 0]
     stamps["time"] = np.ascontiguousarray(rows[:, 15:23]).view("<u8")[:, 0]
     return stamps

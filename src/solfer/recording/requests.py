@@ -9,8 +9,6 @@ from solfer.recording.model import REQUEST, Event
 FEW = 3
 """Requests of one name that are shown one by one."""
 
-_NAME = re.compile(r'\["([^"\\]*)"')  # a text that was cut is no JSON
-
 
 @dataclass(frozen=True)
 class EventGroup:
@@ -34,12 +32,13 @@ class EventGroup:
 
 def request_name(event: Event) -> str:
     """Return the declaration that a request was made of; empty: the event is another one."""
-    found = _NAME.match(event.text) if event.kind == REQUEST else None
+    # a text that was cut is no JSON
+    found = re.match(r'\["([^"\\]*)"', event.text) if event.kind == REQUEST else None
     return found[1] if found else ""
 
 
 def grouped(events: Iterable[Event]) -> list[EventGroup]:
-    """Count the requests of each name of each plugin, where there are more than FEW; other events stay alone."""
+    """Count the requests of each name of each plugin, where there are more than `FEW`; other events stay alone."""
     requests: dict[tuple[str, str], list[Event]] = {}
     alone: list[Event] = []
     for event in events:

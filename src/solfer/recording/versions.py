@@ -9,14 +9,13 @@ from xml.etree import ElementTree
 from solfer.config.yaml.files import located
 from solfer.errors import SolferError
 
-LIBRARIES = {"numpy": "numpy", "pinocchio": "pin", "pybullet": "pybullet", "scipy": "scipy", "numba": "numba"}
-"""Libraries whose results are in the numbers, and the packages that install them."""
-
 
 def versions() -> dict[str, str]:
     """Return the versions of solfer, Python and its libraries, by name; what is not known is left out."""
     found = {"solfer": _own(), "python": platform.python_version()}
-    for name, package in LIBRARIES.items():
+    # libraries whose results are in the numbers, and the packages that install them
+    libraries = {"numpy": "numpy", "pinocchio": "pin", "pybullet": "pybullet", "scipy": "scipy", "numba": "numba"}
+    for name, package in libraries.items():
         with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(package)
     return {name: version for name, version in found.items() if version}

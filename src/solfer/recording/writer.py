@@ -34,31 +34,32 @@ from solfer.recording.events import event_message
 from solfer.recording.kinds import EVENT_MESSAGE, check, definition, ros_name
 from solfer.recording.model import Channel, Event, Recording
 
-EVENT_TOPIC = "/events"
-METADATA, END = "solfer", "solfer_end"
-"""Names of the texts at the beginning, and of those that only a file has whose writer came to its end."""
+METADATA = "solfer"
+"""Name of the texts at the beginning."""
 
-_WRITTEN_LONGEST = {"sec": 9223372036, "nsec": 854775807}
-QOS = json.dumps(
+END = "solfer_end"
+"""Name of the texts that only a file has whose writer came to its end."""
+
+_INFINITE_DURATION = {"sec": 9223372036, "nsec": 854775807}
+_QOS = json.dumps(
     [
         {
             "history": 1,  # keep the last ones
             "depth": 10,
             "reliability": 1,  # reliable
             "durability": 2,  # volatile
-            "deadline": _WRITTEN_LONGEST,
-            "lifespan": _WRITTEN_LONGEST,
+            "deadline": _INFINITE_DURATION,
+            "lifespan": _INFINITE_DURATION,
             "liveliness": 1,  # automatic
-            "liveliness_lease_duration": _WRITTEN_LONGEST,
+            "liveliness_lease_duration": _INFINITE_DURATION,
             "avoid_ros_namespace_conventions": False,
         }
     ]
 )
 """Quality of service of each topic, as `ros2 bag` writes it, which the profile `ros2` of MCAP requests: YAML."""
 
-_LEVEL = 1  # of the compression: the fastest that is worth it
 _MEDIA = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
-_WRITTEN_CHUNK = (
+_CHUNK = (
     "<QQQIi4sQ"  # first and last time, size, checksum, name of the compression with its length, size of the records
 )
 
@@ -88,7 +89,8 @@ class RecordingWriter:
         self.size = 0
         self.rows = 0
         self.dropped = 0
-        self._compress = zstandard.ZstdCompressor(level=_LEVEL).compress
+        # the fastest level that is worth it
+        self._compress = zstandard.ZstdCompressor(level=1).compress
         self._schemas: dict[str, Schema] = {}
         self._channels: list[ChannelRecord] = []
         self._chunks: list[bytes] = []  # their indices, already written down: an hour has many
@@ -105,7 +107,7 @@ class RecordingWriter:
         self._text(METADATA, dict(metadata or {}))
         for name, data in (attachments or {}).items():
             self._attach(name, data)
-        self._events = self._channel(EVENT_MESSAGE, EVENT_TOPIC, {})
+        self._events = self._channel(EVENT_MESSAGE, "/events", {})
 
     def block(self, channels: Sequence[Channel]) -> Block:
         """Announce channels that are recorded together; their own times and values do not count.
@@ -181,7 +183,7 @@ class RecordingWriter:
         if schema is None:
             schema = Schema(len(self._schemas) + 1, definition(kind).encode(), "ros2msg", ros_name(kind))
             records.append(schema)
-        texts = metadata | {"offered_qos_profiles": QOS}
+        texts = metadata | {"offered_qos_profiles": _QOS}
         channel = ChannelRecord(len(self._channels) + 1, topic, "cdr", texts, schema.id)
         self._append(b"".join(map(_bytes, (*records, channel))))
         self._schemas[kind] = schema
@@ -210,7 +212,7 @@ class RecordingWriter:
         packed = self._compress(messages)
         begin = int(index[..., 0].min())
         end = int(index[..., 0].max())
-        head = struct.pack(_WRITTEN_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
+        head = struct.pack(_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
         chunk = struct.pack("<BQ", Opcode.CHUNK, len(head) + len(packed)) + head + packed
         tail = bytearray()
         places = {}

@@ -26,7 +26,7 @@ _COLUMNS = {
     "orientation": ("qx", "qy", "qz", "qw"),
     "pose": ("x", "y", "z", "qx", "qy", "qz", "qw"),
 }
-_REFERENCE_KINDS = {
+_KINDS = {
     "position": ("circle", "line", "sine", "waypoints", "file"),
     "orientation": ("waypoints", "file"),
     "pose": ("circle", "line", "sine", "waypoints", "file"),
@@ -47,11 +47,11 @@ def build_reference(record: ReferenceRecord, quantity: str, joints: Sequence[str
         SizeMismatch: There are too few or too many numbers.
         UnknownName: There is no such joint.
     """
-    if record.kind not in _REFERENCE_KINDS[quantity]:
+    if record.kind not in _KINDS[quantity]:
         raise ConfigError(
             f"there is no {record.kind} of this: it has {'joints' if quantity == POSTURE else 'no position'}",
             where=record.where(record.kind),
-            expected=", ".join(_REFERENCE_KINDS[quantity]),
+            expected=", ".join(_KINDS[quantity]),
         )
     size, rates = QUANTITY_SIZES.get(quantity, (len(joints), len(joints)))
     if record.circle is not None:

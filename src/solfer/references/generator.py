@@ -10,8 +10,8 @@ from solfer.numerics.rotations import quaternion_product
 QUANTITY_SIZES = {"position": (3, 3), "orientation": (4, 3), "pose": (7, 6)}
 """How many numbers a quantity has, and how many its velocity; a posture has one of both for each joint."""
 
-EACH = 64
-"""Looks at the speed in each period of a motion."""
+SAMPLES_PER_PERIOD = 64
+"""Number of times at which the speed is sampled in each period of a motion."""
 
 
 class ReferenceGenerator(abc.ABC):
@@ -47,14 +47,14 @@ class ReferenceGenerator(abc.ABC):
         """Write value and velocity at a time since the start [s], shape (size,) and (rates,). Allocates nothing."""
 
     @abc.abstractmethod
-    def looks(self) -> np.ndarray:
-        """Return the times at which the speed is looked at, shape (k,) [s]."""
+    def sample_times(self) -> np.ndarray:
+        """Return the times at which the speed is sampled, shape (k,) [s]."""
 
     def velocities(self) -> np.ndarray:
-        """Compute the velocities at the times of `looks`, shape (k, rates)."""
+        """Compute the velocities at the times of `sample_times`, shape (k, rates)."""
         position = np.zeros(self.size)
-        rows = np.zeros((len(self.looks()), self.rates))
-        for row, time in zip(rows, self.looks(), strict=True):
+        rows = np.zeros((len(self.sample_times()), self.rates))
+        for row, time in zip(rows, self.sample_times(), strict=True):
             self.at(float(time), position, row)
         return rows
 
@@ -106,7 +106,7 @@ class Swing(OffsetReference):
     ):
         phase_time = math.inf if turns is None else turns * period
         self._fade = min(0.25 * period, phase_time)
-        self._duration = phase_time
+        self._phase_time = phase_time
         self._period = period
         self._cosine = cosine
         self._sine = sine
@@ -114,25 +114,25 @@ class Swing(OffsetReference):
         super().__init__(size, rates, len(cosine), duration=phase_time + self._fade)
         self._work = np.zeros(len(cosine))
 
-    def looks(self) -> np.ndarray:
-        """See `ReferenceGenerator.looks`."""
-        return np.arange(0.0, min(self.duration, self._fade + self._period), self._period / EACH)
+    def sample_times(self) -> np.ndarray:
+        """See `ReferenceGenerator.sample_times`."""
+        return np.arange(0.0, min(self.duration, self._fade + self._period), self._period / SAMPLES_PER_PERIOD)
 
     def _move(self, time: float) -> None:
         fade = self._fade
         left = self.duration - time
-        share = min(time, left, fade) / fade
-        faded = fade * share**3 * (1.0 - 0.5 * share)
-        if share == 1.0:
+        ratio = min(time, left, fade) / fade
+        faded = fade * ratio**3 * (1.0 - 0.5 * ratio)
+        if ratio == 1.0:
             phase_time = time - 0.5 * fade
         elif time <= left:
             phase_time = faded
         else:
-            phase_time = self._duration - faded
+            phase_time = self._phase_time - faded
         phase = self._frequency * phase_time
         cos = math.cos(phase)
         sin = math.sin(phase)
-        rate = self._frequency * share * share * (3.0 - 2.0 * share)
+        rate = self._frequency * ratio * ratio * (3.0 - 2.0 * ratio)
         np.multiply(self._cosine, cos - 1.0, out=self._offset)
         np.multiply(self._sine, sin, out=self._work)
         self._offset += self._work
@@ -142,7 +142,7 @@ class Swing(OffsetReference):
 
 
 class LineReference(OffsetReference):
-    """A straight line whose share u of the time T makes 10 u^3 - 15 u^4 + 6 u^5 of the path: from rest to rest.
+    """A straight line: the fraction u of the time T makes 10 u^3 - 15 u^4 + 6 u^5 of the path, from rest to rest.
 
     Args:
         size: How many numbers it has.
@@ -174,7 +174,7 @@ class LineReference(OffsetReference):
         self._speed = speed
         self._given = duration
         self._back = back
-        self._duration = to.copy()
+        self._displacement = to.copy()
         self._time = 1.0
         self.start(self.origin.copy())
 
@@ -182,15 +182,15 @@ class LineReference(OffsetReference):
         """See `ReferenceGenerator.start`."""
         super().start(origin)
         if self._is_absolute:
-            np.subtract(self._to, self.origin[: len(self._to)], out=self._duration)
-        length = float(np.linalg.norm(self._duration))
+            np.subtract(self._to, self.origin[: len(self._to)], out=self._displacement)
+        length = float(np.linalg.norm(self._displacement))
         time = self._given if self._speed is None else self.PEAK * length / self._speed
         self._time = max(time or 0.0, 1e-3)
         self.duration = 2.0 * self._time if self._back else self._time
 
-    def looks(self) -> np.ndarray:
-        """See `ReferenceGenerator.looks`."""
-        return np.linspace(0.0, self._time, EACH + 1)
+    def sample_times(self) -> np.ndarray:
+        """See `ReferenceGenerator.sample_times`."""
+        return np.linspace(0.0, self._time, SAMPLES_PER_PERIOD + 1)
 
     def _move(self, time: float) -> None:
         sign = 1.0
@@ -198,8 +198,8 @@ class LineReference(OffsetReference):
             time = 2.0 * self._time - time
             sign = -1.0
         u = time / self._time
-        np.multiply(self._duration, u**3 * (10.0 + u * (6.0 * u - 15.0)), out=self._offset)
-        np.multiply(self._duration, sign * 30.0 * (u * (1.0 - u)) ** 2 / self._time, out=self._rate)
+        np.multiply(self._displacement, u**3 * (10.0 + u * (6.0 * u - 15.0)), out=self._offset)
+        np.multiply(self._displacement, sign * 30.0 * (u * (1.0 - u)) ** 2 / self._time, out=self._rate)
 
 
 def turned_by(by: np.ndarray, quaternion: np.ndarray) -> tuple[float, ...]:

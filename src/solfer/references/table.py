@@ -12,11 +12,8 @@ from solfer.errors import ConfigError, SizeMismatch
 from solfer.numerics.rotations import is_unit
 from solfer.references.header import TIME_COLUMN, Field, TableHeader, fields_of, is_header, names_of, read_header
 
-TABLE_ROWS = 20_000
-"""Rows of a table."""
-
-LONGEST = 1e5
-"""Largest time [s]."""
+MAX_ROWS = 20_000
+"""Largest number of rows of a table."""
 
 Line = tuple[int, list[Field]]
 """The number of a line, and its fields."""
@@ -72,8 +69,8 @@ def read_table(
         if turn:
             require_length([row[index] for index in turn], f"{path}:{line}:{fields[min(turn)].column}")
         rows.append(row)
-        if len(rows) > TABLE_ROWS:
-            raise ConfigError("too many lines", where=f"{path}:{line}:1", expected=f"{TABLE_ROWS} at most")
+        if len(rows) > MAX_ROWS:
+            raise ConfigError("too many lines", where=f"{path}:{line}:1", expected=f"{MAX_ROWS} at most")
     if not rows or (len(rows) == 1 and rows[0][begin] == 0.0):
         raise ConfigError(
             f"'{path}' has no motion", where=f"{path}:1:1", expected="a line of numbers after 0 s, or several"
@@ -115,7 +112,7 @@ def _parts(path: Path, columns: Sequence[str], where: str) -> tuple[Line | None,
             names = (line, fields)
         elif fields:
             lines.append((line, fields))
-            if len(lines) > TABLE_ROWS:
+            if len(lines) > MAX_ROWS:
                 break
     if names is None and comment is not None and lines and len(comment[1]) == len(lines[0][1]):
         names = comment
@@ -132,7 +129,7 @@ def _is_number(field: str) -> bool:
 
 def _number(place: str, field: Field, factor: float, is_time: bool) -> float:
     value = float(field.text) * factor if _is_number(field.text) else math.nan
-    most = LONGEST if is_time else COORDINATE["le"]
+    most = 1e5 if is_time else COORDINATE["le"]
     if not abs(value) <= most:
         raise ConfigError(
             f"'{field.text}'", where=f"{place}:{field.column}", expected=f"a number up to {most / factor:g}"

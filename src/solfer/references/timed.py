@@ -7,9 +7,6 @@ import numpy as np
 from solfer.numerics.via_points import ViaPoints
 from solfer.references.generator import ReferenceGenerator, turned_by
 
-PIECE = 8
-"""Looks at the speed between two values."""
-
 
 class TimedReference(ReferenceGenerator):
     """Cubic polynomials through values with times, at rest at both ends.
@@ -86,9 +83,9 @@ class TimedReference(ReferenceGenerator):
         position[:turn] = number[:turn]
         np.multiply(number[turn:], 1.0 / math.sqrt(square), out=position[turn:])
 
-    def looks(self) -> np.ndarray:
-        """See `ReferenceGenerator.looks`."""
-        pieces = np.linspace(self._times[:-1], self._times[1:], PIECE, endpoint=False)
+    def sample_times(self) -> np.ndarray:
+        """See `ReferenceGenerator.sample_times`."""
+        pieces = np.linspace(self._times[:-1], self._times[1:], 8, endpoint=False)
         return np.sort(pieces, axis=None)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.recording.model import Channel
 from solfer.replay.replay import Replay
 
-REPLAY_TOLERANCE = 1e-9
+TOLERANCE = 1e-9
 """Largest difference of numbers that count as the same."""
 
 
@@ -84,8 +84,8 @@ def differences(replay: Replay) -> ReplayDifferences:
         gaps = _gaps(ours, rows.values(recorded[name], shared)[both])
         numbers = numbers + len(shared)
         largest = max(largest, float(gaps.max(initial=0.0)))
-        for place in np.flatnonzero((gaps > REPLAY_TOLERANCE).any(axis=0)):
-            first = int(np.flatnonzero(both)[(gaps[:, place] > REPLAY_TOLERANCE).argmax()])
+        for place in np.flatnonzero((gaps > TOLERANCE).any(axis=0)):
+            first = int(np.flatnonzero(both)[(gaps[:, place] > TOLERANCE).argmax()])
             unit = channel.units[channel.columns.index(shared[place])]
             time = float(rows.times[first] - rows.times[0])
             found.append(

@@ -12,9 +12,6 @@ from solfer.robot import Robot
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
 from solfer.transport.messages import Message
 
-SAME = 1e-7
-"""Arrivals that differ by less are one message: ages are recorded to the last bit, times to the nanosecond [s]."""
-
 
 class RecordedFeedbackPipe(FeedbackPipe):
     """Stands in for a pipe: writes the numbers that it had received in each cycle, and filters them as it does.
@@ -99,7 +96,8 @@ class RecordedFeedbackPipe(FeedbackPipe):
             return False
         if row == 0 or not np.isfinite(self._arrivals[row - 1]):
             return True
-        later = self._arrivals[row] - self._arrivals[row - 1] > SAME
+        # [s]: ages are recorded to the last bit, times to the nanosecond
+        later = self._arrivals[row] - self._arrivals[row - 1] > 1e-7
         return bool(later) or any((values[row] != values[row - 1]).any() for values in self._values)
 
     def _add(

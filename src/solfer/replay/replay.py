@@ -85,7 +85,7 @@ class Replay:
             known = source.channel
             name = known.name.removeprefix(prefix)
             if name in turns:
-                self._turn(known, numbers, turns[name])
+                self._unwrap(known, numbers, turns[name])
             self.commands[name] = Channel(
                 known.name,
                 known.kind,
@@ -97,7 +97,7 @@ class Replay:
                 child=known.child,
             )
 
-    def doubts(self) -> Iterator[str]:
+    def unrepeated_inputs(self) -> Iterator[str]:
         """Yield the inputs that a replay that differs did not get as the recorded plugin did."""
         rows = self.rows
         found = [cast(RecordedFeedbackPipe, each).unrepeated for each in self.plugin.feedbacks]
@@ -146,7 +146,7 @@ class Replay:
         except SolferError as error:
             self.unrepeated.append(f"{note[:60]}: {error.line}")
 
-    def _turn(self, channel: Channel, numbers: np.ndarray, turns: np.ndarray) -> None:
+    def _unwrap(self, channel: Channel, numbers: np.ndarray, turns: np.ndarray) -> None:
         """Count positions, shape (T, n) [rad, m], as the recorded driver did; a replay receives the Robot's count."""
         recorded = self.rows.channel(channel.name.partition("/")[2])
         if recorded is not None and set(channel.columns) <= set(recorded.columns):

@@ -9,10 +9,7 @@ from solfer.throttle import Throttle
 from solfer.transport import Middleware, Reader
 from solfer.transport.topics import Topics
 
-DISCOVERY_PERIOD = 1.0
-"""Time between two questions for topics [s]."""
-
-DISCOVERY_STALE_AGE = 0.5
+STALE_AGE = 0.5
 """Age from which on a message does not count [s]."""
 
 logger = logging.getLogger(__name__)
@@ -40,7 +37,7 @@ class DiscoveredTopics:
         now = self._middleware.now()
         if self._pending is None and now >= self._next:
             self._pending = self._middleware.topics()
-            self._next = now + DISCOVERY_PERIOD
+            self._next = now + 1.0  # [s]
         if self._pending is None or not self._pending.done():
             return
         pending = self._pending
@@ -62,4 +59,4 @@ class DiscoveredTopics:
         """Return the readers of topics `<owner>/<name>` with a message that counts, by their owners."""
         for reader in self._readers[name].values():
             reader.read()
-        return {owner: reader for owner, reader in self._readers[name].items() if reader.age() <= DISCOVERY_STALE_AGE}
+        return {owner: reader for owner, reader in self._readers[name].items() if reader.age() <= STALE_AGE}

@@ -9,7 +9,7 @@ from solfer.interfaces.support import SupportMargins
 from solfer.interfaces.task_references import TaskReferences, numbers_of
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.robot import Robot
-from solfer.scene.discovery import DISCOVERY_STALE_AGE, DiscoveredTopics
+from solfer.scene.discovery import STALE_AGE, DiscoveredTopics
 from solfer.scene.polygon import hull, shrunk
 from solfer.scene.state import ContactForce, ScenePose, SceneState, ShownReference
 from solfer.transport import JointMessage, Middleware, Reader
@@ -17,26 +17,8 @@ from solfer.transport.declared.fields import value_of
 
 WORLD = "world"
 
-SCENE_TOPICS = {
-    "command": "solfer/JointCommand",
-    "references": "solfer/TaskReferences",
-    "support_margins": "solfer/SupportMargins",
-}
-"""What is found out about plugins and controllers, by the last part of the names of topics."""
-
-BASES = ("floating_base", "odometry/odom")
-"""Topics with the pose of the base; the first with a message counts."""
-
-CARRYING_FORCE = 5.0
-"""Vertical force from which on a contact carries a part of the robot [N]."""
-
-CONTACT_HEIGHT = 0.05
-"""Height above the lowest contact up to which one without a known force is on the ground [m]."""
-
-PATH_STEP, PATH_POINTS = 0.02, 2000
-"""Distance of two points of the path of the base [m], and their largest number."""
-
 FRICTION = 0.8
+"""Coefficient of friction of the ground, unless another one is given."""
 
 
 class LiveScene:
@@ -49,12 +31,21 @@ class LiveScene:
     """
 
     def __init__(self, robot: Robot, middleware: Middleware, friction: float = FRICTION):
-        self._robot, self._desired, self._friction = robot, robot.twin(), friction
+        self._robot = robot
+        self._desired = robot.twin()
+        self._friction = friction
         self._places = {name: index for index, name in enumerate(robot.dofs)}
-        self._discovered = DiscoveredTopics(middleware, SCENE_TOPICS)
+        # of plugins and controllers, by the last part of the names of topics
+        messages = {
+            "command": "solfer/JointCommand",
+            "references": "solfer/TaskReferences",
+            "support_margins": "solfer/SupportMargins",
+        }
+        self._discovered = DiscoveredTopics(middleware, messages)
         self._joints = middleware.reader("joint_states", "sensor_msgs/JointState")
         floats = robot.kinematics.base is not None
-        self._bases = [middleware.reader(topic, "nav_msgs/Odometry") for topic in BASES if floats]
+        bases = ("floating_base", "odometry/odom") if floats else ()  # the first with a message counts
+        self._bases = [middleware.reader(topic, "nav_msgs/Odometry") for topic in bases]
         self._wrenches = {
             record.name: middleware.reader(record.topic, "geometry_msgs/WrenchStamped")
             for record in robot.contact_records
@@ -140,7 +131,8 @@ class LiveScene:
                 force = estimates.values[estimates.names.index(name), :3].copy()
             else:
                 continue
-            yield ContactForce(name, contact.value.copy(), force, touches=bool(force[2] >= CARRYING_FORCE))
+            carries = bool(force[2] >= 5.0)  # [N]
+            yield ContactForce(name, contact.value.copy(), force, touches=carries)
 
     def _polygon(self, forces: tuple[ContactForce, ...]) -> tuple[np.ndarray, np.ndarray]:
         nothing = np.zeros((0, 3))
@@ -149,7 +141,8 @@ class LiveScene:
         if not records:
             return nothing, nothing
         known = {force.contact: force.touches for force in forces}
-        ground = contacts.positions[:, 2].min() + CONTACT_HEIGHT
+        # up to here one without a known force is on the ground
+        ground = contacts.positions[:, 2].min() + 0.05
         touching = [each for each in records if known.get(each.name, contacts[each.name].value[2] <= ground)]
         points = np.array([contacts[record.name].value for record in touching]).reshape(-1, 3)
         corners = hull(points)
@@ -218,14 +211,14 @@ class _Path:
 
     def add(self, position: np.ndarray) -> None:
         """Add a position, if it is not near the last one."""
-        if not len(self.points) or np.linalg.norm(position - self.points[-1]) >= PATH_STEP:
-            self.points = np.concatenate((self.points[1 - PATH_POINTS :], position[None]))
+        if not len(self.points) or np.linalg.norm(position - self.points[-1]) >= 0.02:  # [m]
+            self.points = np.concatenate((self.points[1 - 2000 :], position[None]))
 
 
 def _is_fresh(reader: Reader) -> bool:
     """Read the newest message, and return whether it counts."""
     reader.read()
-    return reader.age() <= DISCOVERY_STALE_AGE
+    return reader.age() <= STALE_AGE
 
 
 def _poses(robot: Robot) -> dict[str, ScenePose]:

@@ -19,7 +19,7 @@ def hull(points: np.ndarray) -> list[int]:
     for side in (order, order[::-1]):
         start = len(half)
         for index in side:
-            while len(half) - start >= 2 and _turn(points, half[-2], half[-1], third=index) <= 0.0:
+            while len(half) - start >= 2 and _cross(points, half[-2], half[-1], third=index) <= 0.0:
                 half.pop()
             half.append(index)
         del half[-1:]
@@ -44,10 +44,10 @@ def shrunk(corners: np.ndarray, margins: Sequence[float]) -> np.ndarray:
     return left
 
 
-def _turn(points: np.ndarray, first: int, second: int, third: int) -> float:
+def _cross(points: np.ndarray, first: int, second: int, third: int) -> float:
     (ax, ay), (bx, by), (cx, cy) = points[[first, second, third], :2].tolist()
-    turn: float = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    return turn
+    cross: float = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return cross
 
 
 def _cut(corners: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -56,8 +56,8 @@ def _cut(corners: np.ndarray, inside: np.ndarray) -> np.ndarray:
     for index, distance in enumerate(inside):
         before = inside[index - 1]
         if (distance >= 0.0) != (before >= 0.0):
-            share = before / (before - distance)
-            kept.append(corners[index - 1] + share * (corners[index] - corners[index - 1]))
+            ratio = before / (before - distance)
+            kept.append(corners[index - 1] + ratio * (corners[index] - corners[index - 1]))
         if distance >= 0.0:
             kept.append(corners[index])
     return np.array(kept).reshape(-1, 3)

@@ -12,11 +12,8 @@ from solfer.study.folder import StudyFolder
 from solfer.study.plan import PlannedRun
 from solfer.study.result import Result
 
-DRIVE_POLL_PERIOD = 0.25
+POLL_PERIOD = 0.25
 """Period in which the folder is read [s]."""
-
-TABLE = 30.0
-"""Period in which the table is written meanwhile [s]."""
 
 
 class StudyProgress:
@@ -94,15 +91,16 @@ def carry_out_all(
 
 
 def _wait(folder: StudyFolder, engine: WorkerEngine, progress: StudyProgress) -> None:
+    table_period = 30.0  # [s]
     written = time.monotonic()
     while not all(folder.is_done(run) for run in folder.runs):
         engine.check()
         progress.look()
         progress.show()
-        if time.monotonic() - written > TABLE:
+        if time.monotonic() - written > table_period:
             folder.write_table()
             written = time.monotonic()
-        time.sleep(DRIVE_POLL_PERIOD)
+        time.sleep(POLL_PERIOD)
 
 
 def find_run(folder: StudyFolder, name: str) -> PlannedRun:

@@ -14,14 +14,6 @@ from solfer.errors import StudyError
 
 ENGINES = ("local", "dask", "slurm")
 
-SHORT = 5.0
-"""Time within which a worker that ends has not worked [s]; as many of them in a row as `ENGINE_TRIES` end the study."""
-
-ENGINE_TRIES = 3
-
-ENGINE_CALL_PERIOD = 5.0
-"""Period in which Slurm is requested its jobs [s]."""
-
 
 class WorkerEngine(abc.ABC):
     """Workers of a study."""
@@ -59,8 +51,9 @@ class LocalEngine(WorkerEngine):
             code = process.poll()
             if code is None or code == 0:
                 continue
-            self._short = self._short + 1 if time.monotonic() - begin < SHORT else 0
-            if code == 2 or self._short >= ENGINE_TRIES:
+            has_worked = time.monotonic() - begin >= 5.0
+            self._short = 0 if has_worked else self._short + 1
+            if code == 2 or self._short >= 3:  # three in a row have not worked
                 _, text = process.communicate()
                 raise _failed(f"a worker ended with exit code {code}: {text.strip().removeprefix('error: ')[-2000:]}")
             self._processes[place] = self._start()
@@ -164,7 +157,7 @@ class SlurmEngine(WorkerEngine):
         """See `WorkerEngine.check`."""
         if time.monotonic() < self._next:
             return
-        self._next = time.monotonic() + ENGINE_CALL_PERIOD
+        self._next = time.monotonic() + 5.0  # Slurm answers slowly
         for job in self._jobs:
             if job.done() and (error := job.exception()) is not None:
                 raise _failed(f"a job failed: {error}")

@@ -45,16 +45,25 @@ STDERR_FILE = "stderr"
 RECORDING = "recording.mcap"
 COLUMNS_FILE = "columns.npz"
 CLAIM_PREFIX = "claim."
-CLAIM = re.compile(r"claim\.([1-9][0-9]{0,8})")
 
-MOST_COLUMNS = 2**26
-"""Largest size of the columns of a run [bytes]."""
-
-DAMAGED = zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryError
+_BAD_ARCHIVE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    RuntimeError,
+    MemoryError,
+)
 """Errors of NumPy and `zipfile` about a file that is not one of theirs."""
 
-HEARTBEAT, DEAD = 2.0, 30.0
-"""Period in which a worker renews its claim, and the age at which another one takes it over [s]."""
+HEARTBEAT_PERIOD = 2.0
+"""Period in which a worker renews its claim [s]."""
+
+CLAIM_TIMEOUT = 30.0
+"""Age of a claim at which another worker takes over its run [s]."""
 
 
 class StudyFile(BaseModel):
@@ -76,7 +85,7 @@ class Identity(BaseModel):
     time: float
 
 
-RESULTS = TypeAdapter(Result)
+_RESULTS = TypeAdapter(Result)
 
 
 class Claim:
@@ -200,7 +209,7 @@ class StudyFolder:
     def result(self, run: PlannedRun) -> Result | None:
         """Return the result of a run; None: there is none yet."""
         try:
-            return RESULTS.validate_json((self.of(run) / RESULT).read_bytes())
+            return _RESULTS.validate_json((self.of(run) / RESULT).read_bytes())
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
@@ -287,13 +296,13 @@ class StudyFolder:
         file = self.path / RUNS / run_id / COLUMNS_FILE
         try:
             with zipfile.ZipFile(file) as archive:
-                if sum(each.file_size for each in archive.infolist()) > MOST_COLUMNS:
+                if sum(each.file_size for each in archive.infolist()) > 2**26:  # [bytes]
                     return None
             with np.load(file) as kept:
                 times = kept["times"].astype(float)
                 names = [str(name) for name in kept["names"]]
                 values = kept["values"].astype(float)
-        except DAMAGED:
+        except _BAD_ARCHIVE:
             return None
         return (times, names, values) if values.shape == (len(names), *times.shape) and times.ndim == 1 else None
 
@@ -305,7 +314,11 @@ class StudyFolder:
     def _attempts(self, run: PlannedRun) -> list[int]:
         """List the numbers of the claims of a run; other files beside them do not count, such as an editor's."""
         with suppress(FileNotFoundError):
-            return [int(found[1]) for name in os.listdir(self.of(run)) if (found := CLAIM.fullmatch(name))]
+            return [
+                int(found[1])
+                for name in os.listdir(self.of(run))
+                if (found := re.fullmatch(r"claim\.([1-9][0-9]{0,8})", name))
+            ]
         return []
 
     def rows(self) -> Iterator[dict[str, Any]]:
@@ -354,7 +367,7 @@ class StudyFolder:
         with tempfile.TemporaryFile(dir=self.path) as now:
             now.write(b"0")
             now.flush()
-            return os.fstat(now.fileno()).st_mtime - claim.stat().st_mtime > DEAD
+            return os.fstat(now.fileno()).st_mtime - claim.stat().st_mtime > CLAIM_TIMEOUT
 
 
 def write_whole(file: Path, text: str) -> None:

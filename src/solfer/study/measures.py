@@ -12,11 +12,6 @@ from solfer.errors import ConfigError, UnknownName
 from solfer.recording.log import LogSource
 from solfer.study.records import MeasureRecord, StudyRecord
 
-MACHINE = ("timing", "load")
-"""Channels of a plugin whose numbers differ from machine to machine: no measure of a run that repeats."""
-
-CONSTANTS = {"pi": math.pi, "inf": math.inf}
-
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     each.__name__: each for each in (abs, min, max, math.sqrt, math.hypot, math.log, math.exp, math.isfinite)
 }
@@ -57,7 +52,7 @@ class Columns:
         for name in self._order:
             if name not in places:
                 raise UnknownName("column", name, places, where=where(name))
-            if name.split("/")[1] in MACHINE:
+            if name.split("/")[1] in ("timing", "load"):  # a run that is repeated would have other numbers
                 raise ConfigError(
                     f"'{name}' differs from machine to machine", where=where(name), expected="a column of the robot"
                 )
@@ -114,7 +109,7 @@ def evaluated(expression: str, values: Mapping[str, Any], where: str) -> Any:
     Raises:
         ConfigError: It is no expression, or names something else.
     """
-    evaluator = SimpleEval(functions=FUNCTIONS, names={**CONSTANTS, **values})
+    evaluator = SimpleEval(functions=FUNCTIONS, names={"pi": math.pi, "inf": math.inf, **values})
     try:
         return evaluator.eval(expression)
     except (ZeroDivisionError, OverflowError, ValueError):

@@ -33,9 +33,6 @@ CODE_FOLDER = Path(__file__).resolve().parents[1]
 CONFIGURATION_KEY = "configuration"
 """First key of a path into the configuration of the plugins; others lead into the study itself."""
 
-DECIDING = {"plugins", "simulation", "motion", "settle", "duration", "measure", "fails"}
-"""Keys of a study that decide what a run is."""
-
 VARYING = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
 """First keys of paths of what may vary."""
 
@@ -167,7 +164,8 @@ class Study:
     def planned(self, index: int, seed: int, variations: Mapping[str, Any]) -> PlannedRun:
         """Plan a run."""
         record, over = self.settings(variations)
-        settings = _without_places(record.model_dump(include=DECIDING))
+        decisive = {"plugins", "simulation", "motion", "settle", "duration", "measure", "fails"}
+        settings = _without_places(record.model_dump(include=decisive))
         changes = None if over is None else over.plain()
         files = [_file_hash(str(path)) for path in _files(record)]
         key = _hash(json.dumps([settings, changes, seed, files], sort_keys=True), self._unchanged)

@@ -14,23 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.errors import StudyError, UnknownName
-from solfer.recording.review import CANVAS_FONT, FIRST_COLOR, WRONG, check_suffix, new_figure, save
+from solfer.recording.review import FIRST_COLOR, FONT_SIZE, WRONG_COLOR, check_suffix, new_figure, save
 from solfer.study.folder import RECORDING, RUNS, StudyFolder, write_whole
 
 if TYPE_CHECKING:
     from solfer.recording.review import Figure
 
-WORST = 5
-"""How many runs are shown by themselves."""
-
-REPORT_MAPS = 6
-"""Most maps of a measure."""
-
 MAP_VALUES = 12
 """Most values of a variable for a map of all its values; of more the range is cut into as many pieces."""
-
-REPORT_SHOWN_COUNT = 2000
-"""Most rows of the table on the page; all of them are in `table.csv`."""
 
 STYLE = """
 body { font: 14px/1.45 sans-serif; margin: 2em auto; max-width: 72em; padding: 0 1em; color: #222 }
@@ -105,7 +96,7 @@ def _number(value: Any) -> float:
 
 def _summary(rows: Sequence[Row], measures: Sequence[str]) -> str:
     """Return the table of mean, deviation and quantiles of each measure, of the runs that did not fail."""
-    heads = ("measure", "runs", "mean", "deviation", "least", "median", "95 %", "largest")
+    heads = ("measure", "runs", "mean", "deviation", "minimum", "median", "95 %", "maximum")
     lines = []
     for name in measures:
         values = numbers([row for row in rows if not row["failed"]], name)
@@ -126,27 +117,28 @@ def _histogram(rows: Sequence[Row], name: str) -> str:
     figure = new_figure(3.4, 2.2)
     axes = figure.add_subplot()
     parts = [values[counts & ~failed], values[counts & failed]]
-    axes.hist(parts, bins=30, stacked=True, color=[FIRST_COLOR, WRONG])
+    axes.hist(parts, bins=30, stacked=True, color=[FIRST_COLOR, WRONG_COLOR])
     axes.set_xlabel(name)
     axes.set_ylabel("runs")
     return _picture(figure)
 
 
 def _maps(rows: Sequence[Row], names: Sequence[str], measures: Sequence[str]) -> list[str]:
-    """Draw each measure, and the share of runs that failed, over each two variables."""
+    """Draw each measure, and the fraction of runs that failed, over each two variables."""
     varying = [name for name in names if len({str(row.get(name)) for row in rows}) > 1]
     pairs = list(itertools.combinations(varying, 2))
     found = []
     for measure in ("failed", *measures):
         values = _of_good(rows, measure)
         found += [
-            _picture(_map(rows, first, second, measure=measure, values=values)) for first, second in pairs[:REPORT_MAPS]
+            _picture(_map(rows, first, second, measure=measure, values=values))
+            for first, second in pairs[:6]  # more would bury the page
         ]
     return found
 
 
 def write_map(folder: StudyFolder, first: str, second: str, measure: str, out: Path) -> None:
-    """Draw the mean of a measure over two variables; `failed` is the share of runs that failed.
+    """Draw the mean of a measure over two variables; `failed` is the fraction of runs that failed.
 
     Raises:
         UnknownName: There is no such variable, or no such measure.
@@ -188,7 +180,7 @@ def _map(rows: Sequence[Row], first: str, second: str, measure: str, values: np.
     axes.set_yticks(range(len(up_names)), up_names)
     axes.set_xlabel(first)
     axes.set_ylabel(second)
-    figure.colorbar(image, label="share that failed" if measure == "failed" else measure)
+    figure.colorbar(image, label="fraction that failed" if measure == "failed" else measure)
     return figure
 
 
@@ -213,7 +205,7 @@ def _worst(folder: StudyFolder, rows: Sequence[Row]) -> str:
     size = np.nan_to_num(sign * numbers(rows, str(goal)), nan=-math.inf)
     order = sorted(range(len(rows)), key=lambda place: (-rows[place]["failed"], -size[place]))
     items = []
-    for place in order[:WORST]:
+    for place in order[:5]:
         row = rows[place]
         command = (
             f"solfer study {shlex.quote(folder.study.file)} --out {shlex.quote(str(folder.path))} --rerun {row['id']}"
@@ -242,9 +234,9 @@ def _plot(folder: StudyFolder, run_id: str) -> str:
     for place, (name, column) in enumerate(zip(names, values, strict=True)):
         axes = figure.add_subplot(down, across, place + 1)
         axes.plot(times, column, color=FIRST_COLOR, linewidth=1.0)
-        axes.set_title(name, fontsize=CANVAS_FONT)
-        axes.tick_params(labelsize=CANVAS_FONT)
-    axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
+        axes.set_title(name, fontsize=FONT_SIZE)
+        axes.tick_params(labelsize=FONT_SIZE)
+    axes.set_xlabel("time [s]", fontsize=FONT_SIZE)
     recorded = (
         f"<p>recording: <code>{html.escape(str(run / RECORDING))}</code></p>" if (run / RECORDING).exists() else ""
     )
@@ -253,13 +245,11 @@ def _plot(folder: StudyFolder, run_id: str) -> str:
 
 def _table(rows: Sequence[Row]) -> str:
     heads = list(rows[0])
-    lines = [[_shown(row.get(name)) for name in heads] for row in rows[:REPORT_SHOWN_COUNT]]
-    marks = ["failed" if row["failed"] else "" for row in rows[:REPORT_SHOWN_COUNT]]
-    more = (
-        f"<p>{len(rows) - REPORT_SHOWN_COUNT} more are in <code>table.csv</code>.</p>"
-        if len(rows) > REPORT_SHOWN_COUNT
-        else ""
-    )
+    shown = rows[:2000]
+    lines = [[_shown(row.get(name)) for name in heads] for row in shown]
+    marks = ["failed" if row["failed"] else "" for row in shown]
+    left = len(rows) - len(shown)
+    more = f"<p>{left} more are in <code>table.csv</code>.</p>" if left else ""
     return f"<h2>Runs</h2><div class=rows>{_html_table(heads, lines, marks)}</div>{more}"
 
 

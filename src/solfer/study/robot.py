@@ -16,12 +16,6 @@ from solfer.study.records import PayloadRecord, SimulationRecord
 PAYLOAD_NAME = "study_payload"
 """Name of the link and of the joint of a payload."""
 
-PAYLOAD_RADIUS = 0.05
-"""Radius of the ball that a payload is [m]."""
-
-SPHERE = 0.4
-"""Moment of inertia of a ball by its mass and the square of its radius."""
-
 
 def bundle_of(record: SimulationRecord, seed: int) -> BundleRecord:
     """Read the robot's bundle, with the sensors of the record and a seed of their noise.
@@ -139,7 +133,8 @@ def _add_payload(root: ElementTree.Element, payload: PayloadRecord) -> None:
     link = ElementTree.SubElement(root, "link", name=PAYLOAD_NAME)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "mass", value=repr(payload.mass))
-    moment = repr(SPHERE * payload.mass * PAYLOAD_RADIUS**2)
+    radius = 0.05  # of a solid ball, whose moment of inertia is 2/5 m r^2 [m]
+    moment = repr(0.4 * payload.mass * radius**2)
     ElementTree.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
     joint = ElementTree.SubElement(root, "joint", name=PAYLOAD_NAME, type="fixed")
     ElementTree.SubElement(joint, "parent", link=payload.link)

@@ -18,13 +18,6 @@ from solfer.study.simulated_run import SimulatedRun
 from solfer.telemetry.black_box import TRUTH_MESSAGE, BlackBox
 from solfer.telemetry.drain import RecordDrain, writer_of
 
-DRAIN = 1.0
-"""Period in which a recording is written [s]."""
-
-
-KEPT_ROWS = 400
-"""Most rows of the columns that are kept for pictures."""
-
 
 def run(
     configuration: str | os.PathLike,
@@ -73,7 +66,7 @@ def carry_out(
         changes: What is laid over the configuration; None: nothing.
         variations: What varies, by name, for expressions.
         recording: File of a recording, MCAP; None: none.
-        columns: File for the columns that are measured, NPZ, `KEPT_ROWS` rows at most; None: none.
+        columns: File for the columns that are measured, NPZ, 400 rows at most; None: none.
         gui: Open PyBullet's window.
 
     Raises:
@@ -95,7 +88,7 @@ def carry_out(
 
 def _keep_columns(columns: Columns, file: Path) -> None:
     """Write every n-th row of the columns."""
-    step = max(1, -(-columns.count // KEPT_ROWS))
+    step = max(1, -(-columns.count // 400))  # enough for pictures
     values = np.array([columns[name][::step] for name in columns.names], dtype=np.float32)
     np.savez_compressed(file, names=np.array(columns.names), times=columns.times[::step], values=values)
 
@@ -107,9 +100,13 @@ def recorded(simulated: SimulatedRun, file: Path) -> Iterator[None]:
     Raises:
         RecordingError: The file cannot be written.
     """
+    drain_period = 1.0  # [s]
     plugins = list(simulated.plugins.values())
     truth = simulated.node("recorder").reader("floating_base", TRUTH_MESSAGE) if simulated.simulation.floating else None
-    with TemporaryDirectory() as folder, closing(BlackBox(Path(folder), plugins, 2.0 * DRAIN, truth=truth)) as box:
+    with (
+        TemporaryDirectory() as folder,
+        closing(BlackBox(Path(folder), plugins, 2.0 * drain_period, truth=truth)) as box,
+    ):
         drain = RecordDrain(Path(folder))
         with closing(writer_of(file, [drain])) as writer:
             simulated.every(1.0 / plugins[0].rate, lambda: box.record(simulated.nanoseconds(), 0, 0))
@@ -117,7 +114,7 @@ def recorded(simulated: SimulatedRun, file: Path) -> Iterator[None]:
             def fill() -> None:
                 drain.fill()
 
-            simulated.every(DRAIN, fill)
+            simulated.every(drain_period, fill)
             yield
             fill()
             writer.finish(drain.lost)

@@ -7,15 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from solfer.study.drive import DRIVE_POLL_PERIOD, StudyProgress
+from solfer.study.drive import POLL_PERIOD, StudyProgress
 from solfer.study.engines import engine_of, needs
 from solfer.study.folder import StudyFolder
 from solfer.study.plan import PlannedRun
 from solfer.study.records import SearchRecord, VariationRecord
 from solfer.study.result import Result
-
-STORAGE = "search.log"
-"""File of Optuna's journal; it works on file systems of a network, too."""
 
 
 def search(
@@ -37,7 +34,8 @@ def search(
         from optuna.storages import JournalStorage
         from optuna.storages.journal import JournalFileBackend
     optuna.logging.set_verbosity(logging.WARNING)
-    storage = JournalStorage(JournalFileBackend(str(folder.path / STORAGE)))
+    # a journal works on file systems of a network, too
+    storage = JournalStorage(JournalFileBackend(str(folder.path / "search.log")))
     study = optuna.create_study(
         storage=storage,
         study_name="search",
@@ -61,7 +59,7 @@ def search(
             if not waiting:
                 break
             started.check()
-            time.sleep(DRIVE_POLL_PERIOD)
+            time.sleep(POLL_PERIOD)
     finally:
         started.close()
     progress.show(is_last=True)

@@ -30,17 +30,8 @@ from solfer.study.records import StudyRecord
 from solfer.study.robot import bundle_of, faults_of, simulation_of
 from solfer.telemetry.plugin_log import PluginLog
 
-RUN_PERIOD = 0.02
+MOTION_PERIOD = 0.02
 """Period of what moves the robot [s]."""
-
-SAMPLE = 0.005
-"""Period in which columns are sampled [s]."""
-
-START = 10.0
-"""Longest time in which all plugins have to run [s]."""
-
-TRUTH_PREFIX = "simulation"
-"""Begin of the channels of the true robot."""
 
 Configuration = tuple[str, config.Configuration] | SharedConfiguration
 """A plugin and its configuration, or a shared plugin."""
@@ -118,7 +109,7 @@ class SimulatedRun:
         self._begin = math.inf
         self.columns = Columns(self.sources, self._names(), self._where)
         self._pushes = sorted(record.simulation.pushes, key=lambda push: push.at)
-        self.bus.every(SAMPLE, self._sample)
+        self.bus.every(0.005, self._sample)
         self._settle()
 
     @property
@@ -155,7 +146,7 @@ class SimulatedRun:
         """Do some work once each `period` [s] from now on, after the plugins."""
         self.bus.every(period, work)
 
-    def step(self, duration: float = RUN_PERIOD) -> None:
+    def step(self, duration: float = MOTION_PERIOD) -> None:
         """Let a time pass [s]; a run that has failed stays as it is."""
         end = self.bus.time + duration
         while not self.failure and self.bus.time < end - 1e-12:
@@ -182,7 +173,7 @@ class SimulatedRun:
             self.done = not self.failure
             return
         while not self.is_over:
-            self.step(min(RUN_PERIOD * 5, max(self.record.duration - self.time, STEP)))
+            self.step(min(MOTION_PERIOD * 5, max(self.record.duration - self.time, STEP)))
         if not self.done and not self.failure and self._navigation is not None:
             waits = f": it waits for {self._navigation.waits}" if self._navigation.waits else ""
             self.failure = f"the motion is not over after {self.record.duration:g} s{waits}"
@@ -251,17 +242,17 @@ class SimulatedRun:
         begin = self.bus.time
         self._run_until(begin + self.record.settle)
         while not self.failure and (waiting := self._waiting()):
-            if self.bus.time - begin > START + self.record.settle:
+            if self.bus.time - begin > 10.0 + self.record.settle:  # the plugins take some time to start
                 self.failure = f"{waiting.name} {waiting.health()[1]}"
-            self._run_until(self.bus.time + RUN_PERIOD)
+            self._run_until(self.bus.time + MOTION_PERIOD)
         self.bus.check_faults()
         self._begin = self.bus.time
         self._sample()
         mover = self.node("navigation")
         course = self._course(mover)
         if course is not None:
-            self._navigation = Navigation(mover, course, mover.name, rate=1.0 / RUN_PERIOD)
-            self.bus.every(RUN_PERIOD, self._navigate)
+            self._navigation = Navigation(mover, course, mover.name, rate=1.0 / MOTION_PERIOD)
+            self.bus.every(MOTION_PERIOD, self._navigate)
 
     def _waiting(self) -> Plugin | None:
         return next((plugin for plugin in self.plugins.values() if not plugin.running), None)
@@ -270,7 +261,7 @@ class SimulatedRun:
         """Make what moves the robot from a node; None: nothing does, or a function."""
         motion = self.record.motion
         if motion.scenario is not None:
-            player = Player(read_scenario(str(motion.scenario.location)), RUN_PERIOD)
+            player = Player(read_scenario(str(motion.scenario.location)), MOTION_PERIOD)
             return ScenarioCourse(mover, player, motion.target, odometry=motion.odometry, positions=motion.positions)
         if motion.references is not None:
             references = read_references(str(motion.references.location))
@@ -321,7 +312,7 @@ class _TruthLog:
     def __init__(self, run: SimulatedRun):
         self._simulation = simulation = run.simulation
         self._model = simulation.kinematics.twin()
-        log = Logger(TRUTH_PREFIX)
+        log = Logger("simulation")
         names = simulation.kinematics.dofs
         for title, array, unit in (
             ("position", simulation.q, "rad"),
@@ -354,7 +345,7 @@ class _TruthLog:
         self._base[4] = math.acos(min(1.0, max(-1.0, float(rotation[2, 2]))))
 
     def _unwrapped(self, heading: float) -> float:
-        """Return a heading without its turns, as it is nearest to the one before [rad]."""
+        """Return a heading without its revolutions, as it is nearest to the one before [rad]."""
         before = float(self._base[3])
         return heading + math.tau * round((before - heading) / math.tau)
 

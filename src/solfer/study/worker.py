@@ -20,7 +20,7 @@ from solfer.errors import MissingDependency, SolferError, SolferErrors, StudyErr
 from solfer.study.folder import (
     COLUMNS_FILE,
     CONFIGURATION_FILE,
-    HEARTBEAT,
+    HEARTBEAT_PERIOD,
     RECORDING,
     STDERR_FILE,
     Claim,
@@ -32,13 +32,7 @@ from solfer.study.records import RunLimitsRecord, StudyRecord
 from solfer.study.result import FAULTS, Result
 from solfer.supervision import end_with_parent
 
-WORKER_POLL_PERIOD = 0.02
-"""Period in which a run is watched [s]."""
-
-WORKER_REPEAT_PERIOD = 0.5
-"""Time between two looks for runs where others work on all that are left [s]."""
-
-KILLED = 3
+ATTEMPTS = 3
 """How often a run is begun that is killed from outside, as by the kernel where memory is short."""
 
 ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
@@ -68,7 +62,7 @@ def work(folder: Path, follow: bool = False) -> int:
         done = sum(_take_up(study, run) for run in left)
         count += done
         if not done:
-            time.sleep(WORKER_REPEAT_PERIOD)
+            time.sleep(0.5)  # other workers have taken up all that are left
         if follow:
             study.load()
 
@@ -78,7 +72,7 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
     claim = study.claim(run)
     if claim is None:
         return False
-    for _ in range(KILLED):
+    for _ in range(ATTEMPTS):
         child = _start(study, run)
         try:
             failure, code = _watch(study.study.record.limits, claim, child)
@@ -91,10 +85,12 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
         if failure:
             break
     else:
-        failure = f"its process was killed {KILLED} times; see {STDERR_FILE}"
+        failure = f"its process was killed {ATTEMPTS} times; see {STDERR_FILE}"
         if code != -signal.SIGKILL:  # which the kernel sends where memory is short; others say nothing about the run
             raise StudyError(
-                f"a run was ended {KILLED} times by {_name(code)}", where=str(claim.folder), expected="no signals to it"
+                f"a run was ended {ATTEMPTS} times by {_name(code)}",
+                where=str(claim.folder),
+                expected="no signals to it",
             )
     study.finish(run, Result(failure))
     return True
@@ -139,14 +135,14 @@ def _watch(limits: RunLimitsRecord, claim: Claim, child: int) -> tuple[str, int]
         if ended:
             break
         now = time.monotonic()
-        if now - renewed > HEARTBEAT:
+        if now - renewed > HEARTBEAT_PERIOD:
             claim.renew()
             renewed = now
         excess = _excess(limits, child, now - begin)
         if excess and not failure:
             failure = excess
             os.kill(child, signal.SIGKILL)
-        time.sleep(WORKER_POLL_PERIOD)
+        time.sleep(0.02)
     code = os.waitstatus_to_exitcode(status)
     if code == UNFINISHED:
         raise StudyError(

@@ -14,7 +14,7 @@ from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.pipes.sharing.cached_feedback import CachedFeedbackPipe
 from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.plugin import Plugin
-from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
+from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
 from solfer.recording.log import Logger, LogSource, with_units
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND
 from solfer.robot import Robot
@@ -193,7 +193,7 @@ def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     else:
         columns = NAMED[kind]
         names = [f"{index} {column}" for index in range(port.count) for column in columns]
-        of_columns = (unit,) * len(columns) if unit else with_units(columns, CHANNEL_UNITS)
+        of_columns = (unit,) * len(columns) if unit else with_units(columns, UNITS)
         log.add(name, port.value, names, unit=of_columns * port.count, frame=frame)
 
 

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.full_control import CIRCLE_FRAME, PERIOD, Layer, Nodes, course
+from support.paper.full_control import FRAME, PERIOD, Layer, Nodes, course
 
 from solfer.middleware.memory import read_faults
 from solfer.scenarios import Player, read_scenario
@@ -78,7 +78,7 @@ class Course:
 
     def _pose(self, world):
         now = world.simulation.state.now
-        rotation, place = now.rotation(CIRCLE_FRAME), world.center_of_legs()
+        rotation, place = now.rotation(FRAME), world.center_of_legs()
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
         return place[0], place[1], heading, math.acos(min(1.0, rotation[2, 2]))
 

@@ -83,7 +83,7 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     for row, most in (("centre of mass of the legs, from its reference", 5.0), ("vertices", 6.0), ("hands", 8.0)):
         assert 0.0 < float(re.search(r"([\d.]+) mm at most", rows[row])[1]) < most
     assert float(rows["odometry against truth"].split()[0]) < 5.0
-    assert float(rows["slip, share of the way of wheels"]) < 0.02
+    assert float(rows["slip, fraction of the way of wheels"]) < 0.02
     assert 95.0 < float(rows["forces of the ground"].split()[1]) < 105.0
     path = tmp_path / "film.gif"
     film(shown.robot, seen.time[-30:], seen.position[-30:], FLAT_WORLD, path)
@@ -111,8 +111,8 @@ def test_a_slow_machine_is_told():
 
 
 def test_a_figure_that_is_too_large_is_marked():
-    assert driving_report.bounded(0.5, driving_report.LIMIT_HEADING, "degrees") == ""
-    assert driving_report.bounded(0.9, driving_report.LIMIT_HEADING, "degrees") == "  <-- more than 0.8 degrees"
+    assert driving_report.bounded(0.5, 0.8, "degrees") == ""
+    assert driving_report.bounded(0.9, 0.8, "degrees") == "  <-- more than 0.8 degrees"
 
 
 def lost(seconds):

@@ -7,7 +7,7 @@ from support.simulation.hardware_plugin import mocked
 
 from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
-from solfer.demo.waving import CIRCLE_FRAME, CIRCLE_HANDS, Waving
+from solfer.demo.waving import FRAME, HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
 from solfer.navigation import Navigation, ScenarioCourse
@@ -66,11 +66,11 @@ class Driven:
     def seen(self, link: str) -> np.ndarray:
         """Return where a link truly is as seen from the pelvis, shape (3,) [m]."""
         now = self.simulation.state.now
-        return now.rotation(CIRCLE_FRAME).T @ (now.position(link) - now.position(CIRCLE_FRAME))
+        return now.rotation(FRAME).T @ (now.position(link) - now.position(FRAME))
 
     def hands(self) -> dict[str, np.ndarray]:
         """Return where the hands truly are as seen from the pelvis, by task, each of shape (3,) [m]."""
-        return {name: self.seen(link) for name, link in CIRCLE_HANDS.items()}
+        return {name: self.seen(link) for name, link in HANDS.items()}
 
     def footprint(self) -> np.ndarray:
         """Return where the wheels truly are as seen from the pelvis, x and y, shape (4, 2) [m]."""
@@ -87,7 +87,7 @@ class Driven:
         """Return where the centre of mass truly is as seen from the pelvis, shape (3,) [m]."""
         self.simulation.kinematics.update(self.simulation.q)
         now = self.simulation.state.now
-        return now.rotation(CIRCLE_FRAME).T @ (self.simulation.kinematics.center_of_mass - now.position(CIRCLE_FRAME))
+        return now.rotation(FRAME).T @ (self.simulation.kinematics.center_of_mass - now.position(FRAME))
 
 
 class Nodes(Driven, World):

@@ -204,7 +204,7 @@ sys.exit(", ".join({HEAVY!r} & set(sys.modules)))
 
 
 def test_a_layer_that_ignores_the_stop_is_named(namespace, statistics, capsys, monkeypatch):
-    monkeypatch.setattr("solfer.cli.rt.estop.LATCH_PATIENCE", 0.05)
+    monkeypatch.setattr("solfer.cli.rt.estop.LATCH_TIMEOUT", 0.05)
     assert rt(namespace, "estop") == 2
     assert f"process {statistics.pid} has not read the emergency stop" in capsys.readouterr().err
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solfer.demo.waving import CIRCLE_RADIUS, CIRCLE_TIME, RAISE, Waving
+from solfer.demo.waving import Waving
 from solfer.middleware.memory import Bus, MemoryMiddleware
 
 HANDS = {"left": np.array((0.5, 0.3, 0.1)), "right": np.array((0.5, -0.3, 0.1))}
@@ -16,7 +16,7 @@ def test_hands_are_mirror_images_half_a_turn_apart():
     waving.send(0.0)
     assert all((waving.desired[name] == place).all() for name, place in HANDS.items())
     ways = []
-    for time in RAISE + CIRCLE_TIME * np.linspace(0.0, 1.0, 41):
+    for time in 2.0 + 3.0 * np.linspace(0.0, 1.0, 41):
         waving.send(time)
         ways.append([waving.desired[name] - place for name, place in HANDS.items()])
     left, right = np.swapaxes(ways, 0, 1)
@@ -24,5 +24,5 @@ def test_hands_are_mirror_images_half_a_turn_apart():
     assert left[:, 1:] - left[:, 1:].mean(axis=0) == pytest.approx(
         (right[:, 1:] - right[:, 1:].mean(axis=0)) * (1.0, -1.0), abs=0.01
     )
-    assert np.ptp(left, axis=0) == pytest.approx((0.0, 2.0 * CIRCLE_RADIUS, 2.0 * CIRCLE_RADIUS), abs=0.01)
+    assert np.ptp(left, axis=0) == pytest.approx((0.0, 0.2, 0.2), abs=0.01)
     assert left[:, 1].mean() == pytest.approx(-right[:, 1].mean(), abs=0.01) and left[:, 1].mean() > 0.05

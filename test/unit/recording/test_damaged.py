@@ -122,7 +122,8 @@ def test_a_file_that_unpacks_to_much_is_an_error(file, monkeypatch, capsys):
         return struct.pack("<BQ", 6, len(head) + len(packed)) + head + packed
 
     many = 2**20 // len(message)
-    monkeypatch.setattr(reader, "_MCAP_ROOM", (2**21, 32))
+    monkeypatch.setattr(reader, "_MAX_UNPACKED_SIZE", 2**21)
+    monkeypatch.setattr(reader, "_MAX_EXPANSION", 32)
     file.write_bytes(data[:place] + 5 * chunk(many) + data[place + 9 + length :])
     with pytest.raises(RecordingError, match="unpacks to more than"):
         read(file)
@@ -133,6 +134,6 @@ def test_a_file_that_unpacks_to_much_is_an_error(file, monkeypatch, capsys):
 
 
 def test_attachments_and_texts_have_bounds(file, monkeypatch):
-    monkeypatch.setattr(reader, "_MCAP_OTHERS", 100)
+    monkeypatch.setattr(reader, "_MAX_OTHERS_SIZE", 100)
     with pytest.raises(RecordingError, match="that are no messages"):
         read(file)

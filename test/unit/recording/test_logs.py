@@ -242,8 +242,8 @@ def test_each_plugin_has_its_picture(file, capsys):
 
 
 def test_progress_is_shown_on_a_terminal_alone(capsys, monkeypatch):
-    monkeypatch.setattr("solfer.cli.recordings.progress.AFTER", 0.0)
-    monkeypatch.setattr("solfer.cli.recordings.progress.PROGRESS_PERIOD", 0.0)
+    monkeypatch.setattr("solfer.cli.recordings.progress.DELAY", 0.0)
+    monkeypatch.setattr("solfer.cli.recordings.progress.PERIOD", 0.0)
     assert list(progress(range(3), 3, "rows")) == [0, 1, 2]
     assert capsys.readouterr().err == ""
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)

@@ -12,7 +12,7 @@ from pybag.mcap_reader import McapFileReader
 from rosbags.highlevel import AnyReader
 
 from solfer.errors import RecordingError, UnknownName
-from solfer.recording.kinds import CHANNEL_UNITS, JOINT_PARTS, NAMED
+from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Event, Recording
 from solfer.recording.reader import read
 from solfer.recording.writer import RecordingWriter, save
@@ -26,7 +26,7 @@ def channel(name, kind, columns, times, frame="", child=""):
     """Make numbers of all kinds, among them those that do not survive a detour over text or float32."""
     values = np.random.default_rng(len(name)).standard_normal((len(times), len(columns)))
     values.flat[: len(STRANGE)] = STRANGE[: values.size]
-    units = tuple(CHANNEL_UNITS.get(column, "") for column in columns)
+    units = tuple(UNITS.get(column, "") for column in columns)
     return Channel(name, kind, tuple(columns), units, frame, times, values, child)
 
 

@@ -46,9 +46,10 @@ def test_callers_are_bounded_and_leave_their_places(server, monkeypatch):
     silent = [socket.create_connection(server.server_address, 5.0) for _ in range(ports.CALLERS + 1)]
     assert silent[-1].recv(1) == b""
     end = time.monotonic() + 5.0
-    while asked(server, b"%d" % len(CALL)) != b"HTTP/1.1 200" and time.monotonic() < end:
+    # on a busy machine a call may take longer than the timeout
+    while (reply := asked(server, b"%d" % len(CALL))) != b"HTTP/1.1 200" and time.monotonic() < end:
         time.sleep(0.01)
-    assert asked(server, b"%d" % len(CALL)) == b"HTTP/1.1 200"
+    assert reply == b"HTTP/1.1 200"
     for each in silent:
         each.close()
 

@@ -13,7 +13,7 @@ from solfer.interfaces.support import SupportMargins
 from solfer.interfaces.task_references import TaskReferences
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.scene import LiveScene
-from solfer.scene.discovery import DISCOVERY_STALE_AGE
+from solfer.scene.discovery import STALE_AGE
 from solfer.scene.polygon import hull, shrunk
 from solfer.transport import BodyMessage, JointMessage
 from solfer.transport.declared.fields import message_of
@@ -116,7 +116,7 @@ def test_without_joints_or_base_there_is_no_scene(robots):
     assert robots.scene.update() is None
     robots.publish()
     assert robots.scene.update() is not None
-    robots.bus.run_until(robots.bus.time + DISCOVERY_STALE_AGE + 0.1)
+    robots.bus.run_until(robots.bus.time + STALE_AGE + 0.1)
     assert robots.scene.update() is None
 
 
@@ -126,7 +126,7 @@ def test_the_desired_robot_ends_with_its_commands(robots):
     robots.bus.run_until(2.0)
     robots.write("position_controller/command", "solfer/JointCommand", message)
     assert robots.look().desired
-    robots.bus.run_until(robots.bus.time + DISCOVERY_STALE_AGE + 0.1)
+    robots.bus.run_until(robots.bus.time + STALE_AGE + 0.1)
     assert robots.look().desired == {}
 
 

@@ -14,7 +14,7 @@ from support.unit.studies import made
 from solfer.errors import StudyError
 from solfer.study import Result
 from solfer.study.drive import StudyProgress, find_run
-from solfer.study.folder import DEAD, STUDY, StudyFolder
+from solfer.study.folder import CLAIM_TIMEOUT, STUDY, StudyFolder
 
 VARY = {"mass": {"path": "simulation/mass", "grid": [0.9, 1.0, 1.1]}}
 
@@ -54,7 +54,7 @@ def test_a_run_of_another_machine_is_taken_up_when_its_heartbeat_is_old(folder):
     claim = folder.claim(run)
     owned(claim, machine="another one")
     assert folder.claim(run) is None
-    old = time.time() - DEAD - 5.0
+    old = time.time() - CLAIM_TIMEOUT - 5.0
     os.utime(claim._file, (old, old))
     claim.renew()
     assert folder.claim(run) is None

@@ -26,9 +26,6 @@ UNUSUAL = 5
 MEASURED_CYCLES = 200
 """Most cycles that are run after the start."""
 
-MEASURED_PATIENCE = 10.0
-"""Longest time until a plugin runs on the simulation [s]."""
-
 FEWEST = 40
 """Least number of cycles in which a recorded plugin has to run."""
 
@@ -140,7 +137,7 @@ def _simulated(robot: StandingRobot, plugin: Plugin, meter: CycleMeter, where: s
     robot.every(1.0 / plugin.rate, meter.cycle)
     while not meter.done:
         robot.run(10.0 / plugin.rate)
-        if robot.time > MEASURED_PATIENCE and not plugin.running:
+        if robot.time > 10.0 and not plugin.running:
             raise SimulationError(
                 f"the plugin does not start: {plugin.health()[1]}",
                 where=where,

@@ -22,12 +22,9 @@ OFTEN = 0.1
 KEPT_BYTES = 8.0
 """Least memory that a line keeps in each cycle, to be named [bytes]."""
 
-ALLOCATION_DEPTH = 12
-"""Calls that are remembered of memory that stays."""
-
 # events of CPython's tracing
 CALL = 0
-ALLOCATION_LINE = 2
+LINE = 2
 RETURN = 3
 _EVENT = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.py_object, ctypes.c_int, ctypes.c_void_p)
 _set_trace = ctypes.pythonapi.PyEval_SetTrace
@@ -103,7 +100,7 @@ class LineMeter:
 
     def watch(self) -> None:
         """Watch from now on what is taken and given back; nothing else may be measured before `end`."""
-        tracemalloc.start(ALLOCATION_DEPTH)
+        tracemalloc.start(12)  # calls that are remembered of memory that stays
 
     def begin(self) -> None:
         """Begin to count what stays; what is replaced in each cycle was taken under these eyes before."""
@@ -130,11 +127,11 @@ class LineMeter:
             size -= sys.getsizeof(frame)  # made for the trace alone
         if size >= SMALLEST_PIECE and key and self._counts:
             self._charge(key, size)
-        if frame.f_code is _VIEW and event == ALLOCATION_LINE:
+        if frame.f_code is _VIEW and event == LINE:
             self._probed = max(self._probed, size)
         if event == RETURN:
             stack.pop()
-        elif event in (CALL, ALLOCATION_LINE):
+        elif event in (CALL, LINE):
             owner = self._whose.of(frame.f_code.co_filename)
             if event == CALL:
                 stack.append(IGNORED_FRAMES if key is IGNORED_FRAMES or owner is CodeOwner.STAND_IN else key)

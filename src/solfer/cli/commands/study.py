@@ -8,9 +8,6 @@ import argparse
 import sys
 from pathlib import Path
 
-REPORT_WORD = "report"
-"""Word in place of a file that requests the page of a study."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
@@ -45,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     """
     from solfer.cli.study import actions
 
-    if options.file == REPORT_WORD:
+    if options.file == "report":  # in place of a file
         return actions.report(options.folder or options.out, options.map)
     try:
         if options.rerun is not None:

@@ -6,7 +6,7 @@ that it also works when a process hangs.
 
 import argparse
 
-from solfer.cli.rt.record import RECORD_SECONDS
+from solfer.cli.rt.record import SECONDS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +21,7 @@ def add_times(parser: argparse.ArgumentParser) -> None:
     """Declare when tables are printed."""
     parser.add_argument("--once", action="store_true", help="print the table once instead of again and again")
     parser.add_argument(
-        "--every", type=RECORD_SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
+        "--every", type=SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
     )
 
 

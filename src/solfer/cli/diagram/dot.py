@@ -15,9 +15,8 @@ PINK = "#f8d3d8"
 YELLOW = "#fff0b8"
 PURPLE = "#e4daf5"
 LINE_COLOR = "#3b4a5a"
-DIAGRAM_GREY = "#68778a"
+GREY = "#68778a"
 FONTS = "Helvetica,Arial,sans-serif"
-SYSTEMS = {"SM": "simulation", "HW": "hardware"}
 
 
 def dot_text(network: Network) -> str:
@@ -66,7 +65,7 @@ def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
 
 def _third_parties(network: Network) -> Iterator[str]:
     """Write yellow boxes: sensors at one end, the lower level at the other, and topics outside of the picture."""
-    system = SYSTEMS.get(network.system, network.system)
+    system = {"SM": "simulation", "HW": "hardware"}.get(network.system, network.system)
     for kind, rank in ((Kind.SENSORS, "source"), (Kind.LOWER_LEVEL, "sink")):
         for end in network.ends(kind):
             rows = [_row(f"<B>{kind.value}</B>"), _row(_small(system))]
@@ -96,7 +95,7 @@ def _row(text: str, colour: str = "") -> str:
 
 
 def _small(text: str) -> str:
-    return f'<FONT POINT-SIZE="9" COLOR="{DIAGRAM_GREY}">{escape(text)}</FONT>'
+    return f'<FONT POINT-SIZE="9" COLOR="{GREY}">{escape(text)}</FONT>'
 
 
 def _robot(plugin: PluginBox) -> str:

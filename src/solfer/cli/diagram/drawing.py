@@ -7,8 +7,6 @@ from pathlib import Path
 from solfer.errors import ConfigError, MissingDependency, SolferError
 
 FORMATS = ("svg", "png", "dot")
-DRAWING_PATIENCE = 60.0  # longest time for one picture [s]
-DOTS_PER_INCH = 110
 
 
 def draw(dot: str, path: Path) -> None:
@@ -43,13 +41,13 @@ def _rendered(dot: str, form: str) -> bytes:
             f"a {form} is drawn by Graphviz, which is not installed",
             expected="apt install graphviz; or without it: --text, or -o FILE.dot",
         )
-    resolution = [f"-Gdpi={DOTS_PER_INCH}"] if form == "png" else []
+    resolution = ["-Gdpi=110"] if form == "png" else []
     try:
         done = subprocess.run(
             [program, f"-T{form}", *resolution],
             input=dot.encode(),
             capture_output=True,
-            timeout=DRAWING_PATIENCE,
+            timeout=60.0,
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:

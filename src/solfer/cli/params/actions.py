@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from solfer.cli.columns import aligned
-from solfer.cli.params.callers import CALLER_PATIENCE, Caller
+from solfer.cli.params.callers import TIMEOUT, Caller
 from solfer.config.records.live import saved
 from solfer.errors import ConfigError, MiddlewareError, SolferError, UnknownName
 from solfer.interfaces.declaration import Accepted
@@ -20,7 +20,7 @@ from solfer.transport.parameters import (
     SetParameters,
 )
 
-PARAMETER_TITLES = ("name", "value", "unit", "range", "default", "description")
+TITLES = ("name", "value", "unit", "range", "default", "description")
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def show(options: argparse.Namespace, caller: Caller) -> None:
         rows = [(each.name, each.value, each.unit, each.range, each.default, each.description)
                 for each in _parameters(caller, plugin)]  # fmt: skip
         print(plugin)
-        for line in aligned((PARAMETER_TITLES, *rows), indent="  "):
+        for line in aligned((TITLES, *rows), indent="  "):
             print(line)
 
 
@@ -74,7 +74,7 @@ def put(options: argparse.Namespace, caller: Caller) -> None:
             raise ConfigError(f"'{name}' has no value", expected="NAME=VALUE, such as speed=0.8")
     request = SetParameters(tuple(name for name, _, _ in pairs), tuple(value for _, _, value in pairs))
     plugin = _known(options.running, caller.plugins())
-    _answered(caller.call(f"{plugin}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, CALLER_PATIENCE))
+    _answered(caller.call(f"{plugin}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, TIMEOUT))
 
 
 def save(options: argparse.Namespace, caller: Caller) -> None:
@@ -131,7 +131,7 @@ def _known(plugin: str, plugins: list[str]) -> str:
 
 def _parameters(caller: Caller, plugin: str, names: Iterable[str] = ()) -> Iterator[_Parameter]:
     request = GetParameters(tuple(names))
-    reply = caller.call(f"{plugin}/{GET_PARAMETERS}", GET_INTERFACE, request, ParametersReply, CALLER_PATIENCE)
+    reply = caller.call(f"{plugin}/{GET_PARAMETERS}", GET_INTERFACE, request, ParametersReply, TIMEOUT)
     _answered(reply)
     columns = (reply.names, reply.types, reply.values, reply.configured, reply.defaults, reply.units, reply.minimums,
                reply.maximums, reply.descriptions)  # fmt: skip

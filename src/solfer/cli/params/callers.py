@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from solfer.transport.parameters import GET_INTERFACE, GET_PARAMETERS
 
-CALLER_PATIENCE = 3.0
+TIMEOUT = 3.0
 """Longest time until a service answers [s]; a plugin whose loop stands still answers after 2 s."""
 
 

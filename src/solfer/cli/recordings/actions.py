@@ -58,7 +58,7 @@ def export(options: argparse.Namespace) -> None:
         print(options.bag)
 
 
-RECORDING_ACTIONS = {"info": info, "cut": cut, "export": export}
+ACTIONS = {"info": info, "cut": cut, "export": export}
 
 
 def _chosen(options: argparse.Namespace) -> Recording:

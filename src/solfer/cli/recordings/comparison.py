@@ -19,8 +19,8 @@ def report(result: Comparison, names: tuple[str, str], limits: bool = False) -> 
     span = result.times[-1] - result.times[0]
     yield f"{len(result.joints)} joints compared over {span:.2f} s; clock of {names[1]}: {result.shift:+.4f} s"
     yield from _differences(result)
-    if result.unjudged:
-        yield "hardly move, so that only an offset would have been found: " + ", ".join(result.unjudged)
+    if result.hardly_moving:
+        yield "hardly move, so that only an offset would have been found: " + ", ".join(result.hardly_moving)
     if limits:
         yield "found would have been, from:"
         yield from aligned(_limits(result), "  ")

@@ -6,9 +6,14 @@ from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
 Item = TypeVar("Item")
-AFTER = 1.0
-PROGRESS_PERIOD = 0.1
-PROGRESS_WIDTH = 40  # [s], [s], characters
+DELAY = 1.0
+"""Time after which the progress is shown [s]."""
+
+PERIOD = 0.1
+"""Period in which it is shown [s]."""
+
+WIDTH = 40
+"""Width of the bar in characters."""
 
 
 def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
@@ -19,20 +24,20 @@ def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
         total: How many there will be.
         unit: What they are.
     """
-    following = time.monotonic() + AFTER
+    following = time.monotonic() + DELAY
     shown = False
     count = 0
     for count, item in enumerate(items, 1):
         yield item
         if time.monotonic() >= following and sys.stderr.isatty():
-            following = time.monotonic() + PROGRESS_PERIOD
+            following = time.monotonic() + PERIOD
             shown = True
-            full = PROGRESS_WIDTH * count // max(1, total)
+            full = WIDTH * count // max(1, total)
             print(
-                f"\r[{'#' * full}{'.' * (PROGRESS_WIDTH - full)}] {count} of {total} {unit}",
+                f"\r[{'#' * full}{'.' * (WIDTH - full)}] {count} of {total} {unit}",
                 end="",
                 file=sys.stderr,
                 flush=True,
             )
     if shown:
-        print(f"\r{' ' * (PROGRESS_WIDTH + 40)}\r", end="", file=sys.stderr, flush=True)
+        print(f"\r{' ' * (WIDTH + 40)}\r", end="", file=sys.stderr, flush=True)

@@ -110,10 +110,10 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
     yield from aligned([head, *lines], "  ")
     if len(found.different) > TABLE_LINES:
         yield f"  ... and {len(found.different) - TABLE_LINES} more"
-    doubts = list(replay.doubts())
-    for text in doubts:
+    unrepeated = list(replay.unrepeated_inputs())
+    for text in unrepeated:
         yield f"cannot be repeated: {text}"
-    if not doubts:
+    if not unrepeated:
         yield "all inputs were repeated: it is the component that differs, or it reads the clock or random numbers"
 
 
@@ -123,13 +123,13 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
     Raises:
         RecordingError: The picture cannot be written.
     """
-    from solfer.recording.review import REPLAY_ROWS, replay_page, save
+    from solfer.recording.review import MAX_REPLAY_ROWS, replay_page, save
 
     recorded = recorded_commands(replay)
     rows = replay.rows
-    chosen = [(each.channel, each.column) for each in found.different[:REPLAY_ROWS]] or [
+    chosen = [(each.channel, each.column) for each in found.different[:MAX_REPLAY_ROWS]] or [
         (name, column) for name, channel in replay.commands.items() if name in recorded for column in channel.columns
-    ][:REPLAY_ROWS]
+    ][:MAX_REPLAY_ROWS]
     both = replay.running & rows.running
     tracks = []
     for name, column in chosen:

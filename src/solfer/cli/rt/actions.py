@@ -18,8 +18,6 @@ from solfer.telemetry.summaries import StatisticsReader
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH, TRIGGER, NoFields, SwitchRequest
 
-LAYER_PATIENCE = 2.0  # [s]
-
 
 def switch(options: argparse.Namespace, namespace: Namespace) -> None:
     """Start and stop plugins."""
@@ -70,6 +68,6 @@ def _call(namespace: Namespace, service: str, interface: str, request: Any) -> N
         MiddlewareError: The service does not answer, or it refuses.
     """
     with contextlib.closing(XbotMiddleware(namespace, f"solfer_rt_{os.getpid()}")) as middleware:
-        answer = middleware.call(service, interface, request, Answer, LAYER_PATIENCE)
+        answer = middleware.call(service, interface, request, Answer, 2.0)
     if not answer.success:
         raise MiddlewareError(answer.message)

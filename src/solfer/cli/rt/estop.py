@@ -7,11 +7,8 @@ from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.namespaces import layer_of, no_layer
 from solfer.segments.namespace import Namespace
 
-LATCH_PATIENCE = 2.0
+LATCH_TIMEOUT = 2.0
 """Longest time until the layer reads the latch, which it does in each cycle [s]."""
-
-LATCH_PERIOD = 0.005
-"""Period at which the latch is polled [s]."""
 
 
 def trip(namespace: Namespace, reason: str) -> None:
@@ -28,13 +25,13 @@ def trip(namespace: Namespace, reason: str) -> None:
     while stop.answered < begin:
         if layer is None or not layer.owned():
             raise _not_obeyed(namespace)
-        if time.monotonic_ns() > begin + 1e9 * LATCH_PATIENCE:
+        if time.monotonic_ns() > begin + 1e9 * LATCH_TIMEOUT:
             raise MiddlewareError(
-                f"no plugin obeys yet: process {layer.pid} has not read the emergency stop for {LATCH_PATIENCE:g} s",
+                f"no plugin obeys yet: process {layer.pid} has not read the emergency stop for {LATCH_TIMEOUT:g} s",
                 where=str(namespace.folder),
                 expected=f"an RT layer that cycles; end process {layer.pid}: the robot holds when it is gone",
             )
-        time.sleep(LATCH_PERIOD)
+        time.sleep(0.005)
     if not stop.holds:
         raise MiddlewareError(
             stop.answer_text,

@@ -21,13 +21,11 @@ if TYPE_CHECKING:
     from solfer.segments.namespace import Namespace
     from solfer.telemetry.drain import RecordDrain
 
-RECORD_PERIOD = 0.1
+POLL_PERIOD = 0.1
 """Period at which new rows are polled [s]."""
 
-RECORD_SECONDS = Number(0.01, 86400.0, "seconds")
+SECONDS = Number(0.01, 86400.0, "seconds")
 WAIT_SECONDS = Number(0.1, 86400.0, "seconds", zero=True)
-TRIED = 2.0
-"""Time after which the size of an hour is estimated [s]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,7 +44,7 @@ def add_file(parser: argparse.ArgumentParser) -> None:
     """Declare the file, and how long it shall be."""
     parser.add_argument("file", metavar="FILE", type=Path, help="the file, MCAP")
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--seconds", type=RECORD_SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
+    length.add_argument("--seconds", type=SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
     length.add_argument("--whole", action="store_true", help="begin with what is in memory already, until Ctrl-C")
     length.add_argument("--last", action="store_true", help="write what is in memory, also after a crash")
     parser.add_argument("--npz", action="store_true", help="write arrays for NumPy's `load` instead of MCAP")
@@ -87,7 +85,7 @@ def _waited(options: argparse.Namespace) -> "list[RecordDrain]":
             except UnknownName:
                 if time.monotonic() >= end or not ending.running():
                     raise
-            time.sleep(RECORD_PERIOD)
+            time.sleep(POLL_PERIOD)
 
 
 def record(options: argparse.Namespace, namespace: "Namespace") -> None:
@@ -167,12 +165,12 @@ def _follow(drains: "Sequence[RecordDrain]", seconds: float | None, writer: "Rec
                     print(f"warning: {error}", file=sys.stderr, flush=True)
                 warned = True
             passed = time.monotonic() - begin
-            if not is_reported and passed >= TRIED:
+            if not is_reported and passed >= 2.0:  # [s]
                 is_reported = True
                 print(f"{writer.path}: about {3600e-9 * writer.size / passed:.2g} GB an hour", flush=True)
             if over:
                 return
-            time.sleep(min(RECORD_PERIOD, max(0.0, end - time.monotonic())))
+            time.sleep(min(POLL_PERIOD, max(0.0, end - time.monotonic())))
 
 
 def _print(path: Path, drains: "Sequence[RecordDrain]", writer: "RecordingWriter") -> None:

@@ -6,7 +6,6 @@ from solfer.cli.columns import aligned
 from solfer.telemetry.statistics import COMPUTED
 from solfer.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
-TIME_TITLES = ("p50", "p99", "max", "left out")
 COLUMN_WIDTH = 8
 LEGEND = (
     "overhead: a cycle without its components; lateness: from the deadline to the beginning of a cycle",
@@ -55,7 +54,7 @@ def computed(plugins: Sequence[PluginSummary]) -> Iterator[str]:
 
 def times(layer: LayerSummary) -> Iterator[tuple[str, ...]]:
     """List times of the loop, and of the plugins and their stages [us], and the periods left out for each."""
-    yield "times [us]", "", *(title.rjust(COLUMN_WIDTH) for title in TIME_TITLES)
+    yield "times [us]", "", *(title.rjust(COLUMN_WIDTH) for title in ("p50", "p99", "max", "left out"))
     for name, stages in (("loop", layer.loop), *((plugin.name, plugin.stages) for plugin in layer.plugins)):
         for stage in stages:
             yield name, stage.name, *_figures(stage)

@@ -15,13 +15,6 @@ from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport
 
-CLEAR = "\x1b[H\x1b[2J"
-GATHERED = 2.5
-"""Time in which each node reports each of its parts under ROS [s]."""
-
-PART_SILENCE_LIMIT = 5.0
-"""Time without a report after which a part under ROS is silent [s]."""
-
 
 def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
     """Print the tables of an RT layer until Ctrl-C, or once. A layer that has ended may start again."""
@@ -57,14 +50,12 @@ def top_of_nodes(options: argparse.Namespace) -> None:
         for name, report in dict(reports()).items():
             if name not in seen or seen[name][0] is not report:
                 seen[name] = report, now
-        silent = {
-            name for name, (_, newest) in seen.items() if now - newest > max(PART_SILENCE_LIMIT, 2.0 * options.every)
-        }
+        silent = {name for name, (_, newest) in seen.items() if now - newest > max(5.0, 2.0 * options.every)}
         yield from health({name: report for name, (report, _) in seen.items()}, silent)
 
     with watched() as reports:
         reports()
-        time.sleep(GATHERED)
+        time.sleep(2.5)  # in which each node reports each of its parts
         _print(options, lines)
 
 
@@ -78,7 +69,7 @@ def health(reports: Mapping[str, HealthReport], silent: set[str] | frozenset[str
 
 
 def _print(options: argparse.Namespace, lines: Callable[[], Iterator[str]]) -> None:
-    clear = CLEAR if sys.stdout.isatty() and not options.once else ""
+    clear = "\x1b[H\x1b[2J" if sys.stdout.isatty() and not options.once else ""
     with contextlib.suppress(KeyboardInterrupt):
         while True:
             print(clear + "\n".join(lines()), flush=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from solfer.cli.skeletons.skeleton import ANOTHER, Skeleton
 from solfer.errors import ConfigError
 
-COMPONENT_TEMPLATES = {
+TEMPLATES = {
     "package.xml": "package.xml",
     "CMakeLists.txt": "CMakeLists.txt",
     "setup.py": "setup.py",
@@ -45,4 +45,4 @@ class ComponentSkeleton(Skeleton):
 
     def write(self) -> None:
         """Make the folder and all files; see `Skeleton.fill`."""
-        self.fill(COMPONENT_TEMPLATES, self._words)
+        self.fill(TEMPLATES, self._words)

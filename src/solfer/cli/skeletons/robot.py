@@ -13,7 +13,7 @@ from solfer.model.urdf.fixed_base import warn_of_fixed_base
 from solfer.model.urdf.unfit import check_masses, warn_of_unfit
 
 BUNDLE = "config/robots/@NAME@"
-ROBOT_TEMPLATES = {
+TEMPLATES = {
     "package.xml": "package.xml",
     "CMakeLists.txt": "CMakeLists.txt",
     f"{BUNDLE}/robot.yaml": "robot.yaml",
@@ -91,7 +91,7 @@ TIP_STACK = """\
 
 _QUOTES = {'"': "&quot;"}
 
-FOOT_HEIGHT = 0.1
+FOOT_HEIGHT_RATIO = 0.1
 """Links that are no higher than this part of the base's height above the lowest one are feet."""
 
 
@@ -150,7 +150,7 @@ class RobotSkeleton(Skeleton):
 
     def write(self) -> None:
         """Make the folder and all files; see `Skeleton.fill`."""
-        self.fill(ROBOT_TEMPLATES, self._words)
+        self.fill(TEMPLATES, self._words)
 
     def _seen_from_bundle(self, file: Path, name: str) -> str:
         return os.path.relpath(file.resolve(), self.folder.resolve() / BUNDLE.replace("@NAME@", name))
@@ -165,7 +165,7 @@ def feet_of(kinematics: Kinematics) -> list[str]:
     kinematics.update(neutral_posture(kinematics))
     heights = {link: kinematics.position(link)[2] for link in description.subtree(base)}
     lowest = min(heights.values())
-    highest = lowest + FOOT_HEIGHT * (heights[base] - lowest)
+    highest = lowest + FOOT_HEIGHT_RATIO * (heights[base] - lowest)
     # of links that are fixed to each other the lowest one counts
     tips = {_last_joint(description, link): link for link in sorted(heights, key=lambda each: -heights[each])}
     inner = {_last_joint(description, joint.parent) for joint in description.moving_joints}

@@ -14,7 +14,7 @@ from solfer.robot.names import FEEDBACK_MAP as FEEDBACK_MAP
 from solfer.robot.names import LOWER_LEVEL_MAP, controller_map
 
 Row = tuple[str, ...]
-NAMED_CONFIGURATIONS = 3
+MAX_NAMED = 3
 """Number of configurations that are named beside a pipe; more are only counted."""
 
 
@@ -54,7 +54,7 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
         names = users[key]
         yield (
             *_pipe(record),
-            f"used by {', '.join(names) if len(names) <= NAMED_CONFIGURATIONS else f'{len(names)} configurations'}",
+            f"used by {', '.join(names) if len(names) <= MAX_NAMED else f'{len(names)} configurations'}",
         )
     if options.name is None:
         yield from ((name, direction, "used by nothing") for direction, name in _unused(report, records))

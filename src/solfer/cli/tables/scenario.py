@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.scenarios import Player, Scenario
 
-SCENARIO_HEAD = ("step", "verb", "begin s", "takes s", "x m", "y m", "z m", "heading rad", "way m", "vertices m")
+HEAD = ("step", "verb", "begin s", "takes s", "x m", "y m", "z m", "heading rad", "way m", "vertices m")
 
 
 class ScenarioTrace:
@@ -45,7 +45,7 @@ class ScenarioTrace:
 
     def rows(self) -> Iterator[tuple[str, ...]]:
         """Yield the head, and a row for each step: what it is, where the base is at its end, and how far all moves."""
-        yield SCENARIO_HEAD
+        yield HEAD
         begin = 0
         distance = self.distance
         for number, (step, count) in enumerate(zip(self.scenario.pattern, self.scenario.periods, strict=True), 1):

@@ -15,11 +15,8 @@ from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.view import Page, PageServer, Playback
 
-PAGE_RATE = 20.0
-"""Of the page [Hz]."""
-
 ROBOT = "centauro"
-VIEW_NODE = "view"
+NODE = "view"
 
 
 @dataclass(frozen=True)
@@ -55,9 +52,7 @@ def show(options: argparse.Namespace) -> int:
         print(server.address, flush=True)  # after errors of the source
         if page.foxglove is not None:
             print(page.foxglove.address, flush=True)
-        FixedRateLoop(source.middleware, PAGE_RATE).run(
-            lambda *_: page.update(scene.update()), source.middleware.running
-        )
+        FixedRateLoop(source.middleware, 20.0).run(lambda *_: page.update(scene.update()), source.middleware.running)
     return 0
 
 
@@ -95,7 +90,7 @@ def _recording(options: argparse.Namespace) -> ShownSource:
         bus.run_until(bus.time + duration)
         playback.advance(duration)
 
-    return ShownSource(robot, PacedMiddleware(bus, VIEW_NODE, step), playback=playback)
+    return ShownSource(robot, PacedMiddleware(bus, NODE, step), playback=playback)
 
 
 def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
@@ -104,7 +99,7 @@ def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
     record = read_study(options.study).record
     run = stack.enter_context(SimulatedRun(record))
     run.attend()
-    return ShownSource(_named(options.robot or record.simulation.robot), PacedMiddleware(run.bus, VIEW_NODE, run.step))
+    return ShownSource(_named(options.robot or record.simulation.robot), PacedMiddleware(run.bus, NODE, run.step))
 
 
 def _layer(options: argparse.Namespace) -> ShownSource:
@@ -115,11 +110,11 @@ def _layer(options: argparse.Namespace) -> ShownSource:
     namespace = find(options.namespace)
     latch = EmergencyStopLatch(namespace.folder)
     stop = partial(latch.trip, "by the page")
-    return ShownSource(_named(options.robot or ROBOT), LayerMiddleware(namespace, VIEW_NODE), stop)
+    return ShownSource(_named(options.robot or ROBOT), LayerMiddleware(namespace, NODE), stop)
 
 
 def _ros(options: argparse.Namespace) -> ShownSource:
     from solfer.middleware.ros import RosMiddleware, RosNode
 
     robot = _named(options.robot or ROBOT)  # before the master is called
-    return ShownSource(robot, RosMiddleware(RosNode(VIEW_NODE, sys.argv)))
+    return ShownSource(robot, RosMiddleware(RosNode(NODE, sys.argv)))

@@ -8,9 +8,6 @@ from solfer.segments.namespace import Namespace
 from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport
 
-LAYER_PERIOD = 1.0
-"""Time between two reports of the layer [s]."""
-
 
 class LayerMiddleware(XbotMiddleware):
     """A node that also reports what a layer and its plugins leave to their statistics.
@@ -30,7 +27,7 @@ class LayerMiddleware(XbotMiddleware):
     def reports(self) -> Mapping[str, HealthReport]:
         """See `Middleware.reports`."""
         if self.now() >= self._next:
-            self._next = self.now() + LAYER_PERIOD
+            self._next = self.now() + 1.0
             now = self._statistics.look()
             self._layer = reports_of(now, self._before)
             self._before = now

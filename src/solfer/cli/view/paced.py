@@ -5,9 +5,6 @@ from collections.abc import Callable
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 
-PACE_LAG = 0.2
-"""Lag that is made up for [s]; what is slower falls behind the clock."""
-
 
 class PacedMiddleware(MemoryMiddleware):
     """A node on a bus whose time passes as fast as that of the clock, or more slowly.
@@ -29,5 +26,5 @@ class PacedMiddleware(MemoryMiddleware):
         early = self._begin + deadline - time.monotonic()
         if early > 0.0:
             time.sleep(early)
-        elif early < -PACE_LAG:
+        elif early < -0.2:  # a greater lag is not made up for
             self._begin -= early

@@ -14,9 +14,6 @@ from solfer.recording.model import Channel, Recording
 COLUMNS_MESSAGE = "std_msgs/msg/Float64MultiArray"
 """Message of columns that no message of ROS has: its only dimension is labelled with their names."""
 
-EARLIEST_TIME = 1
-"""Earliest time in a bag [ns]: `rosbag play` leaves out messages at time 0, which stands for no time."""
-
 GEOMETRY = ("Point", "Vector3", "Quaternion", "Pose", "Twist")
 
 
@@ -74,7 +71,8 @@ def _places(bag: Any, store: Any, topic: RecordedTopic) -> tuple[RecordedTopic, 
 def _moments(places: Sequence[tuple[RecordedTopic, Any]]) -> Iterator[tuple[int, int, int]]:
     """Yield time [ns], place and row of each message."""
     for place, (topic, _) in enumerate(places):
-        times = np.maximum(np.rint(1e9 * topic.channels[0].times).astype(np.int64), EARLIEST_TIME)
+        # `rosbag play` leaves out messages at time 0, which stands for no time
+        times = np.maximum(np.rint(1e9 * topic.channels[0].times).astype(np.int64), 1)
         yield from ((time, place, row) for row, time in enumerate(times.tolist()))
 
 

@@ -7,11 +7,11 @@ imported when something is drawn.
 from typing import TYPE_CHECKING
 
 from solfer.recording.review.canvas import (
-    CANVAS_FONT,
-    DESIRED_LINE_COLOR,
+    DESIRED_COLOR,
     FIRST_COLOR,
+    FONT_SIZE,
     SECOND_COLOR,
-    WRONG,
+    WRONG_COLOR,
     check_suffix,
     draw,
     dress,
@@ -25,7 +25,7 @@ from solfer.recording.review.columns_page import columns_page
 from solfer.recording.review.compare import Comparison, compare
 from solfer.recording.review.comparison_page import comparison_page
 from solfer.recording.review.plugin_page import plugin_page
-from solfer.recording.review.replay_page import REPLAY_ROWS, replay_page
+from solfer.recording.review.replay_page import MAX_REPLAY_ROWS, replay_page
 from solfer.recording.review.tracks import tracks_of
 from solfer.recording.review.verdict import Difference, JointVerdict
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "CANVAS_FONT",
-    "DESIRED_LINE_COLOR",
+    "FONT_SIZE",
+    "DESIRED_COLOR",
     "FIRST_COLOR",
-    "REPLAY_ROWS",
+    "MAX_REPLAY_ROWS",
     "SECOND_COLOR",
-    "WRONG",
+    "WRONG_COLOR",
     "Comparison",
     "Difference",
     "Figure",

@@ -14,9 +14,13 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".pdf", ".png")
 LINE_POINTS = 2000  # points of a line; more are neither seen nor quickly drawn
-CANVAS_FONT = 8.0
-FIRST_COLOR, SECOND_COLOR, DESIRED_LINE_COLOR, WRONG = "#1f77b4", "#d95f02", "#fdb863", "#b2182b"
-"""Colours that people with a weakness for red and green distinguish."""
+FONT_SIZE = 8.0
+
+# colours that people with a weakness for red and green distinguish
+FIRST_COLOR = "#1f77b4"
+SECOND_COLOR = "#d95f02"
+DESIRED_COLOR = "#fdb863"
+WRONG_COLOR = "#b2182b"
 
 
 def new_figure(width: float, height: float) -> "Figure":
@@ -60,9 +64,9 @@ def outline(values: np.ndarray) -> np.ndarray:
 
 def dress(axes: "Axes", title: str, label: str = "") -> None:
     """Give axes a title on the left, a label of y, small ticks and a grid."""
-    axes.set_title(title, fontsize=CANVAS_FONT + 1, loc="left")
-    axes.set_ylabel(label, fontsize=CANVAS_FONT)
-    axes.tick_params(labelsize=CANVAS_FONT - 1)
+    axes.set_title(title, fontsize=FONT_SIZE + 1, loc="left")
+    axes.set_ylabel(label, fontsize=FONT_SIZE)
+    axes.tick_params(labelsize=FONT_SIZE - 1)
     axes.grid(alpha=0.3, linewidth=0.5)
     axes.margins(x=0.0)
 

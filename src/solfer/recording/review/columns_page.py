@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.recording.model import Recording
-from solfer.recording.review.canvas import CANVAS_FONT, new_figure
+from solfer.recording.review.canvas import FONT_SIZE, new_figure
 from solfer.recording.review.plugin_page import lines
 
 if TYPE_CHECKING:
@@ -24,5 +24,5 @@ def columns_page(recording: Recording) -> "Figure":
     grid = np.atleast_1d(figure.subplots(max(1, len(channels)), 1, sharex=True))
     for axes, channel in zip(grid, channels, strict=False):
         lines(axes, channel.name, [channel], start=start)
-    grid[-1].set_xlabel("time [s]", fontsize=CANVAS_FONT)
+    grid[-1].set_xlabel("time [s]", fontsize=FONT_SIZE)
     return figure

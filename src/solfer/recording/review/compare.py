@@ -9,21 +9,15 @@ from scipy.interpolate import CubicSpline
 from solfer.errors import RecordingError
 from solfer.numerics.rotations import whole_turns
 from solfer.recording.model import Recording
-from solfer.recording.review.fit import BLOCK, DELAY_INDEX, GAIN_INDEX, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
+from solfer.recording.review.fit import BLOCK, DELAY, GAIN, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
 from solfer.recording.review.motion import JointMotion, Samples, measured_joints, sampled, shift_of
-from solfer.recording.review.verdict import SHAPE, Difference, JointVerdict, excess, judged, thresholds
+from solfer.recording.review.verdict import SHAPE_TOLERANCE, Difference, JointVerdict, excess, findings_of, thresholds
 
-COMPARED_MOTION_RANGE, OVER_NOISE = 0.02, 20.0
-"""Range of a joint that moves: so much [rad, m], and so many standard deviations of what smoothing leaves of noise."""
+MIN_MOTION_RANGE = 0.02
+"""Smallest range of a joint that moves [rad, m]."""
 
-CERTAIN = 8.0  # standard deviations of the noise, for the largest of thousands of samples
-EXPLAINED = 0.25  # what a swap leaves of the difference
-FEWEST_BLOCKS = 8
-FEWEST_DELAYS = 3
-"""Least number of joints that move for one of them to be late: what all have in common is the clocks."""
-
-STEP_MINIMUM = 0.001
-STEP_MAXIMUM = 0.025  # limits of the step [s]
+CERTAIN_SIGMAS = 8.0
+"""Standard deviations of the noise that the largest of thousands of samples does not reach."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,7 @@ class Comparison:
         return tuple(sorted(found, key=lambda each: -1.0 if np.isnan(each.since) else each.since))
 
     @property
-    def unjudged(self) -> tuple[str, ...]:
+    def hardly_moving(self) -> tuple[str, ...]:
         """Joints that hardly move: only an offset of theirs would have been found."""
         return tuple(each.joint for each in self.verdicts if not each.moves and not each.differences)
 
@@ -65,7 +59,7 @@ def compare(
 
     Args:
         first: What counts as right.
-        second: What is judged.
+        second: What is evaluated.
         names: Their files, for errors and texts.
         plugins: Plugins whose feedbacks count; empty: all.
 
@@ -99,7 +93,7 @@ class _Pair:
 
     def __init__(self, one: Sequence[JointMotion], two: Sequence[JointMotion], names: tuple[str, str]):
         periods = [np.median([motion.period for motion in motions]) for motions in (one, two)]
-        step = float(np.clip(max(periods), STEP_MINIMUM, STEP_MAXIMUM))
+        step = float(np.clip(max(periods), 0.001, 0.025))  # [s]
         a = sampled(one, step)
         b = sampled(two, step)
         self._names = names
@@ -111,7 +105,7 @@ class _Pair:
         if not self._both.size:
             raise RecordingError(
                 "no joint moves in both recordings, so that they cannot be aligned", where=" ".join(names),
-                expected=f"a motion of {COMPARED_MOTION_RANGE:g} rad or more",
+                expected=f"a motion of {MIN_MOTION_RANGE:g} rad or more",
             )  # fmt: skip
         self._curves = [CubicSpline(a.times, row) for row in a.positions]
         self._others = CubicSpline(b.times, b.positions, axis=1)
@@ -120,7 +114,8 @@ class _Pair:
 
     def _look(self, first: np.ndarray, second: np.ndarray) -> None:
         """Find the joints that move in both, and those that move in one of them alone: clearly, not just a bit more."""
-        least = np.maximum(COMPARED_MOTION_RANGE, OVER_NOISE * self.noise)
+        # twenty standard deviations of what smoothing leaves of the noise
+        least = np.maximum(MIN_MOTION_RANGE, 20.0 * self.noise)
         one = np.ptp(first, axis=1)
         two = np.ptp(second, axis=1)
         self._both = np.flatnonzero((one > least) & (two > least))
@@ -128,18 +123,19 @@ class _Pair:
         self._alone = (two > least) & (one < np.minimum(least, 0.5 * two))
 
     def _check_long(self, duration: float, where: str) -> None:
-        if duration < FEWEST_BLOCKS * BLOCK:
+        least = 8 * BLOCK
+        if duration < least:
             raise RecordingError(
                 f"{max(0.0, duration):.2f} s are too short to be compared", where=where,
-                expected=f"{FEWEST_BLOCKS * BLOCK:g} s or more in which all joints were measured",
+                expected=f"{least:g} s or more in which all joints were measured",
             )  # fmt: skip
 
     def _align(self, a: Samples, b: Samples) -> None:
         """Find the shift, coarsely by correlation, then as the median of the delays of all joints that move."""
         self.shift = shift_of(a, b, self._both)
         self._overlap(a, b)
-        laws = [self._fit(joint, joint, (GAIN_INDEX, OFFSET, DELAY_INDEX)) for joint in self._both.tolist()]
-        self.shift += float(np.median([law.values[DELAY_INDEX] for law in laws]))
+        laws = [self._fit(joint, joint, (GAIN, OFFSET, DELAY)) for joint in self._both.tolist()]
+        self.shift += float(np.median([law.values[DELAY] for law in laws]))
         self._overlap(a, b)
 
     def _overlap(self, a: Samples, b: Samples) -> None:
@@ -151,7 +147,7 @@ class _Pair:
         self.elapsed = self._times - a.start
         self.first = np.array([curve(self._times) for curve in self._curves])
         self.second = self._others(self._times + self.shift)
-        # either may have begun on another turn
+        # either may have begun on another revolution
         self.second -= whole_turns(np.median(self.second - self.first, axis=1, keepdims=True), self._turns)
         self.apart = self.second - self.first
 
@@ -162,10 +158,11 @@ class _Pair:
         return fit(self._curves[other], self._times, self.second[joint], free=free, noise=noise, density=density)
 
     def _law(self, joint: int) -> tuple[Law, Law]:
-        """Fit the law with as few parameters as are needed, and with all that can be judged."""
+        """Fit the law with as few parameters as are needed, and with all that can be evaluated."""
         free: tuple[int, ...] = (OFFSET,)
         if joint in self._both:
-            free = (GAIN_INDEX, OFFSET, DELAY_INDEX) if len(self._both) >= FEWEST_DELAYS else (GAIN_INDEX, OFFSET)
+            # a delay that all joints have in common is that of the clocks: it takes three to tell which one is late
+            free = (GAIN, OFFSET, DELAY) if len(self._both) >= 3 else (GAIN, OFFSET)
         whole = law = self._fit(joint, joint, free)
         if excess(law, free).max() < 0.5 and _size(self.apart[joint]) < 2.0 * self.noise[joint]:
             free = ()
@@ -191,7 +188,8 @@ class _Pair:
     def _resembles(self, joint: int, other: int) -> bool:
         """Return whether a joint of the second recording does what another one of the first does."""
         left = _size(self.second[joint] - self.first[other])
-        return left < max(EXPLAINED * _size(self.apart[joint]), 2.0 * self.noise[joint])
+        # a swap explains the difference where it leaves a quarter of it
+        return left < max(0.25 * _size(self.apart[joint]), 2.0 * self.noise[joint])
 
     def _verdict(self, index: int, joint: str) -> JointVerdict:
         if self._still[index]:
@@ -201,8 +199,8 @@ class _Pair:
             text = f"moves alone (range {np.ptp(self.second[index]):.3f})"
             return self._made(index, joint, (Difference.MOVED_ALONE,), text=text)
         law, whole = self._law(index)
-        kinds, text = judged(law, thresholds(law))
-        limit = max(SHAPE, CERTAIN * self.noise[index])
+        kinds, text = findings_of(law, thresholds(law))
+        limit = max(SHAPE_TOLERANCE, CERTAIN_SIGMAS * self.noise[index])
         left = float(np.abs(law.residual).max())
         explained = bool(kinds) and _size(law.residual) <= 0.5 * _size(self.apart[index])
         if left > limit and not explained:
@@ -218,7 +216,7 @@ class _Pair:
         largest = float(apart.max())
         since = float("nan")
         if kinds:
-            begin = max(min(CERTAIN * self.noise[index], 0.5 * largest), 0.1 * largest)
+            begin = max(min(CERTAIN_SIGMAS * self.noise[index], 0.5 * largest), 0.1 * largest)
             since = float(self.elapsed[np.argmax(apart >= begin)])
         return JointVerdict(
             joint, kinds, text, since=since, largest=largest,

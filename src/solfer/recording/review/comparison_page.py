@@ -4,16 +4,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solfer.recording.review.canvas import CANVAS_FONT, FIRST_COLOR, SECOND_COLOR, WRONG, draw, dress, new_figure
+from solfer.recording.review.canvas import FIRST_COLOR, FONT_SIZE, SECOND_COLOR, WRONG_COLOR, draw, dress, new_figure
 from solfer.recording.review.compare import Comparison
 from solfer.recording.review.verdict import JointVerdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-COMPARISON_ROWS = 8
-"""Most joints on a page."""
 
 
 def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
@@ -24,7 +21,7 @@ def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
         names: Names of the two recordings.
     """
     place = {joint: row for row, joint in enumerate(comparison.joints)}
-    shown = [verdict for verdict in comparison.different if verdict.joint in place][:COMPARISON_ROWS]
+    shown = [verdict for verdict in comparison.different if verdict.joint in place][:8]
     if not shown:
         known = (verdict for verdict in comparison.verdicts if verdict.joint in place)
         shown = sorted(known, key=lambda verdict: -verdict.largest)[:4]
@@ -33,8 +30,8 @@ def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
     for (left, right), verdict in zip(grid, shown, strict=True):
         _joint(left, right, verdict, comparison=comparison, row=place[verdict.joint], names=names)
     for axes in grid[-1]:
-        axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=CANVAS_FONT)
-    figure.suptitle(_title(comparison, names), fontsize=CANVAS_FONT + 3)
+        axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT_SIZE)
+    figure.suptitle(_title(comparison, names), fontsize=FONT_SIZE + 3)
     return figure
 
 
@@ -56,12 +53,12 @@ def _joint(
     right.axhline(0.0, color="grey", lw=0.5)
     dress(left, verdict.joint, "position [rad, m]")
     dress(right, verdict.text or "no difference", "difference\n[mrad, mm]")
-    left.legend(fontsize=CANVAS_FONT - 1, loc="best", ncols=2, framealpha=0.8)
+    left.legend(fontsize=FONT_SIZE - 1, loc="best", ncols=2, framealpha=0.8)
     if not np.isnan(verdict.since):
         for axes in (left, right):
-            axes.axvline(verdict.since, color=WRONG, lw=0.9)
+            axes.axvline(verdict.since, color=WRONG_COLOR, lw=0.9)
         right.annotate(
-            f" {verdict.since:.3f} s", (verdict.since, 1.0), xycoords=("data", "axes fraction"), color=WRONG,
-            fontsize=CANVAS_FONT - 1, va="top",
+            f" {verdict.since:.3f} s", (verdict.since, 1.0), xycoords=("data", "axes fraction"), color=WRONG_COLOR,
+            fontsize=FONT_SIZE - 1, va="top",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
         )  # fmt: skip

@@ -7,25 +7,24 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import ndtri, stdtrit
 
-GAIN_INDEX, OFFSET, DELAY_INDEX = 0, 1, 2
-"""Indices of the parameters: none, [rad, m], [s]."""
+GAIN = 0
+"""Index of the gain."""
+
+OFFSET = 1
+"""Index of the offset [rad, m]."""
+
+DELAY = 2
+"""Index of the delay [s]."""
 
 NEUTRAL = np.array([1.0, 0.0, 0.0])
 """The law of a joint that does the same."""
 
-FIT_ROUNDS = 12
-FIT_PRECISION = 1e-5
 HUBER = 1.345  # residuals beyond so many standard deviations count less (Huber 1964): 95 % efficient for Gaussian ones
 BLOCK = 0.15
 """Least duration of a block [s]: longer than what the smoothing ties together."""
 
-BLOCKS = 40
-"""Most blocks into which a motion is divided."""
-
 CHANCE = 1e-6
 """Probability that noise alone makes a parameter significant."""
-
-NORMAL_QUANTILE = -float(ndtri(0.5 * CHANCE))
 
 LONGEST_DELAY = 0.1
 """Largest delay of a single joint [s]."""
@@ -48,7 +47,7 @@ class Law:
 
 def blocks_of(count: int, step: float) -> np.ndarray:
     """Divide `count` samples into blocks; returns the index of the block of each sample."""
-    number = int(np.clip(count * step / BLOCK, 1, BLOCKS))
+    number = int(np.clip(count * step / BLOCK, 1, 40))  # more of them decide no better
     return np.arange(count) * number // count
 
 
@@ -72,22 +71,23 @@ def fit(
     chosen = list(free)
     scale = noise
     slope = curve.derivative()
-    if GAIN_INDEX in free:
-        values[GAIN_INDEX] = _first_gain(curve(times), second)
-    for _ in range(FIT_ROUNDS):
+    if GAIN in free:
+        values[GAIN] = _first_gain(curve(times), second)
+    for _ in range(12):
         rows, residual = _linear(curve, slope, times, second=second, values=values)
         scale = max(noise, 1.4826 * float(np.median(np.abs(residual))))
         weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
         bread = np.linalg.inv((rows[chosen] * weights) @ rows[chosen].T)
         step = bread @ (rows[chosen] @ (weights * residual))
         values[chosen] += step
-        values[DELAY_INDEX] = np.clip(values[DELAY_INDEX], -LONGEST_DELAY, LONGEST_DELAY)
-        if np.all(np.abs(step) < FIT_PRECISION):
+        values[DELAY] = np.clip(values[DELAY], -LONGEST_DELAY, LONGEST_DELAY)
+        if np.all(np.abs(step) < 1e-5):
             break
     rows, residual = _linear(curve, slope, times, second=second, values=values)
     weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
     limits = np.full(3, np.inf)
-    least = NORMAL_QUANTILE * density * np.sqrt(np.diag(bread))
+    quantile = -float(ndtri(0.5 * CHANCE))  # of the normal distribution
+    least = quantile * density * np.sqrt(np.diag(bread))
     limits[chosen] = np.maximum(least, _errors(rows[chosen], weights, residual, bread=bread, times=times))
     return Law(values, limits, residual)
 
@@ -103,10 +103,10 @@ def _linear(
     curve: CubicSpline, slope: CubicSpline, times: np.ndarray, second: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives of the law by its parameters, shape (3, T), and what it does not explain, shape (T,)."""
-    moments = times - values[DELAY_INDEX]
+    moments = times - values[DELAY]
     first = curve(moments)
-    rows = np.array([first, np.ones_like(first), -values[GAIN_INDEX] * slope(moments)])
-    return rows, second - values[GAIN_INDEX] * first - values[OFFSET]
+    rows = np.array([first, np.ones_like(first), -values[GAIN] * slope(moments)])
+    return rows, second - values[GAIN] * first - values[OFFSET]
 
 
 @lru_cache

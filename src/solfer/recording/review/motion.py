@@ -12,16 +12,14 @@ from scipy.signal import correlate, correlation_lags, savgol_coeffs
 from solfer.errors import RecordingError, UnknownName
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
 
-FEEDBACK_CHANNEL, POSITION_CHANNEL, AGE_CHANNEL = "/feedback/", "/position", "/age"
-"""Parts of the names of channels."""
+FEEDBACK = "/feedback/"
+"""Part of the names of the channels of feedback."""
 
-CHANNEL_WINDOW = 0.05
-"""Time over which positions are smoothed [s]: short against the motion of a robot, long against its sampling."""
+POSITION = "/position"
+"""End of the names of channels of positions."""
 
-OUTLIER = 8.0  # standard deviations of the noise
-DEGREE = 3  # of the polynomial in this window
-LEAST_STD = 1e-5
-"""Least standard deviation of a measurement [rad, m]: a simulation without noise still rounds and interpolates."""
+AGE = "/age"
+"""End of the names of channels of ages."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class JointMotion:
     Attributes:
         times: When it was measured, ascending, shape (T,) [s].
         positions: Its position, shape (T,) [rad, m].
-        turn: Turn after which it is where it was [rad]; 0: none.
+        turn: A revolution, after which it is where it was [rad]; 0: none.
     """
 
     times: np.ndarray
@@ -42,7 +40,7 @@ class JointMotion:
     def cleaned(self) -> np.ndarray:
         """Positions in which single outliers yielded to the median of their neighbours (Hampel), shape (T,)."""
         middle = median_filter(self.positions, 5, mode="nearest")
-        wrong = np.abs(self.positions - middle) > OUTLIER * self.noise
+        wrong = np.abs(self.positions - middle) > 8.0 * self.noise
         return np.where(wrong, middle, self.positions)
 
     @property
@@ -54,7 +52,8 @@ class JointMotion:
     def noise(self) -> float:
         """Standard deviation of the measurement, from its third differences, which a motion hardly has [rad, m]."""
         third = np.abs(np.diff(self.positions, 3))
-        return max(LEAST_STD, float(1.4826 * np.median(third) / np.sqrt(20.0)))
+        # a simulation without noise still rounds and interpolates
+        return max(1e-5, float(1.4826 * np.median(third) / np.sqrt(20.0)))
 
 
 def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = ()) -> dict[str, JointMotion]:
@@ -77,11 +76,11 @@ def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = (
             raise UnknownName("plugin", name, recording.plugins, where=where)
     found: dict[str, JointMotion] = {}
     for channel in recording.channels.values():
-        plugin, feedback, _ = channel.name.partition(FEEDBACK_CHANNEL)
+        plugin, feedback, _ = channel.name.partition(FEEDBACK)
         if (
             feedback
             and channel.kind == JOINTS_KIND
-            and channel.name.endswith(POSITION_CHANNEL)
+            and channel.name.endswith(POSITION)
             and plugin in (plugins or (plugin,))
         ):
             for joint, motion in _motions(recording, channel).items():
@@ -96,7 +95,7 @@ def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = (
 def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
     """Return the motion of each joint of a channel; one without measurements is left out."""
     times = channel.times
-    age = recording.channels.get(channel.name.removesuffix(POSITION_CHANNEL) + AGE_CHANNEL)
+    age = recording.channels.get(channel.name.removesuffix(POSITION) + AGE)
     if age is not None and np.array_equal(age.times, times):
         times = times - age.values[:, 0]
     keep = np.isfinite(times)
@@ -108,7 +107,7 @@ def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
         if np.count_nonzero(valid) > 8:
             positions = channel.values[valid, column]
             turn = math.tau if joint in continuous else 0.0
-            # one that was recorded within a turn goes on counting
+            # one that was recorded within a revolution goes on counting
             motions[joint] = JointMotion(times[valid], np.unwrap(positions) if turn else positions, turn)
     return motions
 
@@ -160,8 +159,9 @@ def sampled(motions: Sequence[JointMotion], step: float) -> Samples:
     start = max(each.times[0] for each in motions)
     end = min(each.times[-1] for each in motions)
     times = start + step * np.arange(max(0, int((end - start) / step) + 1))
-    half = max(2, round(0.5 * CHANNEL_WINDOW / step))
-    weights = savgol_coeffs(2 * half + 1, DEGREE)
+    window = 0.05  # short against the motion of a robot, long against its sampling [s]
+    half = max(2, round(0.5 * window / step))
+    weights = savgol_coeffs(2 * half + 1, 3)
     raw = np.array([np.interp(times, each.times, each.cleaned) for each in motions])
     padded = np.pad(raw, ((0, 0), (half, half)), mode="edge")
     smooth = np.array([np.convolve(row, weights, "valid") for row in padded])

@@ -8,10 +8,10 @@ import numpy as np
 from solfer.recording.model import Channel, Recording
 from solfer.recording.requests import EventGroup, grouped
 from solfer.recording.review.canvas import (
-    CANVAS_FONT,
-    DESIRED_LINE_COLOR,
+    DESIRED_COLOR,
     FIRST_COLOR,
-    WRONG,
+    FONT_SIZE,
+    WRONG_COLOR,
     draw,
     dress,
     new_figure,
@@ -22,15 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-PAGE_WIDTH = 15.0  # [inch]
 PLOT_COLUMNS = 6  # of small plots
-PAGE_MOTION_RANGE = 2e-3
-"""Least range of a joint that is drawn [rad, m, rad/s, m/s]; the others are listed."""
-
-LEAST_SPAN = 0.02  # that an axis shows, so that noise does not look like motion
 BINS = 400  # of the times of a cycle
-LEAST_TIME = 0.1  # that is shown [us]
-MOST_LINES = 12  # of a log, with one legend
 
 Limits = Mapping[str, tuple[float, float]]
 """Least and largest position of each joint that has an end."""
@@ -45,17 +38,18 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
         limits: Limits of the joints' positions.
     """
     tracks = tracks_of(recording, plugin)
-    moving = [track for track in tracks if track.span > PAGE_MOTION_RANGE]
+    # [rad, m, rad/s, m/s]; the others are listed
+    moving = [track for track in tracks if track.span > 2e-3]
     start = min((channel.times[0] for channel in recording.channels.values() if len(channel.times)), default=0.0)
     extras = _extras(recording, plugin)
     rows = -(-len(moving) // PLOT_COLUMNS)
     errors = [track for track in moving if track.desired is not None]
     heights = [0.5 + 1.35 * rows, 1.2 + 0.17 * len(errors), 0.4 + 2.3 * -(-len(extras) // 2)]
     used = [height if part else 0.0 for height, part in zip(heights, (moving, errors, extras), strict=True)]
-    figure = new_figure(PAGE_WIDTH, 0.9 + sum(used))
+    figure = new_figure(15.0, 0.9 + sum(used))
     groups = grouped(event for event in recording.events if event.plugin in ("", plugin))
     often = [group.counted(start) for group in groups if group.count > 1]
-    figure.suptitle("\n".join((_title(plugin, tracks, moving), *often)), fontsize=CANVAS_FONT + 4)
+    figure.suptitle("\n".join((_title(plugin, tracks, moving), *often)), fontsize=FONT_SIZE + 4)
     parts = [part for part in used if part]
     if not parts:
         return figure
@@ -84,18 +78,18 @@ def _joints(place: "SubFigure", tracks: list[Track], limits: Limits, start: floa
     for index, (axes, track) in enumerate(zip(grid, tracks, strict=False)):
         _joint(axes, track, limits, start=start)
         axes.tick_params(labelbottom=index + PLOT_COLUMNS >= len(tracks))
-    place.supxlabel("time [s]", fontsize=CANVAS_FONT)
+    place.supxlabel("time [s]", fontsize=FONT_SIZE)
     handles = [
         _line(color=FIRST_COLOR, lw=1.0),
-        _line(color=DESIRED_LINE_COLOR, lw=2.8),
-        _line(color=WRONG, lw=1.3, ls=":"),
+        _line(color=DESIRED_COLOR, lw=2.8),
+        _line(color=WRONG_COLOR, lw=1.3, ls=":"),
     ]
     place.legend(
         handles,
         ["measured", "desired", "limit"],
         loc="outside upper right",
         ncols=3,
-        fontsize=CANVAS_FONT,
+        fontsize=FONT_SIZE,
         frameon=False,
     )
 
@@ -108,16 +102,16 @@ def _line(**style: Any) -> Any:
 
 def _joint(axes: "Axes", track: Track, limits: Limits, start: float) -> None:
     if track.desired is not None:  # below and wider: both are seen where they are one
-        draw(axes, track.desired.times - start, track.desired.values, color=DESIRED_LINE_COLOR, lw=2.8)
+        draw(axes, track.desired.times - start, track.desired.values, color=DESIRED_COLOR, lw=2.8)
     draw(axes, track.measured.times - start, track.measured.values, color=FIRST_COLOR, lw=0.9)
     dress(axes, f"{track.joint}  [{track.unit or '-'}]")
     low, high = axes.get_ylim()
-    missing = max(0.0, LEAST_SPAN - (high - low))
+    missing = max(0.0, 0.02 - (high - low))  # so that noise does not look like motion
     low = low - 0.5 * missing
     high = high + 0.5 * missing
     for limit in limits.get(track.joint, ()) if track.field == "position" else ():
         if low - 0.3 * (high - low) <= limit <= high + 0.3 * (high - low):  # near enough to matter
-            axes.axhline(limit, color=WRONG, lw=1.3, ls=":")
+            axes.axhline(limit, color=WRONG_COLOR, lw=1.3, ls=":")
             low = min(low, limit)
             high = max(high, limit)
     axes.set_ylim(low - 0.02 * (high - low), high + 0.02 * (high - low))
@@ -142,12 +136,12 @@ def _errors(place: "SubFigure", tracks: list[Track], start: float) -> None:
     title = (
         "desired minus measured, the largest of each moment; behind each joint its largest [mrad, mm; of wheels mrad/s]"
     )
-    axes.set_title(title, loc="left", fontsize=CANVAS_FONT + 1)
-    axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
-    axes.tick_params(labelsize=CANVAS_FONT - 1)
+    axes.set_title(title, loc="left", fontsize=FONT_SIZE + 1)
+    axes.set_xlabel("time [s]", fontsize=FONT_SIZE)
+    axes.tick_params(labelsize=FONT_SIZE - 1)
     bar = place.colorbar(image, ax=axes, pad=0.01, extend="both")
-    bar.set_label("part of the largest of this unit", fontsize=CANVAS_FONT)
-    bar.ax.tick_params(labelsize=CANVAS_FONT - 1)
+    bar.set_label("part of the largest of this unit", fontsize=FONT_SIZE)
+    bar.ax.tick_params(labelsize=FONT_SIZE - 1)
 
 
 def _scale(errors: np.ndarray) -> float:
@@ -192,7 +186,7 @@ def _draw_extras(
             _timing(axes, channels[0], start)
         else:
             lines(axes, title, channels, start=start)
-        axes.set_xlabel("time [s]", fontsize=CANVAS_FONT)
+        axes.set_xlabel("time [s]", fontsize=FONT_SIZE)
         for group in groups:
             for time in {group.first.time, group.last}:
                 axes.axvline(time - start, color="grey", lw=0.6, ls=":")
@@ -204,7 +198,7 @@ def _timing(axes: "Axes", channel: Channel, start: float) -> None:
     """Draw the median of each part in each moment, and the longest cycle."""
     count = min(BINS, len(channel.times))
     starts = np.unique(np.arange(count) * len(channel.times) // count)
-    groups = np.split(np.maximum(1e6 * channel.values, LEAST_TIME), starts[1:])
+    groups = np.split(np.maximum(1e6 * channel.values, 0.1), starts[1:])
     times = channel.times[starts] - start
     medians = np.array([np.median(group, axis=0) for group in groups])
     for part, values in zip(channel.columns, medians.T, strict=True):
@@ -222,9 +216,10 @@ def lines(axes: "Axes", title: str, channels: list[Channel], start: float) -> No
         for each in channels
         for place, column in enumerate(each.columns)
     ]
-    if len(found) > MOST_LINES:
-        found = sorted(found, key=lambda each: -_span(each[1].values[:, each[2]]))[:MOST_LINES]
-        title = f"{title} (those {MOST_LINES} that change most)"
+    most = 12  # with one legend
+    if len(found) > most:
+        found = sorted(found, key=lambda each: -_span(each[1].values[:, each[2]]))[:most]
+        title = f"{title} (those {most} that change most)"
     for name, channel, place in found:
         draw(axes, channel.times - start, channel.values[:, place], lw=1.0, label=name)
     units = dict.fromkeys(unit for each in channels for unit in each.units if unit)
@@ -244,4 +239,4 @@ def _short(name: str) -> str:
 
 
 def _legend(axes: "Axes") -> None:
-    axes.legend(fontsize=CANVAS_FONT - 1, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.legend(fontsize=FONT_SIZE - 1, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)

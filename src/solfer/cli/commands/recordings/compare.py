@@ -1,8 +1,8 @@
 """Compare two recordings of the same motion: which joint differs first, and how.
 
-A counts as right, such as a simulation; B is judged, such as the hardware. The clocks need not agree: the motion aligns
-them. Differences are a wrong sign, swapped joints, a gain, an offset, a delay, a joint that is missing or stands still.
-The exit code is 0 if no joint differs, 1 if one does, and 2 after an error.
+A counts as right, such as a simulation; B is checked, such as the hardware. The clocks need not agree: the motion
+aligns them. Differences are a wrong sign, swapped joints, a gain, an offset, a delay, a joint that is missing or stands
+still. The exit code is 0 if no joint differs, 1 if one does, and 2 after an error.
 """
 
 import argparse
@@ -12,7 +12,7 @@ from pathlib import Path
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
     parser.add_argument("first", metavar="A", type=Path, help="recording that counts as right")
-    parser.add_argument("second", metavar="B", type=Path, help="recording that is judged")
+    parser.add_argument("second", metavar="B", type=Path, help="recording that is checked")
     parser.add_argument(
         "-n",
         dest="names",

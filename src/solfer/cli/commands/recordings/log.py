@@ -9,7 +9,7 @@ from pathlib import Path
 
 from solfer.cli.options import Number
 
-LOG_SECONDS = Number(0.0, 1e9, "seconds")
+SECONDS = Number(0.0, 1e9, "seconds")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,10 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     forms.add_argument("--npz", metavar="OUT.npz", type=Path, help="arrays for NumPy's `load`")
     forms.add_argument("--bag", metavar="OUT.bag", type=Path, help="a ROS 1 bag for `rosbag play`")
     for action in (cut, export):
-        action.add_argument(
-            "--from", dest="begin", type=LOG_SECONDS, metavar="SECONDS", help="leave out what is earlier"
-        )
-        action.add_argument("--to", dest="end", type=LOG_SECONDS, metavar="SECONDS", help="leave out what is later")
+        action.add_argument("--from", dest="begin", type=SECONDS, metavar="SECONDS", help="leave out what is earlier")
+        action.add_argument("--to", dest="end", type=SECONDS, metavar="SECONDS", help="leave out what is later")
         action.add_argument(
             "-c", dest="columns", metavar="COLUMN", action="append", default=[], help="only this; repeat it for several"
         )
@@ -43,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         RecordingError: The recording cannot be read, or the other file not be written.
         UnknownName: There is no such column.
     """
-    from solfer.cli.recordings.actions import RECORDING_ACTIONS
+    from solfer.cli.recordings.actions import ACTIONS
 
-    RECORDING_ACTIONS[options.action](options)
+    ACTIONS[options.action](options)
     return 0
