@@ -5,6 +5,9 @@ import math
 AHEAD = 1.5
 """Periods by which a stamp may be ahead of all others at its arrival: transports are no faster than they have been."""
 
+PAUSE = 0.5
+"""Time without a message after which stamps are compared with nothing: another process may send now [s]."""
+
 AVERAGED = 100
 """Messages over which periods and delays are averaged."""
 
@@ -14,7 +17,7 @@ class SenderClock:
 
     That is its stamp, unless stamps go back by more than half a period, or ahead by more than 1.5, or are no numbers,
     or zero where others are not. After such a stamp arrivals count for 1 s, smoothed, with the mean delay of before.
-    Where a clock was set, times go on from there.
+    Where a clock was set, times go on from there. After a pause of 0.5 s stamps count as those of the first message.
 
     A stamp and the arrival of its message need not be of one clock, nor of clocks that go equally fast.
 
@@ -57,6 +60,8 @@ class SenderClock:
 
     def _check(self, stamp: float, arrival: float) -> float:
         """Return the time of a message that is the first, earlier than all before, or comes after a wrong stamp."""
+        if arrival - self._arrival > PAUSE:
+            self.restart()
         passed = arrival - self._arrival
         step = stamp - self._stamp
         delay = arrival - stamp

@@ -47,6 +47,18 @@ def test_arrivals_count_where_stamps_cannot_be_true(fault):
     assert np.abs(found - sent).max() < 3.0 * PERIOD and not clock.is_distrusted and clock.fault
 
 
+@pytest.mark.parametrize("ahead", [-1e3, -0.3, 0.3, 1e3])
+def test_after_a_pause_another_process_may_send_with_another_clock(ahead):
+    """As a simulator that was killed and started again: its stamps count from the first message on."""
+    clock = SenderClock()
+    for step in range(1000):
+        clock.time(CLOCK + step * PERIOD, step * PERIOD)
+    for step in range(1000):
+        stamp = CLOCK + ahead + 3.0 + step * PERIOD
+        assert clock.time(stamp, 3.0 + step * PERIOD) == stamp
+    assert not clock.is_distrusted and not clock.fault
+
+
 @pytest.mark.parametrize("speed", [0.05, 0.3, 1.0])
 def test_stamps_count_whatever_the_transport_and_the_speed_of_a_simulation(speed):
     """Messages are late by up to 20 ms, some are lost, all wait for half a second now and then and come together."""
