@@ -8,8 +8,8 @@ from pathlib import Path
 
 import rospy
 import rostest
+from ros_tools import output, shown
 from system import START, Robot, end, started, subscribers, wait_for
-from tools import output, shown
 
 from solfer.msg import JointCommand
 

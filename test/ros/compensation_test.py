@@ -16,9 +16,9 @@ import rostest
 import yaml
 from recording import QUEUE, Recording, step_of
 from replayed import replay
+from ros_tools import shown
 from support.paper.figure_3 import write_offline
 from system import START, Robot, end, started, wait_for
-from tools import shown
 
 from solfer.msg import JointCommand
 from solfer.srv import MoveJoints

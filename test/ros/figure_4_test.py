@@ -15,8 +15,8 @@ import rostest
 import yaml
 from recording import STEP, Recording
 from replayed import replay
+from ros_tools import shown
 from system import NODES, START, Robot, wait_for
-from tools import shown
 
 from solfer.recording.reader import read
 from solfer.srv import MoveJoints

@@ -10,10 +10,10 @@ import rostest
 import tf2_ros
 import yaml
 from nav_msgs.msg import Odometry
+from ros_tools import found
 from sensor_msgs.msg import JointState
 from system import START, numbers, soak, started, wait_for
 from tf2_msgs.msg import TFMessage
-from tools import found
 
 from solfer import Robot
 from solfer.msg import JointCommand

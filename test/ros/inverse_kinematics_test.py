@@ -9,8 +9,8 @@ from pathlib import Path
 
 import rospy
 import rostest
+from ros_tools import shown
 from system import START, Robot, program, started, wait_for
-from tools import shown
 
 from solfer.srv import GetReference
 

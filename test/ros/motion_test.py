@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 import rosgraph
 import rospy
 import rostest
+from ros_tools import shown
 from system import STANDS_STILL, START, Robot, ask, insist, move, soak, wait_for, wait_for_plugin
-from tools import shown
 
 from solfer.msg import JointCommand
 from solfer.recording.reader import read

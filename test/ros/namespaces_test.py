@@ -10,9 +10,9 @@ import unittest
 import rosgraph
 import rospy
 import rostest
+from ros_tools import shown
 from sensor_msgs.msg import JointState
 from system import NODES, START, end, started, wait_for
-from tools import shown
 
 PAGE = NODES.parent / "docs/tutorials/figures.md"
 YAW = "torso_yaw"

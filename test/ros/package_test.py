@@ -4,8 +4,8 @@
 import unittest
 
 import rostest
+from ros_tools import output
 from system import soak
-from tools import output
 
 
 class PackageTest(unittest.TestCase):

@@ -8,8 +8,8 @@ from pathlib import Path
 import rospy
 import rostest
 import yaml
+from ros_tools import found, output, shown
 from system import START, Robot, soak, wait_for
-from tools import found, output, shown
 
 COMMAND = "/position_controller/command"
 

@@ -12,9 +12,9 @@ import rosgraph
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
+from ros_tools import shown
 from system import NODES, START, end, started, wait_for
 from tf2_msgs.msg import TFMessage
-from tools import shown
 
 from solfer.srv import ListControllers
 
