@@ -40,7 +40,7 @@ AT_REST, DRIVES = 0.1, 0.5
 AWAY = 0.05
 """How far a joint may go on that nobody moves any more [rad]."""
 
-TOLD = {
+NAMED = {
     "navigation": r"no position|locomotion/base",
     "hands": r"upper_body|hands",
     "full_control": r"full_control|full_compensation|locomotion/pace",
@@ -48,18 +48,22 @@ TOLD = {
     "bridge": r"no position|locomotion/pace",
     "simulator": r"joint_states|link_side_online|odometry",
 }
-"""How survivors name what was killed."""
+"""How the logs of survivors name what was killed."""
 
 STEERED = ("navigation", "bridge")
 """Without these locomotion brakes by itself; meanwhile legs and wheels steer."""
 
 
 COMMANDS = "position_controller/command"
-"""Topic of what is wanted of the joints."""
+"""Topic of the commands of the joints."""
 
 
 class RosCourse(RosSystem):
-    """Nodes, of which it is known what they want of the joints."""
+    """Nodes, and the newest commands that they send.
+
+    Attributes:
+        commanded: Commanded positions, by joint [rad].
+    """
 
     def __init__(self, *given):
         import rospy
@@ -67,11 +71,13 @@ class RosCourse(RosSystem):
         from solfer.msg import JointCommand
 
         super().__init__(*given)
-        self.wanted: dict[str, float] = {}
-        self._commands = rospy.Subscriber(f"/{COMMANDS}", JointCommand, self._want, queue_size=1, tcp_nodelay=True)
+        self.commanded: dict[str, float] = {}
+        self._commands = rospy.Subscriber(
+            f"/{COMMANDS}", JointCommand, self._receive_command, queue_size=1, tcp_nodelay=True
+        )
 
-    def _want(self, message) -> None:
-        self.wanted = dict(zip(message.name, message.position, strict=True))
+    def _receive_command(self, message) -> None:
+        self.commanded = dict(zip(message.name, message.position, strict=True))
 
     def close(self) -> None:
         """See `System.close`."""
@@ -80,15 +86,15 @@ class RosCourse(RosSystem):
 
 
 class XbotCourse(XbotSystem):
-    """A layer, of which it is known what it wants of the joints."""
+    """A layer, and the newest commands that it sends."""
 
     def __init__(self, *given):
         super().__init__(*given)
         self._commands = self._node.reader(COMMANDS, "solfer/JointCommand")
 
     @property
-    def wanted(self) -> dict[str, float]:
-        """What was wanted last, by joint [rad]."""
+    def commanded(self) -> dict[str, float]:
+        """Commanded positions, by joint [rad]."""
         self._commands.read()
         message = self._commands.message
         return {} if message is None else dict(zip(message.names, message.position.tolist(), strict=True))
@@ -176,13 +182,13 @@ class CourseTrial:
         record.forget()
         robot, moment, lengths = record.robots, record.time, self._lengths()
         (system.processes.stop if self._kill.stop else system.processes.kill)(victim)
-        wanted = system.wanted
+        commanded = system.commanded
         if self._kill.stop:
             if victim == system.simulator:
                 time.sleep(self._kill.stop)
             else:
                 system.passes(self._kill.stop)
-                self._judge(verdict, record.samples(robot), moment, wanted)
+                self._judge(verdict, record.samples(robot), moment, commanded)
             system.processes.go_on(victim)
             system.passes(1.0)
         elif victim == system.simulator:
@@ -191,15 +197,14 @@ class CourseTrial:
             self._judge_new(verdict, record.samples(record.robots))
         else:
             system.passes(AFTER)
-            self._judge(verdict, record.samples(robot), moment, wanted)
+            self._judge(verdict, record.samples(robot), moment, commanded)
             system.processes.start(victim)
         self._drive(f"a robot that drives on after a new {victim}")
         if self._kill.stop:
             return
         news = {name: text for name, text in self._news(lengths).items() if name != victim}
-        told = [name for name, text in news.items() if re.search(TOLD[victim], text)]
-        if not told:
-            verdict.complaints.append(f"no survivor tells that {victim} is gone")
+        if not any(re.search(NAMED[victim], text) for text in news.values()):
+            verdict.complaints.append(f"no survivor logs that {victim} is gone")
 
     def _drive(self, what: str) -> None:
         """Wait until wheels turn; a navigation at its end begins again."""
@@ -216,8 +221,8 @@ class CourseTrial:
         record = self._system.record
         return max(abs(record.velocity(joint)) for joint in record.joints if joint.startswith(WHEEL))
 
-    def _judge(self, verdict: Verdict, samples: Samples, moment: float, wanted: dict[str, float]) -> None:
-        """Judge wheels and joints after a kill."""
+    def _judge(self, verdict: Verdict, samples: Samples, moment: float, commanded: dict[str, float]) -> None:
+        """Judge wheels and joints after a kill; joints stay between their places and all commands."""
         joints, victim = self._system.record.joints, self._kill.victim
         wheels = np.array([joint.startswith(WHEEL) for joint in joints])
         limit = SILENCE + BRAKING + SPARE if victim in STEERED else LEASE + SPARE
@@ -233,8 +238,10 @@ class CourseTrial:
         if victim in STEERED:
             return
         before = samples.positions[np.searchsorted(samples.times, moment, side="right") - 1]
-        goal = np.array([wanted.get(joint, place) for joint, place in zip(joints, before, strict=True)])
-        low, high = np.minimum(before, goal), np.maximum(before, goal)
+        places = [before]
+        for commands in (commanded, self._system.commanded):
+            places.append([commands.get(joint, place) for joint, place in zip(joints, before, strict=True)])
+        low, high = np.min(places, axis=0), np.max(places, axis=0)
         beyond = np.maximum(low - samples.positions, samples.positions - high)
         away = np.where(wheels, 0.0, np.maximum(beyond, 0.0)).max(axis=0)
         verdict.away = max(verdict.away, float(away.max()))

@@ -83,6 +83,25 @@ def test_half_a_second_of_silence_is_bridged(rolling, sensors):
     assert rolling.way - before == pytest.approx(0.99 * SPEED, abs=0.01)
 
 
+@pytest.mark.parametrize("method", ["filter", "geometric"])
+def test_a_robot_that_begins_anew_stays_where_it_was(tmp_path, method):
+    """After a longer silence wheels count from elsewhere, and legs are bent in another way."""
+    rolling = Rolling(tmp_path, method)
+    rolling.roll(0.5)
+    before = rolling.plugin.component.law.position.copy()
+    rolling.roll(1.5, sensors=())
+    legs = np.ones(len(rolling._position), dtype=bool)
+    legs[rolling._wheels] = False
+    drawn = np.random.default_rng(3)
+    rolling._position[legs] += drawn.uniform(-0.2, 0.2, legs.sum())
+    rolling._position[rolling._wheels] = drawn.uniform(-3.0, 3.0, 4)
+    for _ in range(100):
+        rolling.roll(PERIOD)
+        x, y, _, *tilt = rolling.plugin.robot.command.position[:5]
+        assert np.abs(tilt).max() < 0.02 and abs(y) < 0.05 and before[0] - 0.01 < x
+    assert x - before[0] == pytest.approx(0.5 * SPEED, abs=0.05)
+
+
 def nan_joint(sample):
     sample.joints.position[3] = math.nan
 

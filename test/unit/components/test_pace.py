@@ -21,6 +21,7 @@ from solfer.interfaces.geometry import Vector
 PERIOD, ACCELERATION = 0.005, 0.3  # [s], [m/s2]
 BASE_SPEED, TURN_SPEED, VERTEX_SPEED = 0.5, 0.4, 0.1
 STEP = ACCELERATION * PERIOD  # [m/s]
+FURTHEST = 0.3  # [m]
 
 velocities = arrays(float, 3, elements=st.floats(-2.0, 2.0))
 of_vertices = arrays(float, (4, 3), elements=st.floats(-0.5, 0.5))
@@ -35,9 +36,9 @@ class Course:
     def __init__(self):
         self.references, self.wheels = References(4), np.zeros((4, 4))
         self.offsets = SimpleNamespace(base=np.zeros(3), reference=np.zeros((4, 3)))
-        limits = BASE_SPEED, TURN_SPEED, VERTEX_SPEED
-        steering = SimpleNamespace(steered=self.wheels)
-        self.pace = PathPace(limits, ACCELERATION, self.references, steering, self.offsets)
+        self.error = np.zeros(6)
+        self.pace = PathPace(self.references, SimpleNamespace(steered=self.wheels), self.offsets, self.error)
+        self.pace.limit((BASE_SPEED, TURN_SPEED, VERTEX_SPEED), ACCELERATION, FURTHEST)
 
     def point(self, speeds, away=0.0, heading=0.0):
         """Let wheels be as far from where they aim; aims are seen from the heading."""
@@ -97,6 +98,22 @@ def test_a_held_motion_rests_and_goes_on(held, free, velocity):
     for _ in range(free):
         pace = course.cycle()
     assert_allclose(pace, full * min(1.0, left + PERIOD * free), atol=1e-12)
+
+
+@given(st.floats(0.0, 0.6), angles, st.floats(-1.0, 1.0))
+def test_references_wait_for_a_base_that_does_not_follow(distance, direction, turn):
+    """They slow down from 0.1 m or 0.15 rad on, and rest at twice that; a base that sinks does not count."""
+    course = Course()
+    course.references.velocity[:] = 0.2, 0.0, 0.0
+    course.error[2] = math.sin(turn / 2.0)
+    course.error[3:] = distance * math.cos(direction), distance * math.sin(direction), 0.5
+    assert course.cycle(is_first=True) == 1.0  # nothing is known of errors yet
+    place = course.references.position.copy()
+    pace = course.cycle()
+    assert_allclose(
+        pace, np.clip(2.0 - max(distance / 0.1, 2.0 * math.sin(abs(turn) / 2.0) / 0.15), 0.0, 1.0), atol=1e-12
+    )
+    assert pace or (course.references.position == place).all()
 
 
 @pytest.mark.slow

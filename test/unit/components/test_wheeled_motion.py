@@ -207,7 +207,7 @@ def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
 def test_a_base_that_turns_is_corrected_faster(make, turn, correction):
     component = make()
     cycle(component, 300, (0.0, 0.0, turn))
-    component.references.heading += math.copysign(0.3, turn)
+    component.references.heading += math.copysign(0.14, turn)
     rates = []
     for _ in range(200):
         cycle(component, 1, (0.0, 0.0, turn))

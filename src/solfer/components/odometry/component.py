@@ -59,7 +59,8 @@ class RateDivider:
 class Odometry(Component):
     """Estimates pose and velocity of the base from wheels and IMU, and writes them into both States.
 
-    It begins at rest above the origin of the ground, with the heading of the IMU; a service puts it elsewhere.
+    It begins at rest above the origin of the ground, with the heading of the IMU; a service puts it elsewhere. Where
+    all sensors were silent it begins anew at its last place: encoders may count from elsewhere.
     The methods are `GeometricOdometry`, that of the paper, and `FilteredOdometry`.
 
     Args:
@@ -141,7 +142,16 @@ class Odometry(Component):
         streams.read(self.passed)
         while streams.next():
             self.model.update()
-            self.law.update(streams.elapsed, streams.measured)
+            if not streams.silence:
+                self.law.update(streams.elapsed, streams.measured)
+            elif streams.measured:
+                log.warning(
+                    "%s: neither joints nor IMU were measured for %.2f s; the base goes on from where it was",
+                    self.name,
+                    streams.silence,
+                )
+                streams.silence = 0.0
+                self.law.resume()
         streams.finish()
         self._write()
         for check in (streams.joint_stamps, streams.imu_stamps):

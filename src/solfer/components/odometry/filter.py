@@ -7,7 +7,7 @@ import numpy as np
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.consensus import COMPARISON_TIME, WheelConsensus, yaw_of
 from solfer.components.odometry.ground_plane import GroundPlane
-from solfer.components.odometry.kalman import NO_SAMPLE, ImuSample, WheelInertialFilter
+from solfer.components.odometry.kalman import HEADING, NO_SAMPLE, ImuSample, WheelInertialFilter
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheel_motion import WheelMotion
@@ -143,6 +143,22 @@ class FilteredOdometry:
         base.angular[:2] = 0.0
         self._motion.remember()
         self._find_velocity()
+
+    def resume(self) -> None:
+        """Begin anew at the last place and heading: nothing is known of the time since the last measurement."""
+        stop_time = 1.0  # [s] in which a robot whose commands are not received comes to rest
+        x, y, z = self.position.tolist()
+        speeds = (*self.velocity[:2].tolist(), float(self.angular[2]))
+        heading = self.heading
+        ground = z + self._motion.mean_height()
+        variances = [
+            float(self.kalman.covariance[axis, axis]) + (stop_time * speed) ** 2
+            for axis, speed in zip((0, 1, HEADING), speeds, strict=True)
+        ]
+        self.start()
+        self.place(x, y, heading)
+        self.position[2] += ground
+        self.kalman.place(*variances)
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Put the base somewhere else on the ground [m], with another heading [rad]; the pose is known then."""

@@ -132,6 +132,15 @@ class GeometricOdometry:
         self._solve(1.0)
         self._finish()
 
+    def resume(self) -> None:
+        """Begin anew at the last place and heading: nothing is known of the time since the last measurement."""
+        x, y, z = self.position.tolist()
+        heading = self.heading
+        self.start()
+        self.place(x, y, heading)
+        self.position[2] = z
+        self._places[:, 2] += z
+
     def place(self, x: float, y: float, heading: float) -> None:
         """Put the base somewhere else on the ground [m], with another heading [rad]."""
         yaw = heading - self.heading

@@ -60,6 +60,12 @@ class ImuSamples:
         self.measured_at = math.nan
         self.stamps.start()
 
+    def forget_until(self, time: float) -> None:
+        """Forget the samples up to a time [s], and what was measured then."""
+        samples = self._samples
+        samples.drop(int(np.searchsorted(samples.stamps[: samples.count], time, side="right")))
+        self.measured_at = math.nan
+
     def receive(self, history: SensorHistory) -> None:
         """Sort the samples of a cycle in, with the integral of the rates up to each."""
         samples = self._samples

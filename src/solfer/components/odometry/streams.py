@@ -13,6 +13,9 @@ from solfer.robot import Robot
 LONGEST_EXTRAPOLATION = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
+LONGEST_SILENCE = 1.0
+"""Longest silence of all sensors over which the estimate goes on [s]: after it encoders may count from elsewhere."""
+
 
 class _JointSamples:
     """Measurements of the joints: positions, then velocities, shape (2, width) each.
@@ -67,6 +70,8 @@ class Streams:
         elapsed: Time from the measurement before to this one [s].
         measured: Whether the IMU has measured the base in the meantime.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
+        silence: For how long neither joints nor IMU were measured before, if longer than `LONGEST_SILENCE` [s]; 0 after
+            a measurement of both.
         joint_stamps: Check of the joints' stamps.
     """
 
@@ -82,7 +87,7 @@ class Streams:
         self._written = np.zeros((2, 3))
         self._time = math.nan
         self._begin = math.nan
-        self._waited = self._period = 0.0
+        self._waited = self._period = self._silent = self.silence = 0.0
         self._is_due = False
 
     @property
@@ -101,7 +106,7 @@ class Streams:
             SensorHistory.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6))
         )
         self._time = self._begin = math.nan
-        self._waited = self.ahead = 0.0
+        self._waited = self.ahead = self._silent = self.silence = 0.0
         self._measurements.start()
         self.joint_stamps.start()
         self._samples.start()
@@ -124,6 +129,7 @@ class Streams:
         newest[1] = state.velocity[6:]
         if self._joints is not None and self._imu is not None:
             self._waited = self._waited + passed if self._measurements.waiting.count else 0.0
+            self._silent += passed
             self._receive(self._joints, self._imu)
 
     def next(self) -> bool:
@@ -191,6 +197,13 @@ class Streams:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
         begin = -math.inf if math.isnan(self._begin) else self._begin
         after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
-        self.joint_stamps.begin_cycle()
-        self._measurements.receive(joints, self.joint_stamps, begin, after=after)
+        check = self.joint_stamps
+        check.begin_cycle()
+        newest = self._samples.newest
+        self._measurements.receive(joints, check, begin, after=after)
         self._samples.receive(imu)
+        if check.newest != check.before or self._samples.newest != newest:
+            if self._silent > LONGEST_SILENCE:
+                self.silence = self._silent
+                self._samples.forget_until(newest)
+            self._silent = 0.0

@@ -19,6 +19,7 @@ from solfer.components.wheeled_motion.references import References, about_z
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import Lifting, MotionGuard, SupportPolygon, WeightShift
 from solfer.components.wheeled_motion.tags import (
+    BASE,
     CAMBER,
     CASTER,
     TASK_POINTS,
@@ -44,6 +45,9 @@ LIMITS = (
     *("support_margin", "lift_margin"),
 )
 """Tags of limits that change together: speeds, accelerations, corrections, margins."""
+
+NEARLY_AT_REST = 0.02
+"""Pace below which the log says what holds a motion."""
 
 
 class WheeledMotion(Component):
@@ -127,9 +131,9 @@ class WheeledMotion(Component):
             rests=tags.rests,
             across=tags.gain_across if self.received.straight is None else 0.0,
         )
-        self._pace = PathPace(
-            tags.speeds, tags.acceleration, references, steering=self._steering, offsets=wheels.offsets
-        )
+        base_error = self.tasks.rates.error[self.tasks.rows[BASE]] if BASE in self.tasks.rows else np.zeros(6)
+        self._pace = PathPace(references, self._steering, wheels.offsets, error=base_error)
+        self._pace.limit(tags.speeds, tags.acceleration, tags.furthest)
         self._pace.is_found = tags.is_paced
         self._publisher = PacePublisher(self._published_pace, self.period)
         self.tasks.prepare(tags, self.period, references, steering=self._steering, joints=self.joints)
@@ -171,7 +175,7 @@ class WheeledMotion(Component):
         accelerations = values[3:6]
         self.drive.limit(*speeds[:2], *accelerations[:2])
         self.targets.limit(speeds, accelerations)
-        self._pace.limit(speeds, accelerations[0])
+        self._pace.limit(speeds, accelerations[0], furthest=values[8])
         self.tasks.limit(speeds, accelerations, values[6:9])
         margin, self._lifting.margin = values[9:]
         self._guard.set_required_margin(margin)
@@ -249,8 +253,11 @@ class WheeledMotion(Component):
         """Shorten a motion that may not go on, and log why where it comes to rest."""
         last = self.tasks.descent.last
         guard = self._guard
-        if guard.update(self.references.pace, last >= 0, step) and self._pace.held < 0.02:  # nearly at rest
-            guard.warn(self.name, self.model.dofs[last])
+        pace = self.references.pace
+        if guard.update(pace, last >= 0, step) and self._pace.held < NEARLY_AT_REST:
+            guard.warn(self.name, f"joint '{self.model.dofs[last]}' is at its bound")
+        elif pace < NEARLY_AT_REST and self._pace.waits_for_base():
+            guard.warn(self.name, "the base does not follow its reference")
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`: references of base and vertices stay where they are as seen from the robot."""

@@ -13,20 +13,22 @@ LATERAL_SPEED = 4e-3
 PACE, LIMIT_RATIO, HEADING = range(3)
 """Indices of the numbers of the references."""
 
-VALUE, LIMITED, HELD, FOLLOWED, SPEED = range(5)
+VALUE, LIMITED, HELD, LAGS, FOLLOWED, SPEED = range(6)
 """State of the pace, see `solfer.components.wheeled_motion.pace.path.PathPace`: the pace, the factor by the limits,
-that of joints at their bounds, that which wheels and joints can follow, and the fastest vertex at it [m/s]."""
+that of joints at their bounds, that of a base that lags, that which all of them can follow, and the fastest vertex at
+it [m/s]."""
 
 GOING = np.dtype(
     [
         *((name, np.int64) for name in ("count", "state", "steered", "base")),
-        *((name, np.int64) for name in ("numbers", "motion", "vertices", "orientations", "desired")),
-        *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "acceleration")),
+        *((name, np.int64) for name in ("numbers", "motion", "vertices", "orientations", "desired", "error")),
+        *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "acceleration", "furthest")),
     ]
 )
 """What `advance` reads and writes, see `solfer.numerics.pointers.Memory`: the number of wheels, then addresses of the
-pace's state, what is known of the wheels, and the heading of the base; of the references; and of the vertices that are
-desired. Then largest speeds, and the largest acceleration of a vertex."""
+pace's state, what is known of the wheels, and the heading of the base; of the references; of the vertices that are
+desired; and of the errors of the base (rotation, place). Then largest speeds, the largest acceleration of a vertex, and
+the largest distance of the base from its reference."""
 
 _going_at = record_at(GOING)
 
@@ -51,6 +53,17 @@ def _limit(memory, state):
 
 
 @part
+def _lag_ratio(memory):
+    """Return the ratio with which a reference goes on that the base does not follow: where others hold, it waits."""
+    error = vector_at(memory.error, 6)
+    furthest_turn = 0.45  # [rad]
+    distance = math.hypot(error[3], error[4]) / memory.furthest
+    angle = 2.0 * abs(error[2]) / furthest_turn
+    # it slows down from a third of the largest error on, and rests at two thirds
+    return min(max(2.0 - 3.0 * max(distance, angle), 0.0), 1.0)
+
+
+@part
 def _update(memory, state, is_held, most, passed):
     """Find the ratio with which wheels and joints can follow."""
     steered = matrix_at(memory.steered, 4, memory.count)
@@ -67,7 +80,8 @@ def _update(memory, state, is_held, most, passed):
     decay_rate = 8.0  # [1/s] where joints are at their bounds; it recovers with 1/s
     change = (-decay_rate if is_held else 1.0) * passed
     state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - decay_rate * passed))
-    ratio = min(LATERAL_SPEED / across, state[HELD])
+    state[LAGS] = _lag_ratio(memory)
+    ratio = min(LATERAL_SPEED / across, state[HELD], state[LAGS])
     if fastest > 0.0:
         before = state[FOLLOWED]
         step = memory.acceleration * passed / fastest
@@ -132,7 +146,7 @@ def _advance(start, is_paced, is_first, is_held, most, passed):
     count = memory.count
     numbers = vector_at(memory.numbers, 4)
     if is_paced:
-        state = vector_at(memory.state, 5)
+        state = vector_at(memory.state, 6)
         _limit(memory, state)
         if not is_first:
             _update(memory, state, is_held, most, passed)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.wheeled_motion.pace.kernel import FOLLOWED, GOING, HELD, LIMITED, SPEED, VALUE, advance
+from solfer.components.wheeled_motion.pace.kernel import FOLLOWED, GOING, HELD, LAGS, LIMITED, SPEED, VALUE, advance
 from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
@@ -20,28 +20,22 @@ class PathPace:
     along the path rise with twice the `acceleration`, and fall with four times; where velocities jump to larger ones,
     vertices follow with three times the acceleration.
 
+    References wait for a base that does not follow, such as one whose joints another plugin holds: they slow down from
+    a third of `furthest` on, or from 0.15 rad, and rest at twice that.
+
     Args:
-        speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].
-        acceleration: Largest change of a vertex' speed by the pace [m/s2].
         references: What is desired.
         steering: Where wheels aim, and the desired speeds of their vertices.
         offsets: The vertices.
+        error: Errors of the base: its rotation, and its place [m]; live, shape (6,).
 
     Attributes:
         is_found: Whether motions wait for wheels and joints; else the pace stays what it is in the references.
     """
 
-    def __init__(
-        self,
-        speeds: tuple[float, float, float],
-        acceleration: float,
-        references: References,
-        steering: Steering,
-        offsets: RollingOffsets,
-    ):
+    def __init__(self, references: References, steering: Steering, offsets: RollingOffsets, error: np.ndarray):
         self.is_found = True
-        self._state = np.zeros(5)
-        base, heading, vertex = speeds
+        self._state = np.zeros(6)
         self._memory = Memory(
             GOING,
             count=len(references.lifted),
@@ -53,19 +47,22 @@ class PathPace:
             vertices=references.places,
             orientations=references.orientations,
             desired=offsets.reference,
-            base_speed=base,
-            turn_speed=heading,
-            vertex_speed=vertex,
-            acceleration=acceleration,
+            error=error,
         )
         self._address = self._memory.address
         self.start()
 
-    def limit(self, speeds: Sequence[float], acceleration: float) -> None:
-        """Set the largest speeds, and the acceleration of the pace, see above."""
+    def limit(self, speeds: Sequence[float], acceleration: float, furthest: float) -> None:
+        """Set what bounds the motion.
+
+        Args:
+            speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].
+            acceleration: Largest change of a vertex' speed by the pace [m/s2].
+            furthest: Largest distance of the base from its reference [m].
+        """
         record = self._memory.record
         record["base_speed"], record["turn_speed"], record["vertex_speed"] = speeds
-        record["acceleration"] = acceleration
+        record["acceleration"], record["furthest"] = acceleration, furthest
 
     @property
     def value(self) -> float:
@@ -77,9 +74,13 @@ class PathPace:
         """Ratio that joints at their bounds leave."""
         return float(self._state[HELD])
 
+    def waits_for_base(self) -> bool:
+        """Return whether the base is so far from its reference that this one waits."""
+        return bool(self._state[LAGS] < 1.0)
+
     def start(self) -> None:
         """Begin without a motion, which could go on in full."""
-        self._state[[VALUE, LIMITED, HELD, FOLLOWED]] = 1.0
+        self._state[[VALUE, LIMITED, HELD, LAGS, FOLLOWED]] = 1.0
         self._state[SPEED] = 0.0
 
     def advance(self, is_paced: bool, is_first: bool, is_held: bool, most: float, passed: float) -> None:

@@ -141,10 +141,9 @@ class MotionGuard:
             return f"{what} is {amount:.2f} {unit} off"
         return f"joint '{self._names[index - len(self._watched)]}' is near a singularity"
 
-    def warn(self, name: str, joint: str) -> None:
-        """Log what holds a component; nothing but a joint at its bound where the guard does not."""
-        why = self.why or f"joint '{joint}' is at its bound"
-        self._throttle.warning("held", "%s holds where it is: %s", name, why)
+    def warn(self, name: str, other: str) -> None:
+        """Log what holds a component: `other` where the guard does not."""
+        self._throttle.warning("held", "%s holds where it is: %s", name, self.why or other)
 
     def start(self) -> None:
         """Hold nothing."""
