@@ -9,7 +9,7 @@ from solfer.errors import PipeError
 from solfer.interfaces.port import Port
 from solfer.model import State
 from solfer.numerics.filters import LowPass
-from solfer.pipes.feedback_pipe import MakeFilter, Reception
+from solfer.pipes.state_feedback_pipe import MakeFilter, Reception
 from solfer.robot import Robot
 from solfer.transport.endpoints import NullWriter, Writer
 from solfer.transport.messages import canonical

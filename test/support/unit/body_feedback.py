@@ -10,7 +10,7 @@ from solfer.model import Description, Kinematics, State
 from solfer.pipes.body.feedback import BodyFeedbackPipe, BodySensor
 from solfer.pipes.body.reading import READINGS
 from solfer.pipes.body.sensor_mount import SensorMount
-from solfer.pipes.feedback_pipe import Reception
+from solfer.pipes.state_feedback_pipe import Reception
 
 SENSOR = (
     '<link name="sensor"/><joint name="glue" type="fixed"><parent link="arm"/><child link="sensor"/>'

@@ -8,9 +8,9 @@ from support.unit.endpoints import Kept, Told
 from solfer.errors import SizeMismatch
 from solfer.model import BidirectionalMap, State
 from solfer.pipes import JointCommandPipe, JointFeedbackPipe
-from solfer.pipes.feedback_pipe import Reception
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointReceiver, JointSender
+from solfer.pipes.state_feedback_pipe import Reception
 from solfer.transport import JointMessage, MessageStatus
 
 DOFS = ("base", "yaw", "knee", "wheel")

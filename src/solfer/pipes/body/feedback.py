@@ -14,7 +14,7 @@ from solfer.pipes.body.alignment import Alignment
 from solfer.pipes.body.reading import BodyReading
 from solfer.pipes.body.sensor_mount import SensorMount
 from solfer.pipes.body.turn_check import TurnCheck
-from solfer.pipes.feedback_pipe import Reception, StateFeedbackPipe
+from solfer.pipes.state_feedback_pipe import Reception, StateFeedbackPipe
 from solfer.transport.endpoints import Reader
 from solfer.transport.messages import Message
 

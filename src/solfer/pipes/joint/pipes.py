@@ -10,12 +10,12 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
 from solfer.pipes.command_pipe import CommandPipe
-from solfer.pipes.feedback_pipe import MakeFilter, Reception, StateFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration, Correction, same
 from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.joint.turns import JointTurns
 from solfer.pipes.name_order import ORDER_MEMORY, NameOrder, Order
+from solfer.pipes.state_feedback_pipe import MakeFilter, Reception, StateFeedbackPipe
 from solfer.pipes.state_field import interface_of
 from solfer.transport.endpoints import Reader, Writer
 from solfer.transport.messages import JOINT_FIELDS, JointMessage, arrays

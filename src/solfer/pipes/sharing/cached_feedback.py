@@ -6,8 +6,9 @@ from operator import attrgetter
 import numpy as np
 
 from solfer.config.records.pipes import FeedbackRecord
-from solfer.pipes.feedback_pipe import FeedbackPipe, StateFeedbackPipe
+from solfer.pipes.feedback_pipe import FeedbackPipe
 from solfer.pipes.precedence import Watch
+from solfer.pipes.state_feedback_pipe import StateFeedbackPipe
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
 from solfer.transport.messages import Message
 
