@@ -21,12 +21,8 @@ from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.sensors import Equipment, load_equipment
 from solfer.simulation.world.records import Friction
 
-ROBOTS = "package://solfer/config/robots"
 URDF_SUFFIXES = (".urdf", ".xacro")
 """Ends of names of bare URDFs, in letters of any case."""
-
-STANDING_STATE = "standing"
-"""Name that collections of robots have given to the state in which a robot stands."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +61,7 @@ def find_robot(name: str) -> Path:
     """
     if "/" in name or name.lower().endswith((".yaml", *URDF_SUFFIXES)):
         return Path(name)
-    folder = located(ROBOTS, ".")
+    folder = located("package://solfer/config/robots", ".")
     known = sorted(path.parent.name for path in folder.glob("*/robot.yaml"))
     if name not in known:
         raise UnknownName("robot", name, known)
@@ -175,7 +171,8 @@ def _file(path: str | Path) -> FileRecord:
 def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> str | None:
     """Choose the state in which a simulation begins; None: in the neutral posture."""
     if record.start is None:
-        return STANDING_STATE if STANDING_STATE in states else next(iter(states), None)
+        # the name that collections of robots have given to the state in which a robot stands
+        return "standing" if "standing" in states else next(iter(states), None)
     if record.start.state not in states:
         raise UnknownName("state", record.start.state, states, where=record.start.where("state"))
     return record.start.state

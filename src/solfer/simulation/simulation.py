@@ -19,11 +19,6 @@ from solfer.simulation.state import BaseMotion, Moment, MotorSide, SimulationSta
 from solfer.simulation.world.records import WorldRecord
 from solfer.simulation.world.world import FLAT_WORLD, World, read_world
 
-NOWHERE = (0.0, 0.0, 500.0)  # [m], where nothing is
-LARGEST_FRICTION = 10.0
-LARGEST_SEED = 2**63 - 1
-DIVERGED = 1e6  # [rad/s, m/s]; the norm of all speeds stays far below in a world that makes sense
-
 
 class Simulation:
     """Steps a robot and its lower level together, one millisecond at a time. Equal inputs give bitwise equal motions.
@@ -187,8 +182,9 @@ class Simulation:
         placement.check()
         if not self.floating and placement != START_ORIGIN:
             raise SimulationError("the robot's base is fixed", expected="no x, y, yaw and height")
-        if seed is not None and not 0 <= seed <= LARGEST_SEED:
-            raise SimulationError(f"the seed is {seed}", expected=f"from 0 to {LARGEST_SEED}")
+        highest = 2**63 - 1
+        if seed is not None and not 0 <= seed <= highest:
+            raise SimulationError(f"the seed is {seed}", expected=f"from 0 to {highest}")
         self._put(posture, placement)
         self.pushes.clear()
         self.torque[:] = 0.0
@@ -225,16 +221,14 @@ class Simulation:
 
         Args:
             name: A part of the world (`ground` is the plane), a link of the robot, or a group of its links.
-            coefficient: From zero to LARGEST_FRICTION.
+            coefficient: From 0 to 10.
 
         Raises:
             UnknownName: Nothing has that name.
             SimulationError: The coefficient is beyond its bounds.
         """
-        if not 0.0 <= coefficient <= LARGEST_FRICTION:
-            raise SimulationError(
-                f"the friction of '{name}' is {coefficient:g}", expected=f"from 0 to {LARGEST_FRICTION:g}"
-            )
+        if not 0.0 <= coefficient <= 10.0:
+            raise SimulationError(f"the friction of '{name}' is {coefficient:g}", expected="from 0 to 10")
         if name in self.world.names:
             self.world.set_friction(name, coefficient)
         elif name in self.body.owner or name in self._groups:
@@ -261,7 +255,7 @@ class Simulation:
         """Put robot and world where they begin; if that is impossible they stay where they are."""
         before = self._engine.keep()
         try:
-            self.body.place(posture, NOWHERE)
+            self.body.place(posture, (0.0, 0.0, 500.0))  # where nothing is
             self.world.scatter()
             self._engine.forget_contacts()
             self.world.reset()
@@ -285,7 +279,8 @@ class Simulation:
     def _read(self) -> None:
         self.state.now.expire()
         self.body.read(self.q, self.v, self._motor_torque)
-        if not float(np.dot(self.v, self.v)) < DIVERGED**2:  # true for NaN as well
+        highest = 1e6  # norm of all speeds [rad/s, m/s], which stays far below in a world that makes sense
+        if not float(np.dot(self.v, self.v)) < highest**2:  # true for NaN as well
             raise SimulationError(
                 f"the simulation diverged after {self.time:g} s",
                 expected="smaller gains or forces, or masses and inertias as the real robot has them",

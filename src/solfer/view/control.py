@@ -18,23 +18,18 @@ from solfer.view.life import PageLives
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 
-CONTROL_SILENCE = 0.5
+SILENCE_TIMEOUT = 0.5
 """Time without a sign of life of the page that commands after which everything comes to rest [s]."""
-
-DRAG_RANGE = 5.0
-"""Farthest that a handle is dragged from its reference [m]."""
 
 NO_PAGE_COMMANDS = "no page commands"
 
 logger = logging.getLogger(__name__)
 
-WORLD_POSE = ScenePose(np.zeros(3), np.eye(3))
-
 
 class PageControl:
     """Lets one page command, as long as it shows life.
 
-    Without a sign of it for `CONTROL_SILENCE`, or closed, the velocity is zero, references stay where they are, and
+    Without a sign of it for `SILENCE_TIMEOUT`, or closed, the velocity is zero, references stay where they are, and
     others may command.
 
     Args:
@@ -79,7 +74,7 @@ class PageControl:
     def update(self, state: SceneState | None) -> None:
         """Publish what is commanded; without a scene, None, nothing is."""
         self._pad.find_modules()
-        if self._holder is not None and (state is None or self._lives.age(self._holder) > CONTROL_SILENCE):
+        if self._holder is not None and (state is None or self._lives.age(self._holder) > SILENCE_TIMEOUT):
             self._rest()
         if state is not None:
             self._show(state)
@@ -112,7 +107,7 @@ class PageControl:
             return
         if self._holder is not None:
             self._refuse(client, "another page commands")
-        elif self._lives.age(client) > CONTROL_SILENCE:
+        elif self._lives.age(client) > SILENCE_TIMEOUT:
             self._refuse(client, "this page does not answer in time to command")
         else:
             self._holder = client
@@ -165,15 +160,15 @@ class PageControl:
         )
 
         async def moved(event: TransformControlsEvent) -> None:
-            place = handle.position.copy()
-            turn = handle.wxyz.copy()
-            drag = partial(self._drag, name, event.client_id, event.phase, position=place, turn=turn)
+            position = handle.position.copy()
+            quaternion = handle.wxyz.copy()
+            drag = partial(self._drag, name, event.client_id, event.phase, position=position, quaternion=quaternion)
             self._requests.submit((name, event.client_id, event.phase), drag)
 
         handle.on_update(moved)
         return handle
 
-    def _drag(self, name: str, client: int | None, phase: str, position: np.ndarray, turn: np.ndarray) -> None:
+    def _drag(self, name: str, client: int | None, phase: str, position: np.ndarray, quaternion: np.ndarray) -> None:
         shown = self._shown.get(name)
         if shown is None or not self._is_holder(client):
             return
@@ -182,11 +177,11 @@ class PageControl:
             self._dragged.release(shown, self._name)
             return
         try:
-            pose = ScenePose(position, rotation_from_quaternion(np.roll(turn, -1)))
+            pose = ScenePose(position, rotation_from_quaternion(np.roll(quaternion, -1)))
         except NotFinite:
             return
-        if phase == "update" and np.linalg.norm(position - shown.reference.position) <= DRAG_RANGE:
-            frame = self._frames.get(shown.frame, WORLD_POSE)
+        if phase == "update" and np.linalg.norm(position - shown.reference.position) <= 5.0:  # [m]
+            frame = self._frames.get(shown.frame, ScenePose(np.zeros(3), np.eye(3)))
             own = ScenePose(frame.seen(pose.position), frame.rotation.T @ pose.rotation)
             self._moved.add(name)
             self._dragged.drag(shown, self._name, own)

@@ -14,26 +14,9 @@ from solfer.view.visuals import Visual, visuals_of
 FORCE_SCALE = 1e-3
 """Length of the arrow of a force [m/N]."""
 
-DRAWN_STEP = 1e-4
-"""How far a link moves until the page is informed [m], and an entry of its rotation."""
-
-REFERENCE_AXES_LENGTH = 0.12
-"""Length of the axes of a reference [m]."""
-
-TRANSLUCENT = 0.3
-"""Opacity of the desired robot."""
+FORCE_COLOR = (0.9, 0.3, 0.1)
 
 Color = tuple[float, float, float]
-
-DESIRED_COLOR = (0.3, 0.55, 1.0)
-CENTER = (0.1, 0.4, 0.9)
-PROJECTION = (0.9, 0.2, 0.2)
-EDGES_COLOR = (0.1, 0.7, 0.2)
-INNER_COLOR = (0.9, 0.7, 0.1)
-FORCES = (0.9, 0.3, 0.1)
-PATH_COLOR = (0.6, 0.2, 0.8)
-ESTIMATED = (0.95, 0.6, 0.2)
-GOAL_COLOR = (0.5, 0.5, 0.5)
 
 
 class SceneDrawing:
@@ -49,13 +32,13 @@ class SceneDrawing:
         visuals = visuals_of(description)
         api.add_grid("/ground", width=20.0, height=20.0, cell_size=0.5, section_size=1.0)
         self._measured = _Links(api, "/measured", visuals)
-        self._desired = _Links(api, "/desired", visuals, color=DESIRED_COLOR, opacity=TRANSLUCENT)
-        self._center = api.add_icosphere("/center/mass", 0.04, CENTER)
-        self._projection = api.add_icosphere("/center/projection", 0.025, PROJECTION)
-        self._polygon = _Line(api, "/support/polygon", EDGES_COLOR)
-        self._inner = _Line(api, "/support/margins", INNER_COLOR)
-        self._path = _Line(api, "/path/base", PATH_COLOR)
-        self._estimated = _Line(api, "/path/estimated", ESTIMATED)
+        self._desired = _Links(api, "/desired", visuals, color=(0.3, 0.55, 1.0), opacity=0.3)
+        self._center = api.add_icosphere("/center/mass", 0.04, (0.1, 0.4, 0.9))
+        self._projection = api.add_icosphere("/center/projection", 0.025, (0.9, 0.2, 0.2))
+        self._polygon = _Line(api, "/support/polygon", (0.1, 0.7, 0.2))
+        self._inner = _Line(api, "/support/margins", (0.9, 0.7, 0.1))
+        self._path = _Line(api, "/path/base", (0.6, 0.2, 0.8))
+        self._estimated = _Line(api, "/path/estimated", (0.95, 0.6, 0.2))
         self._forces: ArrowsHandle | None = None
         self._references: dict[str, _Reference] = {}
 
@@ -82,7 +65,7 @@ class SceneDrawing:
         if self._forces is not None:
             self._forces.points = arrows
         elif len(arrows):
-            self._forces = self._api.add_arrows("/forces", arrows, FORCES, shaft_radius=0.012, head_radius=0.03)
+            self._forces = self._api.add_arrows("/forces", arrows, FORCE_COLOR, shaft_radius=0.012, head_radius=0.03)
 
     def _draw_references(self, references: Sequence[ShownReference]) -> None:
         shown = {name_of(each): each for each in references}
@@ -133,11 +116,12 @@ class _Links:
             return
         positions = np.array([poses[link].position for link in self._links])
         rotations = np.array([poses[link].rotation for link in self._links])
+        change = 1e-4  # of a position [m], or of an entry of a rotation, below which the page is not informed
         # handles would compare each pose with the one before, which takes three times as long as to send it
-        for index in np.flatnonzero(~(np.abs(positions - self._positions) < DRAWN_STEP).all(axis=1)):
+        for index in np.flatnonzero(~(np.abs(positions - self._positions) < change).all(axis=1)):
             self._positions[index] = positions[index]
             self._send(SetPositionMessage(self._names[index], tuple(positions[index].tolist())))
-        for index in np.flatnonzero(~(np.abs(rotations - self._rotations) < DRAWN_STEP).all(axis=(1, 2))):
+        for index in np.flatnonzero(~(np.abs(rotations - self._rotations) < change).all(axis=(1, 2))):
             self._rotations[index] = rotations[index]
             x, y, z, w = quaternion_from_rotation(rotations[index]).tolist()
             self._send(SetOrientationMessage(self._names[index], (w, x, y, z)))
@@ -163,9 +147,9 @@ class _Reference:
     """Where a reference is, and where it goes."""
 
     def __init__(self, api: SceneApi, name: str):
-        self._frame = api.add_frame(f"/references{name}", axes_length=REFERENCE_AXES_LENGTH, axes_radius=0.006)
+        self._frame = api.add_frame(f"/references{name}", axes_length=0.12, axes_radius=0.006)
         self._label = api.add_label(f"/references{name}/name", name)
-        self._goal = api.add_icosphere(f"/goals{name}", 0.02, GOAL_COLOR)
+        self._goal = api.add_icosphere(f"/goals{name}", 0.02, (0.5, 0.5, 0.5))
 
     def place(self, reference: ShownReference) -> None:
         """Move it."""

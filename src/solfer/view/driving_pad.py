@@ -13,24 +13,7 @@ from solfer.transport.messages import FieldsMessage
 from solfer.transport.topics import Topics
 from solfer.view.requests import PageRequests
 
-RELEASE_TIME = 0.25
-"""Time after which a button of the pad counts as released [s]; while it is pressed it says so ten times a second."""
-
-TURN_BY_SPEED = 2.0
-"""Turn of the base for each metre of the pad's speed [rad/m]."""
-
 CMD_VEL = "cmd_vel"
-TWIST = "geometry_msgs/Twist"
-
-PAD_VELOCITIES = {
-    "ahead": (1.0, 0.0, 0.0),
-    "back": (-1.0, 0.0, 0.0),
-    "left": (0.0, 1.0, 0.0),
-    "right": (0.0, -1.0, 0.0),
-    "turn left": (0.0, 0.0, 1.0),
-    "turn right": (0.0, 0.0, -1.0),
-}
-"""Velocity of each button of the pad, as a share: x, y, heading."""
 
 
 class DrivingPad:
@@ -61,7 +44,15 @@ class DrivingPad:
         self._next = -math.inf
         self._module = gui.add_dropdown("base", ("",))
         self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
-        for name, direction in PAD_VELOCITIES.items():
+        directions = {  # x, y, yaw
+            "ahead": (1.0, 0.0, 0.0),
+            "back": (-1.0, 0.0, 0.0),
+            "left": (0.0, 1.0, 0.0),
+            "right": (0.0, -1.0, 0.0),
+            "turn left": (0.0, 0.0, 1.0),
+            "turn right": (0.0, 0.0, -1.0),
+        }
+        for name, direction in directions.items():
             self._connect(gui.add_button(name), direction)
 
     def find_modules(self) -> None:
@@ -84,17 +75,17 @@ class DrivingPad:
 
     def drive(self) -> None:
         """Publish the velocity while a button is pressed, then zero once."""
-        pressed = self._middleware.now() - self._pressed <= RELEASE_TIME
+        pressed = self._middleware.now() - self._pressed <= 0.25  # [s]; a pressed button says so ten times a second
         module = str(self._module.value)
         if not module or not (pressed or self._drives):
             return
         speed = float(self._speed.value) if pressed else 0.0
-        x, y, turn = (speed * each for each in self._direction)
+        x, y, yaw = (speed * each for each in self._direction)
         if module not in self._writers:
             topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
-            self._writers[module] = self._middleware.declared_writer(topic, TWIST)
+            self._writers[module] = self._middleware.declared_writer(topic, "geometry_msgs/Twist")
         linear = {"x": x, "y": y, "z": 0.0}
-        angular = {"x": 0.0, "y": 0.0, "z": TURN_BY_SPEED * turn}
+        angular = {"x": 0.0, "y": 0.0, "z": 2.0 * yaw}  # 2 rad/s at 1 m/s
         self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
         self._drives = pressed
 

@@ -8,9 +8,6 @@ from solfer.transport.lower_level import LOWER_LEVEL, Answer
 from solfer.transport.middleware import TRIGGER, NoFields
 from solfer.view.requests import PageRequests
 
-STOP_LABEL = "EMERGENCY STOP"
-CONFIRM = "stop the robot now"
-
 
 class EmergencyStopButton:
     """Always there, also where nothing else may be commanded.
@@ -24,7 +21,7 @@ class EmergencyStopButton:
     def __init__(self, viser: ViserServer, requests: PageRequests, stop: Callable[[], None] | None = None):
         self._requests = requests
         self._stop = stop or self._call
-        button = viser.gui.add_button(STOP_LABEL, color="red")
+        button = viser.gui.add_button("EMERGENCY STOP", color="red")
         button.on_click(self._confirm)
 
     async def _confirm(self, event: GuiEvent[GuiButtonHandle]) -> None:
@@ -33,7 +30,7 @@ class EmergencyStopButton:
         for question in tuple(event.client.gui._modal_handle_from_uuid.values()):
             question.close()
         with event.client.gui.add_modal("emergency stop") as modal:
-            confirm = event.client.gui.add_button(CONFIRM, color="red")
+            confirm = event.client.gui.add_button("stop the robot now", color="red")
             cancel = event.client.gui.add_button("cancel")
 
         @confirm.on_click

@@ -14,9 +14,6 @@ from solfer.view.server import PageServer
 FOXGLOVE = "foxglove"
 """Path of the server below the token of the page."""
 
-RELAY_PAUSE = 0.001
-"""Shortest time between two messages of a client [s]: the server behind takes them in threads that delay the page."""
-
 
 class FoxgloveRelay:
     """Passes on what clients and a server behind it send.
@@ -51,8 +48,9 @@ class FoxgloveRelay:
                 if isinstance(message, str) and self._secret in message:
                     break
                 await connection.send(message)
+            pause = 0.001  # [s]; the server behind takes messages in threads that delay the page
             both = [
-                asyncio.create_task(_pass_on(connection, server, RELAY_PAUSE)),
+                asyncio.create_task(_pass_on(connection, server, pause)),
                 asyncio.create_task(_pass_on(server, connection)),
             ]
             await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)

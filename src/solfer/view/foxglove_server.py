@@ -15,7 +15,7 @@ from solfer.scene import ContactForce, SceneState
 from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, SetParameters
 from solfer.view.columns import PlottedColumns
 from solfer.view.control import PageControl
-from solfer.view.drawing import FORCE_SCALE, FORCES
+from solfer.view.drawing import FORCE_COLOR, FORCE_SCALE
 from solfer.view.foxglove_relay import FOXGLOVE, FoxgloveRelay
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
@@ -127,7 +127,7 @@ class FoxgloveServer(ServerListener):
                     parent_frame_id=state.frame,
                     child_frame_id=link,
                     translation=_vector(pose.position),
-                    rotation=_turn(quaternion_from_rotation(pose.rotation)),
+                    rotation=_quaternion(quaternion_from_rotation(pose.rotation)),
                 )
                 for link, pose in state.measured.items()
             ]
@@ -202,7 +202,7 @@ class FoxgloveServer(ServerListener):
         if not self._odometry.read():
             return
         message = self._odometry.message
-        pose = Pose(position=_vector(message.position), orientation=_turn(message.orientation))
+        pose = Pose(position=_vector(message.position), orientation=_quaternion(message.orientation))
         self._odom.log(Odometry(timestamp=stamp, frame_id=message.frame, body_frame_id=message.child, pose=pose))
 
 
@@ -211,20 +211,20 @@ def _vector(numbers: np.ndarray) -> Vector3:
     return Vector3(x=x, y=y, z=z)
 
 
-def _turn(numbers: np.ndarray) -> Quaternion:
+def _quaternion(numbers: np.ndarray) -> Quaternion:
     x, y, z, w = numbers.tolist()
     return Quaternion(x=x, y=y, z=z, w=w)
 
 
 def _arrow(force: ContactForce) -> ArrowPrimitive:
-    """Return the arrow of a force; without a turn it points along x."""
+    """Return the arrow of a force; without a rotation it points along x."""
     size = float(np.linalg.norm(force.force))
     x, y, z = (force.force / size).tolist()
     half = np.array((0.0, -z, y, 1.0 + x))
-    turn = half / np.linalg.norm(half) if x > -1.0 else np.array((0.0, 0.0, 1.0, 0.0))
-    red, green, blue = FORCES
+    quaternion = half / np.linalg.norm(half) if x > -1.0 else np.array((0.0, 0.0, 1.0, 0.0))
+    red, green, blue = FORCE_COLOR
     return ArrowPrimitive(
-        pose=Pose(position=_vector(force.position), orientation=_turn(turn)),
+        pose=Pose(position=_vector(force.position), orientation=_quaternion(quaternion)),
         shaft_length=FORCE_SCALE * size,
         shaft_diameter=0.024,
         head_length=0.06,

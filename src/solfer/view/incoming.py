@@ -12,31 +12,17 @@ from websockets.asyncio.server import ServerConnection
 
 from solfer.throttle import Throttle
 
-LARGEST_MESSAGE = 65536
-"""Of a page [bytes]; a longer one closes its connection."""
-
 DRAG_MESSAGES = (
     _messages.TransformControlsDragStartMessage,
     _messages.TransformControlsUpdateMessage,
     _messages.TransformControlsDragEndMessage,
 )
 
-MESSAGE_TYPES = {
-    each.__name__: each
-    for each in (
-        _messages.ViewerCameraMessage,
-        _messages.GuiUpdateMessage,
-        _messages.GuiButtonHoldMessage,
-        *DRAG_MESSAGES,
-    )
-}
-"""All that pages send; viser would also take files, and be reached from other machines."""
-
 logger = logging.getLogger(__name__)
 
 
 class IncomingMessages:
-    """Judges each message of a page before viser shares it with all pages.
+    """Checks each message of a page before viser shares it with all pages.
 
     What a page may not change is set back on that page. All of it runs in the server's thread.
 
@@ -55,6 +41,14 @@ class IncomingMessages:
         self.may_command: Callable[[int], bool] = lambda _: False
         self.is_free: Callable[[], bool] = lambda: True
         self.display: set[str] = set()
+        # all that pages send; viser would also take files, and be reached from other machines
+        types = (
+            _messages.ViewerCameraMessage,
+            _messages.GuiUpdateMessage,
+            _messages.GuiButtonHoldMessage,
+            *DRAG_MESSAGES,
+        )
+        self._types = {each.__name__: each for each in types}
 
     async def receive(self, connection: ServerConnection, receive: Callable[[], Awaitable[str | bytes]]) -> bytes:
         """Return the next message of a page that viser may have."""
@@ -62,25 +56,25 @@ class IncomingMessages:
             raw = await receive()
             await asyncio.sleep(0.0)  # a page that floods leaves their turn to the others
             try:
-                message = self._judged(connection, _decoded(raw))
+                message = self._checked(connection, self._decoded(raw))
             except (ValueError, TypeError, KeyError, RecursionError) as error:
                 self._throttle.warning("junk", "a page sends what is no message of it: %s", type(error).__name__)
                 continue
             if message is not None:
                 return msgspec.msgpack.encode(message.as_serializable_dict())
 
-    def _judged(self, connection: ServerConnection, message: _messages.Message) -> _messages.Message | None:
+    def _checked(self, connection: ServerConnection, message: _messages.Message) -> _messages.Message | None:
         """Return a message as viser may have it; None: it may not."""
         connections = self._viser._websock_server._live_connections
         page = next(number for number, each in connections.items() if each is connection)
         if isinstance(message, _messages.GuiUpdateMessage):
-            return self._judged_update(page, message)
+            return self._checked_update(page, message)
         if isinstance(message, DRAG_MESSAGES) and not self.may_command(page):
             self._put_back(page, message.name)
             return None
         return message
 
-    def _judged_update(self, page: int, message: _messages.GuiUpdateMessage) -> _messages.Message | None:
+    def _checked_update(self, page: int, message: _messages.GuiUpdateMessage) -> _messages.Message | None:
         if set(message.updates) != {"value"}:  # viser would also change what belongs to the server alone
             raise ValueError
         value = message.updates["value"]
@@ -97,6 +91,20 @@ class IncomingMessages:
             self._send(page, _messages.GuiUpdateMessage(message.uuid, {"value": kept}))
         return None if fitting is None else _messages.GuiUpdateMessage(message.uuid, {"value": fitting})
 
+    def _decoded(self, raw: str | bytes) -> _messages.Message:
+        """Make a message of its bytes, strictly: viser itself accepts any shape, and warns without a bound.
+
+        Raises:
+            ValueError, TypeError, KeyError, RecursionError: It is none.
+        """
+        if isinstance(raw, str):
+            raise TypeError
+        fields = msgspec.msgpack.decode(raw, type=dict[str, Any])
+        message = msgspec.convert(fields, self._types[fields.pop("type")], strict=False)
+        if not _is_finite(tuple(vars(message).values())):
+            raise ValueError
+        return message
+
     def _put_back(self, page: int, name: str) -> None:
         handle = self._viser.scene._handle_from_transform_controls_name.get(name)
         if handle is not None:
@@ -105,21 +113,6 @@ class IncomingMessages:
 
     def _send(self, page: int, message: _messages.Message) -> None:
         self._viser._websock_server._client_state_from_id[page].message_buffer.push(message)
-
-
-def _decoded(raw: str | bytes) -> _messages.Message:
-    """Make a message of its bytes, strictly: viser itself accepts any shape, and warns without a bound.
-
-    Raises:
-        ValueError, TypeError, KeyError, RecursionError: It is none.
-    """
-    if isinstance(raw, str):
-        raise TypeError
-    fields = msgspec.msgpack.decode(raw, type=dict[str, Any])
-    message = msgspec.convert(fields, MESSAGE_TYPES[fields.pop("type")], strict=False)
-    if not _is_finite(tuple(vars(message).values())):
-        raise ValueError
-    return message
 
 
 def _is_finite(value: object) -> bool:

@@ -7,18 +7,7 @@ from collections.abc import Callable
 from viser import ClientHandle
 from viser._messages import RunJavascriptMessage
 
-from solfer.view.server import LIFE, PageServer
-
-LIFE_PERIOD = 100
-"""Time between two signs of a page [ms]; a browser lets a page that is not in view send one a second."""
-
-LIFE_SCRIPT = """
-const place = location.origin.replace(/^http/, "ws") + location.pathname;
-const socket = new WebSocket(`${place}%s/%s`);
-const timer = setInterval(() => socket.readyState === 1 && socket.send(""), %d);
-socket.onclose = () => clearInterval(timer);
-"""
-# viser's own messages wait for the next picture, which may take seconds to draw
+from solfer.view.server import LIFE_PATH, PageServer
 
 
 class PageLives:
@@ -28,6 +17,15 @@ class PageLives:
         server: The pages.
         now: Time [s]; any thread may request it.
     """
+
+    # A sign of life every 100 ms; a browser lets a page that is not in view send one a second. Viser's own messages
+    # wait for the next picture, which may take seconds to draw.
+    _SCRIPT = """
+const place = location.origin.replace(/^http/, "ws") + location.pathname;
+const socket = new WebSocket(`${place}%s/%s`);
+const timer = setInterval(() => socket.readyState === 1 && socket.send(""), 100);
+socket.onclose = () => clearInterval(timer);
+"""
 
     def __init__(self, server: PageServer, now: Callable[[], float]):
         self._now = now
@@ -39,9 +37,7 @@ class PageLives:
             number = client.client_id
             keys[number] = secrets.token_urlsafe()
             server.lives[keys[number]] = lambda: self._note(number)
-            client._websock_connection.queue_message(
-                RunJavascriptMessage(LIFE_SCRIPT % (LIFE, keys[number], LIFE_PERIOD))
-            )
+            client._websock_connection.queue_message(RunJavascriptMessage(self._SCRIPT % (LIFE_PATH, keys[number])))
 
         @server.viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:

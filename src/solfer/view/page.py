@@ -24,13 +24,6 @@ from solfer.view.time_line import TimeLine
 if TYPE_CHECKING:
     from solfer.view.foxglove_server import FoxgloveServer
 
-CAMERA = (2.1, -1.8, 1.4)
-CAMERA_TARGET = (0.0, 0.0, 0.6)
-"""Where a page looks from at first, and where to [m]."""
-
-CAMERA_FIELD_OF_VIEW = math.radians(40.0)
-"""Vertical field of view of a page [rad]."""
-
 
 class Page:
     """A page of one robot; `update` is called by one loop, which does all that pages request.
@@ -48,6 +41,15 @@ class Page:
         foxglove: Its server; None: there is none.
     """
 
+    CAMERA = (2.1, -1.8, 1.4)
+    """Where it looks from at first [m]."""
+
+    TARGET = (0.0, 0.0, 0.6)
+    """Where it looks to at first [m]."""
+
+    FIELD_OF_VIEW = math.radians(40.0)
+    """Vertical field of view [rad]."""
+
     def __init__(
         self,
         server: PageServer,
@@ -64,9 +66,9 @@ class Page:
         self._playback = playback
         gui = self._viser.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
-        self._viser.initial_camera.position = CAMERA
-        self._viser.initial_camera.look_at = CAMERA_TARGET
-        self._viser.initial_camera.fov = CAMERA_FIELD_OF_VIEW
+        self._viser.initial_camera.position = self.CAMERA
+        self._viser.initial_camera.look_at = self.TARGET
+        self._viser.initial_camera.fov = self.FIELD_OF_VIEW
         self._freshness = Freshness(server)
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)

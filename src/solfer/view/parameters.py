@@ -7,8 +7,8 @@ from concurrent.futures import Future
 from solfer.transport import Middleware
 from solfer.transport.parameters import GET_INTERFACE, GET_PARAMETERS, GetParameters, ParametersReply
 
-TRIALS, PARAMETERS_PAUSE = 10, 2.0
-"""How often, and after which time [s], a part is requested its parameters: it may report before it offers them."""
+ATTEMPTS = 10
+"""How often a part is requested its parameters: it may report before it offers them."""
 
 
 class KnownParameters:
@@ -30,22 +30,21 @@ class KnownParameters:
 
     def update(self, parts: Iterable[str]) -> None:
         """Send requests, and take the replies that are there."""
+        pause = 2.0  # [s] until the next request
         now = self._middleware.now()
         for part in parts:
             if part in self._pending:
                 self._take(part)
-            elif self._left.setdefault(part, TRIALS) and now >= self._next.get(part, -math.inf):
+            elif self._left.setdefault(part, ATTEMPTS) and now >= self._next.get(part, -math.inf):
                 self._left[part] -= 1
-                self._next[part] = now + PARAMETERS_PAUSE
+                self._next[part] = now + pause
                 service = self._middleware.resolve(f"{part}/{GET_PARAMETERS}")
-                answer = self._middleware.request(
-                    service, GET_INTERFACE, GetParameters(), ParametersReply, PARAMETERS_PAUSE
-                )
+                answer = self._middleware.request(service, GET_INTERFACE, GetParameters(), ParametersReply, pause)
                 self._pending[part] = answer
 
     def forget(self, part: str) -> None:
         """Request a part's parameters again, since they have changed."""
-        self._left[part] = TRIALS
+        self._left[part] = ATTEMPTS
         self._next[part] = -math.inf
 
     def _take(self, part: str) -> None:

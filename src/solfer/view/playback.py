@@ -11,8 +11,6 @@ from solfer.transport import BodyMessage, JointMessage, Middleware, Writer
 from solfer.transport.messages import PointsMessage
 
 MEASURED_CHANNEL = "measured/position"
-COMMAND_CHANNEL = "command"
-TRUTH_CHANNEL = "truth"
 
 
 class PlayedTopics:
@@ -67,12 +65,12 @@ class Playback:
         channels = [each for each in recording.channels.values() if len(each.times)]
         for channel in channels:
             plugin, _, rest = channel.name.partition("/")
-            if channel.kind == JOINTS_KIND and rest.startswith(f"{COMMAND_CHANNEL}/") and part_of(rest) == "position":
+            if channel.kind == JOINTS_KIND and rest.startswith("command/") and part_of(rest) == "position":
                 topic = f"{plugin}_{topic_of(channel).rpartition('/')[2]}/command"
                 self._commands.append((channel, middleware.writer(topic, "solfer/JointCommand")))
         poses = [each for each in channels if each.kind == "nav_msgs/Odometry"]
-        self._truths = [each for each in poses if part_of(each.name) == TRUTH_CHANNEL]
-        self._estimates = [each for each in poses if part_of(each.name) != TRUTH_CHANNEL]
+        self._truths = [each for each in poses if part_of(each.name) == "truth"]
+        self._estimates = [each for each in poses if part_of(each.name) != "truth"]
         names = robot.contacts.names
         self._forces = {part_of(each.name): each for each in channels if part_of(each.name) in names}
         base = robot.kinematics.base

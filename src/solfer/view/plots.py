@@ -9,13 +9,7 @@ from solfer.view.columns import PlottedColumns
 from solfer.view.incoming import IncomingMessages
 from solfer.view.requests import PageRequests
 
-SPAN = 20.0
-"""Time that a plot shows [s]."""
-
-PLOT_RATE = 5.0
-"""Of what is drawn [Hz]."""
-
-PLOT_COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf")
+COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf")
 """Of the columns of a plot, which has as many at most."""
 
 NO_COLUMN = "(none)"
@@ -62,16 +56,16 @@ class Plots:
         self._times.append(now)
         for name, samples in self._samples.items():
             samples.append(self._columns.value(name))
-        while self._times[0] < now - SPAN:
+        while self._times[0] < now - 20.0:  # [s]
             for kept in (self._times, *self._samples.values()):
                 kept.popleft()
-        if self._plot is not None and abs(now - self._drawn) >= 1.0 / PLOT_RATE:
+        if self._plot is not None and abs(now - self._drawn) >= 0.2:  # [s]
             self._drawn = now
             self._plot.data = self._data()
 
     def _add(self) -> None:
         name = self._choice.value
-        if name != NO_COLUMN and name not in self._samples and len(self._samples) < len(PLOT_COLORS):
+        if name != NO_COLUMN and name not in self._samples and len(self._samples) < len(COLORS):
             self._samples[name] = deque([np.nan] * len(self._times))
             self._draw()
 
@@ -89,9 +83,7 @@ class Plots:
             self._plot = None
         if not self._samples:
             return
-        lines = (
-            uplot.Series(label=name, stroke=color) for name, color in zip(self._samples, PLOT_COLORS, strict=False)
-        )
+        lines = (uplot.Series(label=name, stroke=color) for name, color in zip(self._samples, COLORS, strict=False))
         with self._folder:
             self._plot = self._gui.add_uplot(
                 self._data(),

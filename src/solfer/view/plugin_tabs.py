@@ -27,14 +27,6 @@ from solfer.view.control import PageControl
 from solfer.view.parameters import KnownParameters
 from solfer.view.requests import PageRequests
 
-SLIDER_COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
-
-SLIDER_RANGE = 4.0
-"""Largest value of a slider over the larger one of value and default, where the parameter may have it."""
-
-SLIDER_STEPS = 400
-"""Steps of a slider."""
-
 Control = GuiSliderHandle[float] | GuiCheckboxHandle | GuiTextHandle
 
 
@@ -142,17 +134,18 @@ class _PluginTab:
         control: Control
         number = _number(value)
         usual = _number(reply.defaults[index])
-        least = _number(reply.minimums[index])
-        most = _number(reply.maximums[index])
+        lower = _number(reply.minimums[index])
+        upper = _number(reply.maximums[index])
         off = self._control is None
         if value in ("true", "false"):
             control = self._gui.add_checkbox(label, value == "true", disabled=off, hint=description)
-        elif not any(math.isnan(each) for each in (number, least, most)):
+        elif not any(math.isnan(each) for each in (number, lower, upper)):
             largest = max((abs(each) for each in (number, usual) if not math.isnan(each)), default=0.0)
-            most = min(most, SLIDER_RANGE * largest or most)
-            least = max(least, -SLIDER_RANGE * largest if largest else least)
-            step = (most - least) / SLIDER_STEPS
-            control = self._gui.add_slider(label, least, most, step, number, disabled=off, hint=description)
+            ratio = 4.0  # of the end of the slider to the larger one of value and default, if the parameter may have it
+            upper = min(upper, ratio * largest or upper)
+            lower = max(lower, -ratio * largest if largest else lower)
+            step = (upper - lower) / 400
+            control = self._gui.add_slider(label, lower, upper, step, number, disabled=off, hint=description)
         else:
             control = self._gui.add_text(label, value, disabled=off, hint=description)
 
@@ -186,7 +179,8 @@ def _table(report: HealthReport) -> str:
         f"<tr><td>{html.escape(name)}</td><td style='text-align:right;padding-left:1em'>{_text(value)}</td></tr>"
         for name, value in report.values.items()
     )
-    color = SLIDER_COLORS[report.level]
+    colors = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
+    color = colors[report.level]
     head = f"<b style='color:{color}'>{report.level.name}</b> {html.escape(report.summary)}"
     return f"<div style='font-size:0.8em;padding:0.5em'>{head}<table>{rows}</table></div>"
 

@@ -13,9 +13,6 @@ from solfer.errors import MiddlewareError, SolferError, described
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
 
-SERVICE_PATIENCE = 2.0
-"""Longest wait for an answer of a service [s]."""
-
 logger = logging.getLogger(__name__)
 
 
@@ -48,7 +45,8 @@ class PageRequests:
         self, service: str, interface: str, request: Any, reply: type, done: Callable[[Any], None] = lambda _: None
     ) -> None:
         """Call a service, from the loop alone; a refusal is shown. `done` gets the reply, or None, in the loop."""
-        answer = self.middleware.request(self.middleware.resolve(service), interface, request, reply, SERVICE_PATIENCE)
+        timeout = 2.0  # [s]
+        answer = self.middleware.request(self.middleware.resolve(service), interface, request, reply, timeout)
         self._answers.append((answer, service, done))
 
     def update(self) -> None:

@@ -24,33 +24,12 @@ from websockets.typing import Subprotocol
 
 from solfer.errors import MiddlewareError, described
 from solfer.throttle import Throttle
-from solfer.view.incoming import LARGEST_MESSAGE, IncomingMessages
+from solfer.view.incoming import IncomingMessages
 
 HOST = "127.0.0.1"
 
-HOST_NAMES = ("localhost", HOST)
-"""Names of this machine in addresses of the page."""
-
-FIRST_PORT = 8080
-
-LARGEST_READ = 16384
-"""Bytes of a connection that are decoded at once: 256 KiB of empty messages would keep others waiting for 0.4 s."""
-
-MOST_UNREAD_PINGS = 1000
-"""Pings of a connection in a row, while earlier answers wait to be read, after which it ends."""
-
-LIFE = "life"
+LIFE_PATH = "life"
 """Path of the websockets by which pages show that they live."""
-
-PROGRAM_ORIGINS = ("https://app.foxglove.dev", "file://")
-"""Origins that `routes` accept besides that of the page and none: Foxglove in the browser, and on the desktop."""
-
-HEADERS = {
-    "Cache-Control": "no-store",
-    "Content-Security-Policy": "frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-}
-"""Of the page: neither stored nor shown inside of another one, and its address is not passed on."""
 
 logger = logging.getLogger(__name__)
 
@@ -94,7 +73,7 @@ class PageServer:
     Attributes:
         viser: What is on the page.
         address: Address of the page.
-        incoming: Judges what pages send.
+        incoming: Checks what pages send.
         routes: What serves websockets of other programs, by the path below the token.
         lives: What notes a sign of life, in the server's thread, by the random key of a page.
 
@@ -102,7 +81,7 @@ class PageServer:
         MiddlewareError: It cannot be served.
     """
 
-    def __init__(self, port: int = FIRST_PORT):
+    def __init__(self, port: int = 8080):
         rich.get_console().quiet = True  # viser prints addresses without the token
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
@@ -132,6 +111,11 @@ class PageServer:
 
     def _guarded(self, serve: Callable[..., Any]) -> Callable[..., Any]:
         """Return a `serve` that checks each request by `_refusal` first, and receives signs of life."""
+        headers = {  # the page is neither stored nor shown inside of another one, and its address is not passed on
+            "Cache-Control": "no-store",
+            "Content-Security-Policy": "frame-ancestors 'none'",
+            "Referrer-Policy": "no-referrer",
+        }
 
         def guarded(handler: Handler, *arguments: Any, process_request: Process, **options: Any) -> Any:
             self._is_guarded = True
@@ -146,7 +130,7 @@ class PageServer:
                 except OSError:  # a path that no file can have
                     response = Response(http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"")
                 if isinstance(response, Response):
-                    response.headers.update(HEADERS)
+                    response.headers.update(headers)
                 return response
 
             async def handle(connection: ServerConnection) -> None:
@@ -154,7 +138,7 @@ class PageServer:
                 kind, _, key = connection.request.path.strip("/").partition("/")
                 if kind in self.routes:
                     return await self.routes[kind](connection)
-                if kind != LIFE:
+                if kind != LIFE_PATH:
                     receive = partial(self.incoming.receive, connection, connection.recv)
                     connection.recv = receive  # type: ignore[method-assign, assignment]
                     return await handler(connection)
@@ -170,7 +154,7 @@ class PageServer:
             )
             quiet_logger("asyncio")  # it warns of each message to a connection that has ended
             options |= {
-                "max_size": LARGEST_MESSAGE,
+                "max_size": 65536,  # [bytes] of a message; a longer one closes its connection
                 "logger": quiet_logger(f"{__name__}.websockets"),
                 "select_subprotocol": _subprotocol,
                 "create_connection": _PageConnection,
@@ -181,12 +165,13 @@ class PageServer:
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the answer to a request that is none of this page's; None: it is one."""
-        hosts = [f"{name}:{connection.local_address[1]}" for name in HOST_NAMES]
+        hosts = [f"{name}:{connection.local_address[1]}" for name in ("localhost", HOST)]
         origins = [f"http://{host}" for host in hosts]
         _, token, kind, *_ = [*request.path.partition("?")[0].split("/"), "", ""]
         headers = request.headers
         is_routed = kind in self.routes
-        origins += PROGRAM_ORIGINS if is_routed else ()
+        if is_routed:  # Foxglove in the browser, and on the desktop
+            origins += ("https://app.foxglove.dev", "file://")
         own = (
             secrets.compare_digest(token.encode(), self._token.encode())
             and headers.get_all("Host") in [[host] for host in hosts]
@@ -203,14 +188,15 @@ class _PageConnection(ServerConnection):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See `ServerConnection.connection_made`."""
-        transport.max_size = LARGEST_READ  # type: ignore[attr-defined]  # of asyncio
+        # what is decoded at once [bytes]: 256 KiB of empty messages would keep others waiting for 0.4 s
+        transport.max_size = 16384  # type: ignore[attr-defined]  # of asyncio
         super().connection_made(transport)
 
     def process_event(self, event: Event) -> None:
         """See `ServerConnection.process_event`."""
         if isinstance(event, Frame) and event.opcode is Opcode.PING:
             self._unread = self._unread + 1 if self.transport.get_write_buffer_size() else 0
-            if self._unread > MOST_UNREAD_PINGS:
+            if self._unread > 1000:
                 self.transport.abort()
         super().process_event(event)
 

@@ -8,11 +8,6 @@ from solfer.view.playback import Playback
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 
-TIME_LINE_STEP = 0.01
-"""Of the time line [s]."""
-
-PLAYBACK_SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "10")
-
 
 class TimeLine:
     """Plays, pauses and scrubs.
@@ -25,11 +20,12 @@ class TimeLine:
 
     def __init__(self, server: PageServer, requests: PageRequests, playback: Playback):
         self._playback = playback
-        length = max(math.floor(100.0 * (playback.end - playback.begin)) / 100.0, TIME_LINE_STEP)
+        step = 0.01  # [s]
+        length = max(math.floor(100.0 * (playback.end - playback.begin)) / 100.0, step)
         gui = server.viser.gui
-        self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, TIME_LINE_STEP, 0.0)
+        self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, step, 0.0)
         self._button: GuiButtonHandle = gui.add_button("pause")
-        speed = gui.add_dropdown("speed", PLAYBACK_SPEEDS, initial_value="1")
+        speed = gui.add_dropdown("speed", ("0.1", "0.25", "0.5", "1", "2", "4", "10"), initial_value="1")
         server.incoming.display |= {each._impl.uuid for each in (self._slider, self._button, speed)}
 
         @self._button.on_click

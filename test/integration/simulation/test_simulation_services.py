@@ -188,7 +188,7 @@ def test_a_robot_that_cannot_be_put_stays(world, monkeypatch):
     lower_level.accept("velocity_controller", JointMessage(wheels, velocity=np.ones(4), sender="owner"))
     world.run(0.05)
     before, speed = world.simulation.q.copy(), np.abs(world.simulation.v).max()
-    monkeypatch.setattr("solfer.simulation.robot_body.placement.APPROACHES", 0)
+    monkeypatch.setattr("solfer.simulation.robot_body.body.Body.distance", lambda *_: 1.0)  # it never touches
     reply = world.bus.call("simulator/reset", x=3.0)
     world.run(0.001)
     assert "no place" in reply.result(0).message

@@ -19,8 +19,7 @@ from solfer.robot.shipped import robot_of  # noqa: E402
 from solfer.scene import LiveScene  # noqa: E402
 from solfer.study import SimulatedRun, read_study  # noqa: E402
 from solfer.view import Page, PageServer  # noqa: E402
-from solfer.view.page import CAMERA, CAMERA_FIELD_OF_VIEW, CAMERA_TARGET  # noqa: E402
-from solfer.view.plugin_tabs import SLIDER_STEPS  # noqa: E402
+from solfer.view.page import Page  # noqa: E402
 
 pytestmark = [pytest.mark.soak, pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")]
 
@@ -110,12 +109,12 @@ class Shown:
         width, height = self.browser.evaluate(
             "(r => [r.width, r.height])(document.querySelector('canvas').getBoundingClientRect())"
         )
-        back = np.subtract(CAMERA, CAMERA_TARGET)
+        back = np.subtract(Page.CAMERA, Page.TARGET)
         back /= np.linalg.norm(back)
         right = np.cross((0.0, 0.0, 1.0), back)
         right /= np.linalg.norm(right)
-        seen = np.array((right, np.cross(back, right), back)) @ np.subtract(point, CAMERA)
-        scale = 0.5 * height / np.tan(0.5 * CAMERA_FIELD_OF_VIEW) / -seen[2]
+        seen = np.array((right, np.cross(back, right), back)) @ np.subtract(point, Page.CAMERA)
+        scale = 0.5 * height / np.tan(0.5 * Page.FIELD_OF_VIEW) / -seen[2]
         return 0.5 * width + scale * seen[0], 0.5 * height - scale * seen[1]
 
     def close(self):
@@ -183,7 +182,7 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
         shown.step()
         shown.until(lambda: shown.gain() > before, "a gain that is changed")
         shown.step(1.0, 0.5)
-        assert shown.gain() == pytest.approx(before + 20 * 40.0 / SLIDER_STEPS, abs=0.2)
+        assert shown.gain() == pytest.approx(before + 20 * 40.0 / 400, abs=0.2)
 
         seen.click("EMERGENCY STOP")
         seen.click("stop the robot now")

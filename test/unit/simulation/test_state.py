@@ -12,7 +12,7 @@ from solfer.errors import UnknownName
 from solfer.model import Kinematics
 from solfer.simulation import Rates, Simulation, read_bundle
 from solfer.simulation.sensors import SensorsRecord
-from solfer.simulation.sensors.records import SENSOR_KINDS
+from solfer.simulation.sensors.records import KINDS
 from solfer.transport.messages import JointMessage
 
 ROBOT = Path(__file__).resolve().parents[3] / "config/robots/centauro/robot.yaml"
@@ -85,7 +85,7 @@ def test_links_are_checked_by_name(arm):
 
 
 def test_each_kind_has_its_rate():
-    names = [kind.name for kind in SENSOR_KINDS]
+    names = [kind.name for kind in KINDS]
     assert sorted(Rates.model_fields) == sorted(names) == names
     assert {"base", "contacts", "imu", "joints", "motors"} <= set(names)
 

@@ -24,15 +24,15 @@ class BulletBase:
         self._to_com = tuple(self._bullet.getDynamicsInfo(body, -1, self._client)[3:5])
         # not by PyBullet's own functions of transforms, which compute with single precision
         x, y, z, w = self._to_com[1]
-        self._turn_from_com = -x, -y, -z, w
-        self._from_com = rotated([-each for each in self._to_com[0]], self._turn_from_com)
+        self._rotation_from_com = -x, -y, -z, w
+        self._from_com = rotated([-each for each in self._to_com[0]], self._rotation_from_com)
 
     def place(self, position: Sequence[float] | np.ndarray, orientation: Sequence[float] | np.ndarray) -> None:
         """Put the link's origin somewhere, at rest."""
-        offset, turn = self._to_com
+        offset, rotation = self._to_com
         com = np.add(position, rotated(offset, orientation)).tolist()
         self._bullet.resetBasePositionAndOrientation(
-            self._body, com, quaternion_product(orientation, turn), self._client
+            self._body, com, quaternion_product(orientation, rotation), self._client
         )
         self._bullet.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3, self._client)
 
@@ -46,7 +46,7 @@ class BulletBase:
         cz = -z
         return BaseState(
             (com[0] + x, com[1] + y, com[2] + z),
-            quaternion_product(orientation, self._turn_from_com),
+            quaternion_product(orientation, self._rotation_from_com),
             (vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)),
             angular=(wx, wy, wz),
         )

@@ -11,7 +11,10 @@ from types import ModuleType
 from solfer.errors import MissingDependency, SimulationError
 
 STDOUT = 1
-STDERR_DESCRIPTOR = 2  # file descriptors
+"""File descriptor."""
+
+STDERR = 2
+"""File descriptor."""
 
 
 @contextlib.contextmanager
@@ -54,7 +57,7 @@ def load_pybullet() -> ModuleType:
     Raises:
         MissingDependency: It is not installed.
     """
-    with redirected((STDOUT, STDERR_DESCRIPTOR)):
+    with redirected((STDOUT, STDERR)):
         try:
             import pybullet
         except ModuleNotFoundError as error:

@@ -9,15 +9,6 @@ from xml.etree.ElementTree import Element
 
 from solfer.simulation.bullet.client import BulletClient
 
-DIFFERENCES_TOLERANCE = 1e-4
-"""Relative error that counts as none: PyBullet keeps some numbers with single precision."""
-
-DIFFERENCES_SHOWN_COUNT = 8
-"""Number of differences that a warning lists."""
-
-DIFFERENCES_SIZES = {"box": "size", "sphere": "radius", "cylinder": "length radius", "capsule": "length radius"}
-"""Attributes of shapes, in PyBullet's order."""
-
 logger = logging.getLogger(__name__)
 
 
@@ -32,10 +23,8 @@ def warn_of_differences(client: BulletClient, body: int, text: str, where: str) 
     """
     found = list(differences(client, body, text))
     if found:
-        more = f"; and {len(found) - DIFFERENCES_SHOWN_COUNT} more" if len(found) > DIFFERENCES_SHOWN_COUNT else ""
-        logger.warning(
-            "%s: the simulation differs from it: %s%s", where, "; ".join(found[:DIFFERENCES_SHOWN_COUNT]), more
-        )
+        more = f"; and {len(found) - 8} more" if len(found) > 8 else ""
+        logger.warning("%s: the simulation differs from it: %s%s", where, "; ".join(found[:8]), more)
 
 
 def differences(client: BulletClient, body: int, text: str) -> Iterator[str]:
@@ -68,9 +57,11 @@ def _shapes(name: str, link: Element, made: tuple[Any, ...]) -> Iterator[str]:
         meshes = f", of the meshes {', '.join(map(str, files))}" if files else ""
         yield f"link '{name}': {len(made)} of {len(shapes)} collision shapes{meshes}"
         return
+    # attributes of shapes, in PyBullet's order
+    attributes = {"box": "size", "sphere": "radius", "cylinder": "length radius", "capsule": "length radius"}
     for shape, one in zip(shapes, made, strict=True):
-        if shape is not None and shape.tag in DIFFERENCES_SIZES:
-            sizes = [float(word) for key in DIFFERENCES_SIZES[shape.tag].split() for word in shape.get(key, "").split()]
+        if shape is not None and shape.tag in attributes:
+            sizes = [float(word) for key in attributes[shape.tag].split() for word in shape.get(key, "").split()]
             if not all(map(_equal, sizes, one[3])):
                 yield f"link '{name}': {shape.tag} of the size {_listed(one[3])} instead of {_listed(sizes)}"
 
@@ -87,7 +78,8 @@ def _joint(joint: Element, infos: dict[str, tuple[Any, ...]]) -> Iterator[str]:
 
 
 def _equal(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=DIFFERENCES_TOLERANCE, abs_tol=1e-9)
+    # PyBullet keeps some numbers with single precision
+    return math.isclose(one, other, rel_tol=1e-4, abs_tol=1e-9)
 
 
 def _listed(values: Any) -> str:

@@ -10,13 +10,8 @@ from solfer.simulation.bullet.robot import BulletRobot
 from solfer.simulation.physics import STEP, CameraView, Colour, PhysicsEngine, Picture, Pose, Vector
 from solfer.simulation.world.records import Friction
 
-GRAVITY = 9.81  # [m/s^2], along -z
-SOLVER_ITERATIONS = 50
-WINDOW_VIEW = (2.5, 50.0, -20.0)
-"""Distance [m], yaw and pitch [deg] of the window's camera at first."""
-
-NEAR_PLANE, FAR_PLANE = 0.05, 50.0  # what is drawn, from the camera [m]
 NO_SHAPE = -1
+"""PyBullet's number of a shape that is not there."""
 
 
 class BulletEngine(PhysicsEngine):
@@ -38,11 +33,11 @@ class BulletEngine(PhysicsEngine):
         if gui:  # its panels show nothing of use, and drawing while a robot is loaded takes a minute without a GPU
             for flag in (self._bullet.COV_ENABLE_GUI, self._bullet.COV_ENABLE_RENDERING):
                 self._bullet.configureDebugVisualizer(flag, 0, physicsClientId=self._client)
-        self._bullet.setGravity(0.0, 0.0, -GRAVITY, self._client)
+        self._bullet.setGravity(0.0, 0.0, -9.81, self._client)
         self._bullet.setPhysicsEngineParameter(
             fixedTimeStep=STEP,
             numSubSteps=0,
-            numSolverIterations=SOLVER_ITERATIONS,
+            numSolverIterations=50,
             deterministicOverlappingPairs=1,
             physicsClientId=self._client,
         )
@@ -126,18 +121,21 @@ class BulletEngine(PhysicsEngine):
     def show(self, target: Iterable[float]) -> None:
         """See `PhysicsEngine.show`."""
         if self._window:
-            self._bullet.resetDebugVisualizerCamera(*WINDOW_VIEW, [float(value) for value in target], self._client)
+            # distance [m], yaw and pitch [deg] of the camera at first
+            self._bullet.resetDebugVisualizerCamera(2.5, 50.0, -20.0, [float(value) for value in target], self._client)
             self._bullet.configureDebugVisualizer(self._bullet.COV_ENABLE_RENDERING, 1, physicsClientId=self._client)
 
     def render(self, view: CameraView) -> Picture:
         """See `PhysicsEngine.render`."""
         bullet = self._bullet
         width, height = view.size
+        near = 0.05  # what is drawn, from the camera [m]
+        far = 50.0
         picture = bullet.getCameraImage(
             width,
             height,
             bullet.computeViewMatrixFromYawPitchRoll(view.target, view.distance, view.yaw, view.pitch, 0.0, 2),
-            bullet.computeProjectionMatrixFOV(view.field_of_view, width / height, NEAR_PLANE, FAR_PLANE),
+            bullet.computeProjectionMatrixFOV(view.field_of_view, width / height, near, far),
             lightDirection=[1.5, 1.0, 5.0],
             lightColor=[1.0, 1.0, 1.0],
             lightDistance=8.0,
@@ -149,10 +147,10 @@ class BulletEngine(PhysicsEngine):
             physicsClientId=self._client,
         )
         _, _, colours, depth, segments = picture
-        share = np.reshape(depth, (height, width))
+        normalized = np.reshape(depth, (height, width))  # from 0 in the near plane to 1 in the far one
         return Picture(
             np.array(colours, dtype=np.uint8).reshape(height, width, 4)[:, :, :3],
-            NEAR_PLANE * FAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * share),
+            near * far / (far - (far - near) * normalized),
             is_empty=np.reshape(segments, (height, width)) < 0,
         )
 

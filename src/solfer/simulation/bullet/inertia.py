@@ -7,27 +7,12 @@ import numpy as np
 
 from solfer.errors import SimulationError
 
-INERTIA_ROUNDING = 1e-6
-"""Share of the largest principal inertia that counts as rounding: it is worth no warning."""
-
-INERTIA_MARGIN = 1e-5
-"""Least second moment of mass, as a share of their sum: Bullet, in single precision, drops inertias without it."""
-
-INERTIA_SMALLEST_SIZE = 1e-6
-"""Radius of gyration below which an inertia stands for none at all [m]."""
-
-INERTIA_DENSITY = 7800.0
-"""Density of steel, of which a link without inertia is made [kg/m^3]."""
-
-REPAIRED = 0.1
-"""Largest repair, as a share of the inertia (norms of Frobenius): more is no inaccuracy but another body."""
-
-INERTIA_SHOWN_COUNT = 4
-"""Number of links that a warning names."""
+MARGIN = 1e-5
+"""Smallest second moment of mass over their sum: Bullet, in single precision, drops inertias without it."""
 
 logger = logging.getLogger(__name__)
-_MOMENTS = np.ones((3, 3)) - np.eye(3)  # principal inertias of a body from its second moments of mass, none negative
-_INERTIA_SECOND = np.linalg.inv(_MOMENTS)
+_FROM_MOMENTS = np.ones((3, 3)) - np.eye(3)
+"""Maps second moments of mass of a body, none of them negative, to its principal inertias."""
 
 
 class Inertias:
@@ -58,28 +43,25 @@ class Inertias:
             SimulationError: It is far from the inertia of any body.
         """
         principal, axes = np.linalg.eigh(inertia)
-        if abs(principal).max() < mass * INERTIA_SMALLEST_SIZE**2:
+        if abs(principal).max() < mass * 1e-6**2:  # a radius of gyration of less than 1e-6 m stands for no inertia
             ball = _ball(mass)
             self._note(link, principal, ball)
             return np.diag(ball)
-        moments = _INERTIA_SECOND @ principal
-        if moments.min() >= INERTIA_MARGIN * moments.sum() > 0.0:
+        moments = np.linalg.inv(_FROM_MOMENTS) @ principal
+        if moments.min() >= MARGIN * moments.sum() > 0.0:
             return inertia
         nearest = _nearest(principal)
         small, middle, large = principal
-        if small < -INERTIA_ROUNDING * large or large > (small + middle) * (1.0 + INERTIA_ROUNDING):
+        rounding = 1e-6  # over the largest principal inertia: it is worth no warning
+        if small < -rounding * large or large > (small + middle) * (1.0 + rounding):
             self._repair(link, principal, nearest)
         return (axes * nearest) @ axes.T
 
     def warn(self) -> None:
         """Log what was repaired."""
         if self._repaired:
-            more = (
-                f"; and {len(self._repaired) - INERTIA_SHOWN_COUNT} more"
-                if len(self._repaired) > INERTIA_SHOWN_COUNT
-                else ""
-            )
-            listed = "; ".join(self._repaired[:INERTIA_SHOWN_COUNT])
+            more = f"; and {len(self._repaired) - 4} more" if len(self._repaired) > 4 else ""
+            listed = "; ".join(self._repaired[:4])
             logger.warning(
                 "%s: principal inertias that no body has are replaced by the nearest: %s%s", self._where, listed, more
             )
@@ -90,30 +72,31 @@ class Inertias:
         Raises:
             SimulationError: It is no repair, but another body.
         """
-        share = np.linalg.norm(nearest - principal) / np.linalg.norm(principal)
-        if share > REPAIRED:
+        change = np.linalg.norm(nearest - principal) / np.linalg.norm(principal)
+        if change > 0.1:
             raise SimulationError(
                 f"no body has the principal inertia {_listed(principal)} kg m^2",
                 where=f"{self._where}: link '{link}'",
                 expected="none negative, none larger than the sum of the others",
             )
-        self._note(link, principal, nearest, share=f" (by {100.0 * share:.2g} %)")
+        self._note(link, principal, nearest, change=f" (by {100.0 * change:.2g} %)")
 
-    def _note(self, link: str, before: np.ndarray, after: np.ndarray, share: str = "") -> None:
-        self._repaired.append(f"link '{link}': {_listed(before)} -> {_listed(after)} kg m^2{share}")
+    def _note(self, link: str, before: np.ndarray, after: np.ndarray, change: str = "") -> None:
+        self._repaired.append(f"link '{link}': {_listed(before)} -> {_listed(after)} kg m^2{change}")
 
 
 def _nearest(principal: np.ndarray) -> np.ndarray:
     """Compute the nearest principal inertias of a body, whose second moments all have the margin, shape (3,)."""
     from scipy.optimize import nnls  # heavy, and needed by few robots
 
-    least = INERTIA_MARGIN * abs(principal).sum()
-    return _MOMENTS @ (nnls(_MOMENTS, principal - _MOMENTS @ np.full(3, least))[0] + least)
+    lower = MARGIN * abs(principal).sum()
+    return _FROM_MOMENTS @ (nnls(_FROM_MOMENTS, principal - _FROM_MOMENTS @ np.full(3, lower))[0] + lower)
 
 
 def _ball(mass: float) -> np.ndarray:
     """Compute the principal inertias of a ball of steel, 2/5 m r^2, shape (3,) [kg m^2]."""
-    radius = (3.0 * mass / (4.0 * math.pi * INERTIA_DENSITY)) ** (1.0 / 3.0)
+    density = 7800.0  # [kg/m^3]
+    radius = (3.0 * mass / (4.0 * math.pi * density)) ** (1.0 / 3.0)
     return np.full(3, 0.4 * mass * radius**2)
 
 

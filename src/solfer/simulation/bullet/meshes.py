@@ -13,10 +13,6 @@ from solfer.model.urdf.mesh_files import PACKAGE_SCHEME, find_mesh, mesh_candida
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle of a binary STL."""
 
-_NEEDS = {".obj": re.compile(rb"^\s*v\s", re.MULTILINE), ".dae": re.compile(rb"<float_array\b")}
-"""What is in each mesh that PyBullet reads, by the end of its name."""
-
-_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 logger = logging.getLogger(__name__)
 
 
@@ -83,7 +79,8 @@ class Meshes:
         kind = path.suffix.lower()
         content = path.read_bytes()
         if kind != ".stl":
-            return path if kind in _NEEDS and _NEEDS[kind].search(content) else None
+            contained = {".obj": rb"(?m)^\s*v\s", ".dae": rb"<float_array\b"}  # in each file that PyBullet reads
+            return path if kind in contained and re.search(contained[kind], content) else None
         size = 84 + TRIANGLE.itemsize * int.from_bytes(content[80:84], "little")
         if len(content) == size > 84:
             return path
@@ -104,7 +101,8 @@ class Meshes:
 def _binary(text: bytes) -> bytes:
     """Write an STL in text as a binary one; empty if it has no triangles."""
     try:
-        corners = np.array(_VERTEX.findall(text)).astype("<f4").reshape(-1, 3, 3)
+        vertices = re.findall(rb"(?i)\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", text)
+        corners = np.array(vertices).astype("<f4").reshape(-1, 3, 3)
     except ValueError:
         return b""
     if not len(corners):

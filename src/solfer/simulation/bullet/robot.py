@@ -10,7 +10,7 @@ from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
 from solfer.simulation.bullet.base import BulletBase
 from solfer.simulation.bullet.body_urdf import body_urdf
-from solfer.simulation.bullet.client import STDERR_DESCRIPTOR, STDOUT, BulletClient, decimal_points, redirected
+from solfer.simulation.bullet.client import STDERR, STDOUT, BulletClient, decimal_points, redirected
 from solfer.simulation.bullet.differences import warn_of_differences
 from solfer.simulation.physics import (
     STEP,
@@ -23,11 +23,6 @@ from solfer.simulation.physics import (
     Vector,
 )
 from solfer.simulation.world.records import Friction
-
-LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
-LARGEST_GEAR_EFFORT = 1e6  # [Nm]
-MOST_BRAKING = 0.25  # share of its speed that the damping of the description takes from a joint in a step
-MOST_JOINTS = 127  # of which PyBullet measures the state
 
 
 class BulletJoints(JointGroup):
@@ -80,8 +75,8 @@ class BulletRobot(RobotInEngine):
         floats: Whether its base moves.
 
     Raises:
-        SimulationError: PyBullet cannot load the robot, it has more than MOST_JOINTS joints, or `friction` names a link
-            that it does not have.
+        SimulationError: PyBullet cannot load the robot, it has more than 127 joints, or `friction` names a link that it
+            does not have.
     """
 
     def __init__(
@@ -96,9 +91,9 @@ class BulletRobot(RobotInEngine):
         self._world = client
         self._bullet = client.bullet
         self._client = client.number
-        if len(joints) > MOST_JOINTS:
+        if len(joints) > 127:  # PyBullet measures the state of no more
             what = f"the robot has {len(joints)} moving joints, more than PyBullet can take"
-            raise SimulationError(what, where=description.where, expected=f"at most {MOST_JOINTS}")
+            raise SimulationError(what, where=description.where, expected="at most 127")
         with tempfile.TemporaryDirectory() as folder:
             urdf = body_urdf(description, floats, Path(folder))
             self.owner = urdf.owner
@@ -147,8 +142,8 @@ class BulletRobot(RobotInEngine):
 
         PyBullet takes the speed at the begin of a step for damping, which diverges where it would turn a joint back.
         """
-        most = MOST_BRAKING * inertia / STEP
-        for index, value, bound in zip(self._indices, damping, most.tolist(), strict=True):
+        bounds = 0.25 * inertia / STEP  # damping takes at most a quarter of its speed from a joint in a step
+        for index, value, bound in zip(self._indices, damping, bounds.tolist(), strict=True):
             if value:
                 self._bullet.changeDynamics(
                     self.number, index, jointDamping=min(value, bound), physicsClientId=self._client
@@ -174,9 +169,7 @@ class BulletRobot(RobotInEngine):
             (0.0, 0.0, 0.0),
             physicsClientId=self._client,
         )
-        self._bullet.changeConstraint(
-            gear, gearRatio=-ratio, maxForce=LARGEST_GEAR_EFFORT, physicsClientId=self._client
-        )
+        self._bullet.changeConstraint(gear, gearRatio=-ratio, maxForce=1e6, physicsClientId=self._client)
 
     def set_friction(self, link: str, coefficient: float) -> None:
         """See `RobotInEngine.set_friction`."""
@@ -229,7 +222,7 @@ class BulletRobot(RobotInEngine):
         flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
         path.write_text(text, encoding="utf-8")
         try:
-            with redirected((STDOUT,), STDERR_DESCRIPTOR), decimal_points():
+            with redirected((STDOUT,), STDERR), decimal_points():
                 return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags, physicsClientId=self._client)
         except bullet.error as error:
             raise SimulationError(
@@ -255,7 +248,8 @@ class BulletRobot(RobotInEngine):
         change = self._bullet.changeDynamics
         client = self._client
         change(self.number, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-        change(self.number, -1, maxJointVelocity=LARGEST_SPEED, physicsClientId=client)
+        # free light links reach Bullet's own default of 100 rad/s
+        change(self.number, -1, maxJointVelocity=1000.0, physicsClientId=client)
         for link, index in self._numbers.items():  # calls of their own: some values redirect a call to the base
             change(self.number, index, jointDamping=0.0, physicsClientId=client)
             change(

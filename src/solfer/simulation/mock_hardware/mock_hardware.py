@@ -23,9 +23,6 @@ from solfer.transport.middleware import Middleware
 MOCK = "package://solfer/config/robots/centauro/hardware/mock.yaml"
 """The mock that is shipped, of CENTAURO."""
 
-MOCK_HEALTH = "hardware"
-"""Name of the health report."""
-
 
 class MockHardware:
     """Offers a simulated robot like its hardware: on the topics of a SimulationServer.
@@ -65,7 +62,7 @@ class MockHardware:
         truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
         self._wiring = Wiring(middleware, encoders, owners, measurement=measurement, command=command, truth=truth)
         outside = cast(Middleware, self._wiring)
-        self._server = SimulationServer(simulation, outside, factor=factor, name=MOCK_HEALTH, followers=followers)
+        self._server = SimulationServer(simulation, outside, factor=factor, name="hardware", followers=followers)
 
     @classmethod
     def from_file(

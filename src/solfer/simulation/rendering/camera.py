@@ -21,9 +21,6 @@ from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.world.records import WorldRecord
 from solfer.simulation.world.world import Pose
 
-NICENESS = 10  # the simulation goes before its pictures
-CAMERA_PATIENCE = 5.0  # [s] until a drawing process that has to end is killed
-
 
 @dataclass(frozen=True)
 class Scene:
@@ -86,7 +83,7 @@ class Camera:
         with contextlib.suppress(OSError):
             process.stdin.close()
         try:
-            process.wait(CAMERA_PATIENCE)
+            process.wait(5.0)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
@@ -105,7 +102,7 @@ class Camera:
 
 def draw_all() -> None:
     """Draw what comes on stdin until it ends; each answer on stdout is an error, or nothing."""
-    os.nice(NICENESS)
+    os.nice(10)  # the simulation goes before its pictures
     source = sys.stdin.buffer
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())

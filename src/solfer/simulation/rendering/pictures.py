@@ -9,14 +9,6 @@ from typing import BinaryIO
 
 from solfer.errors import ConfigError, SimulationError
 
-PICTURE_NAME = re.compile(r"\w[\w. -]{0,99}\.png", re.ASCII)
-MAX_PICTURES = 1000
-"""Pictures in the folder; beyond them only those that are there are replaced."""
-
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-_PICTURE_OTHERS = 0o022  # the group and all users may write
-
 
 class Pictures:
     """Where pictures are written: files with names that end in `.png`, in one folder of this user.
@@ -48,7 +40,7 @@ class Pictures:
             SimulationError: It does not lie in the folder, or is not a name of a picture.
         """
         folder, name = os.path.split(text)
-        if folder not in ("", str(self.folder)) or not PICTURE_NAME.fullmatch(name):
+        if folder not in ("", str(self.folder)) or not re.fullmatch(r"\w[\w. -]{0,99}\.png", name, re.ASCII):
             raise SimulationError(
                 f"'{text[:200]}' cannot become a picture",
                 expected="the name of a picture in the simulator's folder of pictures, such as robot.png",
@@ -64,7 +56,7 @@ def write_picture(path: Path, draw: Callable[[BinaryIO], None]) -> None:
     """
     try:
         os.makedirs(path.parent, 0o700, exist_ok=True)
-        folder = os.open(path.parent, _FOLDER)
+        folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
     except OSError as error:
         raise SimulationError(
             f"the folder of pictures cannot be used: {error.strerror}", expected="a folder that you may write to"
@@ -82,19 +74,20 @@ def write_picture(path: Path, draw: Callable[[BinaryIO], None]) -> None:
 
 def _check(folder: int, name: str) -> None:
     status = os.fstat(folder)
-    if status.st_uid != os.geteuid() or status.st_mode & _PICTURE_OTHERS:
+    if status.st_uid != os.geteuid() or status.st_mode & 0o022:  # the group or all users may write
         raise SimulationError(
             "the folder of pictures is not the user's own",
             expected="a folder of the simulator's user, which no other user may write",
         )
     names = os.listdir(folder)
-    if len(names) >= MAX_PICTURES and name not in names:
-        raise SimulationError("the folder of pictures is full", expected=f"{MAX_PICTURES} pictures at most")
+    if len(names) >= 1000 and name not in names:
+        raise SimulationError("the folder of pictures is full", expected="1000 pictures at most")
 
 
 def _write(folder: int, name: str, draw: Callable[[BinaryIO], None]) -> None:
     new = f".{secrets.token_hex(8)}"
-    handle = os.open(new, _NEW, 0o600, dir_fd=folder)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+    handle = os.open(new, flags, 0o600, dir_fd=folder)
     try:
         with os.fdopen(handle, "wb") as file:
             draw(file)

@@ -18,17 +18,14 @@ from solfer.simulation.simulation import Simulation
 from solfer.simulation.world.records import Friction, WorldRecord
 from solfer.simulation.world.world import FLAT_WORLD, World
 
-RENDERER_FIELD_OF_VIEW = 40.0  # [deg], vertical
-RENDERER_MARGIN = 1.6  # what is seen, over the extent of the robot
-RENDERER_SAMPLES = 2  # rays along each side of a pixel
-HAZE = (1.2, 2.0)
-"""Distances at which the floor begins to fade, and has faded into the sky, over that of the robot."""
+TILE_SIZE = 0.5
+"""Edge of a tile of the floor [m]."""
 
-FLOOR_TILE = 0.5  # [m]
-FLOOR_TILES = 20  # along each side
-FLOOR_TILE_HEIGHT = 0.01  # [m]
-FLOOR_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
-SKY = np.array([[250.0, 251.0, 253.0], [206.0, 216.0, 228.0]])  # RGB at the lower and at the upper edge
+TILE_COUNT = 20
+"""Tiles along each side of the floor."""
+
+TILE_HEIGHT = 0.01
+"""Height of a tile [m]."""
 
 
 class Renderer:
@@ -76,22 +73,27 @@ class Renderer:
             self._world.place(boxes)
         pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if self._chart is None else self._chart.to_pose(q[:6])
         self._body.place(q[self._first :], *pose)
-        width, height = (RENDERER_SAMPLES * side for side in self._size)
+        samples = 2  # rays along each side of a pixel
+        width, height = (samples * side for side in self._size)
         yaw, pitch = self._angles
         centre, size = self._extent()
         self._move_floor(centre)
-        distance = RENDERER_MARGIN * size / 2.0 / math.tan(math.radians(RENDERER_FIELD_OF_VIEW / 2.0))
+        margin = 1.6  # what is seen, over the extent of the robot
+        field_of_view = 40.0  # vertical [deg]
+        distance = margin * size / 2.0 / math.tan(math.radians(field_of_view / 2.0))
         picture = self._engine.render(
-            CameraView(centre, distance, yaw, pitch=pitch, field_of_view=RENDERER_FIELD_OF_VIEW, size=(width, height))
+            CameraView(centre, distance, yaw, pitch=pitch, field_of_view=field_of_view, size=(width, height))
         )
-        haze = np.clip((picture.depth / distance - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
+        begin = 1.2  # where the floor begins to fade, over the distance of the robot
+        end = 2.0  # where it has faded into the sky
+        haze = np.clip((picture.depth / distance - begin) / (end - begin), 0.0, 1.0)
         haze[picture.is_empty] = 1.0
-        share = np.linspace(1.0, 0.0, height)[:, None, None]
-        sky = share * SKY[1] + (1.0 - share) * SKY[0]
+        fraction = np.linspace(1.0, 0.0, height)[:, None, None]
+        lower = np.array([250.0, 251.0, 253.0])  # RGB of the sky at the edges of the picture
+        upper = np.array([206.0, 216.0, 228.0])
+        sky = fraction * upper + (1.0 - fraction) * lower
         fine = picture.colours + haze[:, :, None] * (sky - picture.colours)
-        blocks = fine.reshape(
-            height // RENDERER_SAMPLES, RENDERER_SAMPLES, width // RENDERER_SAMPLES, RENDERER_SAMPLES, 3
-        )
+        blocks = fine.reshape(height // samples, samples, width // samples, samples, 3)
         return blocks.mean(axis=(1, 3)).astype(np.uint8)
 
     def save(self, q: np.ndarray, path: str | Path, boxes: Sequence[Pose] = ()) -> None:
@@ -127,22 +129,23 @@ class Renderer:
 
     def _make_floor(self) -> list[int]:
         """Add tiles below the plane of the ground, which are visual only; return their bodies."""
-        colours = [FLOOR_COLOURS[(row + column) % 2] for row in range(FLOOR_TILES) for column in range(FLOOR_TILES)]
-        return self._engine.add_tiles((FLOOR_TILE, FLOOR_TILE, FLOOR_TILE_HEIGHT), colours)
+        pair = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
+        colours = [pair[(row + column) % 2] for row in range(TILE_COUNT) for column in range(TILE_COUNT)]
+        return self._engine.add_tiles((TILE_SIZE, TILE_SIZE, TILE_HEIGHT), colours)
 
     def _move_floor(self, centre: Sequence[float]) -> None:
         """Move the tiles below the robot, by whole pairs of them, so that the pattern stands still."""
         orientation = self._world.orientation()
         rotation = rotation_from_quaternion(orientation)
         x, y, _ = centre @ rotation
-        pair = 2.0 * FLOOR_TILE
-        first = 0.5 * (1 - FLOOR_TILES) * FLOOR_TILE
+        pair = 2.0 * TILE_SIZE
+        first = 0.5 * (1 - TILE_COUNT) * TILE_SIZE
         for number, tile in enumerate(self._floor):
-            row, column = divmod(number, FLOOR_TILES)
+            row, column = divmod(number, TILE_COUNT)
             place = [
-                pair * round(x / pair) + first + row * FLOOR_TILE,
-                pair * round(y / pair) + first + column * FLOOR_TILE,
-                -FLOOR_TILE_HEIGHT / 2.0,
+                pair * round(x / pair) + first + row * TILE_SIZE,
+                pair * round(y / pair) + first + column * TILE_SIZE,
+                -TILE_HEIGHT / 2.0,
             ]
             self._engine.place(tile, (rotation @ place, orientation))
 

@@ -15,7 +15,8 @@ from solfer.simulation.robot_body.base import FloatingBase
 from solfer.simulation.robot_body.motors import BodyMotors
 from solfer.simulation.world.records import Friction
 
-SEARCH_DISTANCE = 100.0  # [m], how far away other bodies are searched for
+SEARCH_DISTANCE = 100.0
+"""How far away other bodies are searched for [m]."""
 
 
 class Body:

@@ -5,8 +5,6 @@ import numpy as np
 from solfer.model.kinematics import Kinematics
 from solfer.simulation.physics import RobotInEngine
 
-LARGEST_EFFORT = 1e6  # [Nm], of motors without a limit
-
 
 class BodyMotors:
     """Motors that hold a speed, and torques of all other joints.
@@ -28,7 +26,7 @@ class BodyMotors:
         self.rows = [int(dof) - self._first for dof in motors]
         self._drive_torques([row for row in range(count) if row not in self.rows])
         self._motors = robot.group(self.rows)
-        self._efforts = np.minimum(kinematics.effort_limit[motors], LARGEST_EFFORT).tolist()
+        self._efforts = np.minimum(kinematics.effort_limit[motors], 1e6).tolist()  # motors may have no limit
 
     def push(self) -> None:
         """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""

@@ -13,17 +13,6 @@ from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.resting import resting_orientation, rests
 from solfer.simulation.world.world import World
 
-OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
-TOUCH_DISTANCE = 2e-7  # [m], distance at which the approach to the ground ends; engines measure in single precision
-APPROACHES = 2000
-BOUNDS = {
-    "x": (-1000.0, 1000.0, "m"),
-    "y": (-1000.0, 1000.0, "m"),
-    "yaw": (-100.0, 100.0, "rad"),
-    "height": (0.0, 100.0, "m"),
-}
-"""Smallest and largest number of each attribute of a `StartPlacement`, and its unit."""
-
 
 @dataclass(frozen=True)
 class StartPlacement:
@@ -46,14 +35,19 @@ class StartPlacement:
         Raises:
             SimulationError: A number is not finite, or beyond its bounds.
         """
-        for name, (low, high, unit) in BOUNDS.items():
+        bounds = {
+            "x": (-1000.0, 1000.0, "m"),
+            "y": (-1000.0, 1000.0, "m"),
+            "yaw": (-100.0, 100.0, "rad"),
+            "height": (0.0, 100.0, "m"),
+        }
+        for name, (low, high, unit) in bounds.items():
             value = getattr(self, name)
             if not low <= value <= high:  # true for NaN as well
                 raise SimulationError(f"'{name}' is {value:g}", expected=f"from {low:g} to {high:g} [{unit}]")
 
 
 START_ORIGIN = StartPlacement()
-PLACEMENT_DEPTH_LIMIT = 1e-3  # [m], from which on an overlap is no matter of rounding
 logger = logging.getLogger(__name__)
 
 
@@ -98,7 +92,7 @@ def _put_down(
         body.place(joints, (placement.x, placement.y, placement.height - low[2]), orientation)
         return obstacles
     height = top - low[2]
-    for _ in range(APPROACHES):
+    for _ in range(2000):
         body.place(joints, (placement.x, placement.y, height), orientation)
         distance = body.distance(obstacles)
         if math.isinf(distance):
@@ -106,7 +100,7 @@ def _put_down(
                 "nothing carries the robot: its base floats, and it has no collision shapes",
                 expected="<collision> elements in its URDF, or `floating_base: false`",
             )
-        if abs(distance) < TOUCH_DISTANCE:
+        if abs(distance) < 2e-7:  # [m]; engines measure in single precision
             break
         height -= distance
     else:
@@ -114,7 +108,8 @@ def _put_down(
             f"there is no place for the robot at x {placement.x:g}, y {placement.y:g}",
             expected="a place that is free of obstacles and inside of the world",
         )
-    body.place(joints, (placement.x, placement.y, height + (placement.height or -OVERLAP)), orientation)
+    overlap = 1e-5  # [m] into the ground, so that the very first step finds the contacts
+    body.place(joints, (placement.x, placement.y, height + (placement.height or -overlap)), orientation)
     return obstacles
 
 
@@ -123,7 +118,7 @@ def fix(body: Body, world: World, joints: Sequence[float] | np.ndarray) -> None:
     body.place(joints)
     obstacles, _ = world.under(*body.extent())
     depth, link = body.overlap(obstacles)
-    if depth > PLACEMENT_DEPTH_LIMIT:
+    if depth > 1e-3:  # [m]; a smaller overlap is a matter of rounding
         logger.warning(
             "link '%s' begins %.3f m inside of the world, which pushes it out: the base is fixed at z = 0; "
             "a link below the root of the URDF raises it",

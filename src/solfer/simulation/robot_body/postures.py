@@ -10,8 +10,6 @@ from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 
-POSTURE_ROUNDING = 1e-9
-
 
 class Postures:
     """Positions of all joints in each named state.
@@ -21,7 +19,6 @@ class Postures:
             that `start` does not name as in the robot's neutral posture.
         start: Name of the state that None stands for; without one, None is the neutral posture.
         kinematics: Model of the robot.
-
     """
 
     def __init__(self, states: Mapping[str, Mapping[str, float]], start: str | None, kinematics: Kinematics):
@@ -50,8 +47,9 @@ class Postures:
                 if joint in place:
                     posture[place[joint]] = value
         self._followers.follow(posture)
+        rounding = 1e-9  # [rad, m]
         for joint, value, low, high in zip(self._joints, posture, self._lower, self._upper, strict=True):
-            if not low - POSTURE_ROUNDING <= value <= high + POSTURE_ROUNDING or not math.isfinite(value):
+            if not low - rounding <= value <= high + rounding or not math.isfinite(value):
                 raise ModelError(
                     f"state '{state or self._start}' has joint '{joint}' at {value:g}",
                     expected=f"from {low:g} to {high:g} [rad]",

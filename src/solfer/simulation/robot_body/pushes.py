@@ -11,13 +11,6 @@ from solfer.simulation.state import Moment
 
 Vector = Sequence[float] | np.ndarray
 
-PUSH_MAXIMUM = {"force": (1e4, "N"), "torque": (1e4, "Nm")}
-"""Largest magnitude of each component of a push, and its unit."""
-
-LONGEST_PUSH = 60.0  # [s]
-MAX_PUSHES = 64
-"""Pushes that act at the same time."""
-
 
 class Pushes:
     """The pushes that act on a body; those on one link add up.
@@ -50,19 +43,16 @@ class Pushes:
             raise UnknownName("link", link, body.owner)
         if not body.floating and body.owner[link] == body.base_link:
             raise SimulationError(f"link '{link}' is fixed to the world", expected="a link that moves")
-        for what, numbers in (("force", force), ("torque", torque)):
-            largest, unit = PUSH_MAXIMUM[what]
-            if len(numbers) != 3 or not all(abs(number) <= largest for number in numbers):  # true for NaN as well
+        for what, numbers, unit in (("force", force, "N"), ("torque", torque, "Nm")):
+            if len(numbers) != 3 or not all(abs(number) <= 1e4 for number in numbers):  # true for NaN as well
                 raise SimulationError(
                     f"the {what} of a push on '{link}' is {_shown(numbers)}",
-                    expected=f"three numbers from {-largest:g} to {largest:g} [{unit}]",
+                    expected=f"three numbers from -10000 to 10000 [{unit}]",
                 )
-        if not 0.0 < duration <= LONGEST_PUSH:
-            raise SimulationError(
-                f"the duration of a push is {duration:g}", expected=f"above 0, to {LONGEST_PUSH:g} [s]"
-            )
-        if len(self._acting) >= MAX_PUSHES:
-            raise SimulationError(f"{MAX_PUSHES} pushes act already", expected="a push after they have ended")
+        if not 0.0 < duration <= 60.0:
+            raise SimulationError(f"the duration of a push is {duration:g}", expected="above 0, to 60 [s]")
+        if len(self._acting) >= 64:
+            raise SimulationError("64 pushes act already", expected="a push after they have ended")
         steps = max(1, round(duration / STEP))
         self._acting.append((link, [float(value) for value in force], [float(value) for value in torque], steps))
 

@@ -8,19 +8,7 @@ import numpy as np
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.simulation.robot_body.body import SEARCH_DISTANCE, Body
 
-LEAST_TILT = math.radians(0.3)
-"""Least tilt that is worth it: from less a robot comes to rest by itself [rad]."""
-
-LARGEST_TILT = math.radians(10.0)
-"""Largest tilt at which a robot still counts as put down upright [rad]."""
-
-TILT_DIRECTIONS, TILT_STEPS = 16, 10
-"""Directions in which a robot is tilted to find its lowest points, and steps to the largest tilt."""
-
-GENTLE = 2e-4
-"""Tilt at which the corners of a flat sole are its lowest points [rad]."""
-
-TOUCHING = 1e-4
+TOUCH_HEIGHT = 1e-4
 """Height up to which a point counts as touching the ground [m]."""
 
 
@@ -52,34 +40,35 @@ def resting_orientation(
         ground: The plane.
 
     Returns:
-        The orientation next to upright in which it rests; None: it rests upright, but for LEAST_TILT, or nowhere
-        within LARGEST_TILT.
+        The orientation next to upright in which it rests; None: it rests upright, but for a tilt of 0.3
+        degrees from which it comes to rest by itself, or nowhere within 10 degrees.
     """
     start = rotation_from_quaternion(upright)
-    soles = _vertices(body, joints, start, ground=ground, tilts=_tilts(start, (GENTLE,)))
+    tilt_of_corners = 2e-4  # [rad], at which the corners of a flat sole are its lowest points
+    soles = _vertices(body, joints, start, ground=ground, tilts=_tilts(start, (tilt_of_corners,)))
     body.place(joints)
     center = body.center_of_mass()
     normal = start[:, 2]
     heights = soles @ start.T @ normal
-    if _carried(soles[heights < heights.min() + TOUCHING] @ start.T, start @ center):
+    if _carried(soles[heights < heights.min() + TOUCH_HEIGHT] @ start.T, start @ center):
         return None
-    steps = np.linspace(0.0, LARGEST_TILT, TILT_STEPS + 1)
-    nearest = LARGEST_TILT
+    nearest = math.radians(10.0)  # more does not count as put down upright
+    steps = np.linspace(0.0, nearest, 11)
     found = None
     for corners, outward in _faces(_vertices(body, joints, start, ground=ground, tilts=_tilts(start, steps)), center):
-        turn = _turn(start @ outward, -normal)
-        rotation = _rotation(turn) @ start
-        if np.linalg.norm(turn) < nearest and _below(center, corners, -rotation[2]):
-            nearest = float(np.linalg.norm(turn))
+        tilt = _rotation_vector(start @ outward, -normal)
+        rotation = _rotation(tilt) @ start
+        if np.linalg.norm(tilt) < nearest and _below(center, corners, -rotation[2]):
+            nearest = float(np.linalg.norm(tilt))
             found = quaternion_from_rotation(rotation)
-    return found if nearest > LEAST_TILT else None
+    return found if nearest > math.radians(0.3) else None
 
 
 def _lowest(body: Body, ground: int, normal: np.ndarray) -> np.ndarray:
     """Find the lowest points of the robot above a plane with this normal, shape (n, 3) [m]."""
     points = body.near(ground, SEARCH_DISTANCE)
     heights = points @ normal
-    return points[heights < heights.min() + TOUCHING]
+    return points[heights < heights.min() + TOUCH_HEIGHT]
 
 
 def _carried(points: np.ndarray, center: np.ndarray) -> bool:
@@ -105,8 +94,9 @@ def _vertices(
 
 def _tilts(start: np.ndarray, angles: Iterable[float]) -> Iterator[np.ndarray]:
     """Iterate over rotation vectors of these lengths in all directions of the plane, shape (3,) [rad]."""
+    count = 16  # directions
     for angle in angles:
-        for direction in np.arange(TILT_DIRECTIONS) * (2.0 * math.pi / TILT_DIRECTIONS):
+        for direction in np.arange(count) * (2.0 * math.pi / count):
             yield angle * (math.cos(direction) * start[:, 0] + math.sin(direction) * start[:, 1])
 
 
@@ -123,14 +113,14 @@ def _faces(points: np.ndarray, center: np.ndarray) -> Iterator[tuple[np.ndarray,
             yield points[corners], plane[:3]
 
 
-def _rotation(turn: np.ndarray) -> np.ndarray:
+def _rotation(vector: np.ndarray) -> np.ndarray:
     """Compute the rotation of a rotation vector that is shorter than pi, shape (3, 3)."""
-    angle = float(np.linalg.norm(turn))
-    axis = turn / angle if angle else turn
+    angle = float(np.linalg.norm(vector))
+    axis = vector / angle if angle else vector
     return rotation_from_quaternion((*(math.sin(angle / 2.0) * axis), math.cos(angle / 2.0)))
 
 
-def _turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _rotation_vector(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Compute the shortest rotation vector from one unit vector to another, shape (3,) [rad]."""
     axis = np.cross(start, end)
     length = float(np.linalg.norm(axis))

@@ -6,9 +6,9 @@ import numpy as np
 
 from solfer.numerics.rotations import cross, rotation_from_quaternion
 
-WEIGHTLESS = 5.0
+LOWEST_SPECIFIC_FORCE = 5.0
 """Specific force below which gyroscopes count alone [m/s^2]: half the weight. What is left of it in a fall points
-anywhere, and a filter that began with it would learn a bias that is none, and lean for half a minute."""
+anywhere, and a filter that began with it would learn a bias that is none, and be tilted for half a minute."""
 
 
 class AttitudeFilter:
@@ -49,26 +49,26 @@ class AttitudeFilter:
         self.bias[:] = 0.0
         self.rotation[:] = rotation
         size = float(np.linalg.norm(force))
-        if size < WEIGHTLESS:
+        if size < LOWEST_SPECIFIC_FORCE:
             return
         felt = rotation @ force / size
         axis = np.array([felt[1], -felt[0], 0.0])  # felt x z, which turns `felt` upwards
         sine = float(np.linalg.norm(axis))
         angle = math.atan2(sine, float(felt[2]))
-        self.rotation[:] = _turn(axis * (angle / sine if sine > 0.0 else 0.0)) @ rotation
+        self.rotation[:] = _rotation(axis * (angle / sine if sine > 0.0 else 0.0)) @ rotation
 
     def update(self, angular: np.ndarray, force: np.ndarray, dt: float) -> None:
         """Let `dt` [s] pass with an angular velocity [rad/s] and a specific force [m/s^2] in the sensor's axes."""
-        turned = self.rotation @ _turn(dt * (angular - self.bias))
+        turned = self.rotation @ _rotation(dt * (angular - self.bias))
         size = float(np.linalg.norm(force))
-        error = cross(force / size, turned[2]) if size >= WEIGHTLESS else np.zeros(3)
+        error = cross(force / size, turned[2]) if size >= LOWEST_SPECIFIC_FORCE else np.zeros(3)
         righted = -math.expm1(-dt / self._time_constant) * error
         self.bias += math.expm1(-dt / self._bias_time) / dt * righted
-        self.rotation[:] = turned @ _turn(righted)
+        self.rotation[:] = turned @ _rotation(righted)
 
 
-def _turn(vector: np.ndarray) -> np.ndarray:
+def _rotation(vector: np.ndarray) -> np.ndarray:
     """Return the rotation about a vector by its length [rad], shape (3, 3)."""
     half = 0.5 * float(np.linalg.norm(vector))
-    share = 0.5 if half == 0.0 else 0.5 * math.sin(half) / half
-    return rotation_from_quaternion((*(share * vector), math.cos(half)))
+    scale = 0.5 if half == 0.0 else 0.5 * math.sin(half) / half
+    return rotation_from_quaternion((*(scale * vector), math.cos(half)))

@@ -7,12 +7,9 @@ from typing import Any
 from pydantic import Field, create_model
 
 from solfer.config import Record
-from solfer.config.records.bounds import SEED, Bounds
+from solfer.config.records.bounds import SEED
 from solfer.simulation.sensors import kinds
 from solfer.simulation.sensors.sensor import Sensor
-
-PUBLICATION: Bounds = {"ge": 0.01, "le": 1000.0}
-"""Bounds of a rate of publication: above 0, at most that of the steps [Hz]."""
 
 
 def _kinds() -> tuple[type[Sensor], ...]:
@@ -27,15 +24,15 @@ def _kinds() -> tuple[type[Sensor], ...]:
     )
 
 
-SENSOR_KINDS = _kinds()
+KINDS = _kinds()
 """All kinds of sensors, in alphabetical order of their modules."""
 
-_RATES: dict[str, Any] = {
-    kind.name: (float, Field(default=kind.rate, **PUBLICATION, description=kind.what)) for kind in SENSOR_KINDS
+_rates: dict[str, Any] = {  # at most that of the steps
+    kind.name: (float, Field(default=kind.rate, ge=0.01, le=1000.0, description=kind.what)) for kind in KINDS
 }
-_TAGS: dict[str, Any] = {name: field for kind in SENSOR_KINDS for name, field in kind.tags.items()}
-_RatesOfKinds: Any = create_model("_RatesOfKinds", __base__=Record, **_RATES)
-_TagsOfKinds: Any = create_model("_TagsOfKinds", __base__=Record, **_TAGS)
+_tags: dict[str, Any] = {name: field for kind in KINDS for name, field in kind.tags.items()}
+_RatesOfKinds: Any = create_model("_RatesOfKinds", __base__=Record, **_rates)
+_TagsOfKinds: Any = create_model("_TagsOfKinds", __base__=Record, **_tags)
 
 
 class Rates(_RatesOfKinds):

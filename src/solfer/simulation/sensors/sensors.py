@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from solfer.simulation.sensors.equipment import Equipment
-from solfer.simulation.sensors.records import SENSOR_KINDS
+from solfer.simulation.sensors.records import KINDS
 from solfer.simulation.sensors.sensor import Sensor
 from solfer.simulation.state import SimulationState
 
@@ -27,7 +27,7 @@ class Sensors(Mapping[str, Any]):
     def __init__(self, state: SimulationState, equipment: Equipment):
         self.record = equipment.record
         self.rates = equipment.record.rates
-        made = {kind.name: kind.of(state, equipment) for kind in SENSOR_KINDS}
+        made = {kind.name: kind.of(state, equipment) for kind in KINDS}
         self._sensors: dict[str, Sensor] = {name: sensor for name, sensor in made.items() if sensor is not None}
 
     def __getitem__(self, name: str) -> Any:

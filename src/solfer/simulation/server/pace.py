@@ -3,27 +3,24 @@
 from solfer.simulation.physics import STEP
 from solfer.transport.fixed_rate import Clock, FixedRateLoop
 
-CATCH_UP = 0.02  # [s]
-PACE_WINDOW = 1.0  # [s]
-
 
 class Pace:
     """Waits for the moment at which a simulated time is due.
 
-    A lag of up to CATCH_UP is made up by steps without a pause; what goes beyond is counted as lost.
+    A lag of up to 20 ms is made up by steps without a pause; what goes beyond is counted as lost.
 
     Args:
         clock: The clock of real time.
         factor: Simulated seconds for each second of the clock; 0: as fast as possible.
 
     Attributes:
-        measured: Simulated seconds for each second of the clock over the newest window; zero before the first is full.
+        measured: Simulated seconds for each second of the clock over the newest second; zero before the first is over.
     """
 
     def __init__(self, clock: Clock, factor: float = 1.0):
         self._now = clock.now
         self.measured = 0.0
-        self._loop = FixedRateLoop(clock, factor / STEP, CATCH_UP) if factor else None
+        self._loop = FixedRateLoop(clock, factor / STEP, 0.02) if factor else None
         self._newest: float | None = None
         self._window = (0.0, 0.0)
 
@@ -53,6 +50,6 @@ class Pace:
 
     def _measure(self, now: float, time: float) -> None:
         begin, simulated = self._window
-        if now - begin >= PACE_WINDOW:
+        if now - begin >= 1.0:
             self.measured = (time - simulated) / (now - begin)
             self._window = (now, time)

@@ -4,11 +4,6 @@ from solfer.errors import ConfigError, SimulationError, UnknownName
 from solfer.simulation.physics import STEP
 from solfer.simulation.sensors import Rates
 
-HOW = "NAME=HZ, several with commas between, such as joints=500,contacts=200"
-
-LONGEST_PERIOD = 1e-6
-"""Highest rate that makes sense [Hz]."""
-
 
 def every(rate: float, where: str = "") -> int:
     """Compute the steps between two publications at `rate` [Hz].
@@ -16,7 +11,7 @@ def every(rate: float, where: str = "") -> int:
     Raises:
         SimulationError: That is not a whole number of steps; `where` is the place of the rate.
     """
-    steps = round(1.0 / (rate * STEP)) if rate > LONGEST_PERIOD else 0
+    steps = round(1.0 / (rate * STEP)) if rate > 1e-6 else 0  # a lower rate makes no sense
     if steps < 1 or abs(steps * rate * STEP - 1.0) > 1e-9:
         raise SimulationError(
             f"{rate:g} Hz is not a rate of publication",
@@ -49,6 +44,10 @@ def changed_rates(rates: Rates, text: str) -> Rates:
         try:
             given[name] = float(number)
         except ValueError as error:
-            raise ConfigError(f"'{part.strip()}' is not a rate", where=where, expected=HOW) from error
+            raise ConfigError(
+                f"'{part.strip()}' is not a rate",
+                where=where,
+                expected="NAME=HZ, several with commas between, such as joints=500,contacts=200",
+            ) from error
         every(given[name], where)
     return rates.model_copy(update=given)

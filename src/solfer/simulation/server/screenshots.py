@@ -12,9 +12,6 @@ from solfer.simulation.rendering.pictures import Pictures
 from solfer.simulation.simulation import Simulation
 from solfer.transport import Inbox
 
-STANDSTILL = 2.0  # [s] without a cycle until a picture fails
-SCREENSHOTS_WAITING = 4  # pictures that may wait to be drawn
-
 
 class Screenshots:
     """Draws pictures in a thread, with a process of its own, while the simulation goes on.
@@ -38,13 +35,11 @@ class Screenshots:
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":
         """Pass a call to the thread that draws, unless too many wait there."""
         self._drawings = [drawing for drawing in self._drawings if not drawing.done()]
-        if len(self._drawings) < SCREENSHOTS_WAITING:
+        if len(self._drawings) < 4:
             self._drawings.append(self._thread.submit(call))
             return self._drawings[-1]
         refused: Future[Any] = Future()
-        refused.set_exception(
-            SimulationError(f"{SCREENSHOTS_WAITING} pictures wait to be drawn", expected="a request later on")
-        )
+        refused.set_exception(SimulationError("4 pictures wait to be drawn", expected="a request later on"))
         return refused
 
     def take(self, name: str) -> Path:
@@ -53,7 +48,7 @@ class Screenshots:
         path = self._pictures.place(name)
         moment = self._inbox.submit(lambda: Shot(simulation.q.copy(), simulation.world.poses(), path))
         try:
-            shot = moment.result(STANDSTILL)
+            shot = moment.result(2.0)
         except FutureTimeout as error:
             moment.cancel()
             raise SimulationError("the simulation does not run", expected="a simulation that makes steps") from error

@@ -16,7 +16,7 @@ from solfer.simulation.server.pace import Pace
 from solfer.simulation.server.publications import publications
 from solfer.simulation.server.rates import every
 from solfer.simulation.server.screenshots import Screenshots
-from solfer.simulation.server.services import SERVICES_OWNER, screenshot_service, simulator_services
+from solfer.simulation.server.services import OWNER, screenshot_service, simulator_services
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
 from solfer.transport.health import Health
@@ -25,14 +25,11 @@ from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
-SIMULATION_HEALTH = "simulation"
-"""Name of the health report."""
+COAST_TIME = 1.0
+"""Simulated time in which a robot without commands comes to rest [s]."""
 
-HEALTH_RATE = 1.0  # [Hz] of simulated time
-SIMULATION_REPEAT_PERIOD = 1.0  # [s] of simulated time; a simulation that diverges twice within it has no good state
-COAST_TIME = 1.0  # [s] of simulated time in which a robot without commands comes to rest
-REST_SPEED_OF_JOINTS = 0.05  # [rad/s] largest speed of a joint of a robot at rest
-IDLE = 0.02  # [s] between two checks for requests and commands while paused
+PAUSE_PERIOD = 0.02
+"""Time between two checks for requests and commands while simulated time stands still [s]."""
 
 
 class _Losses:
@@ -104,7 +101,7 @@ class SimulationServer:
         middleware: Middleware,
         rates: Rates | None = None,
         factor: float = 1.0,
-        name: str = SIMULATION_HEALTH,
+        name: str = "simulation",
         *,
         followers: StepHook | None = None,
         pictures: Pictures | None = None,
@@ -123,10 +120,10 @@ class SimulationServer:
         self._diverged = -math.inf
         self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
-        self._health = every(HEALTH_RATE)
-        middleware.serve(SERVICES_OWNER, simulator_services(self), self.inbox.submit)
+        self._health = every(1.0)
+        middleware.serve(OWNER, simulator_services(self), self.inbox.submit)
         self._screenshots = Screenshots(simulation, self.inbox, pictures or Pictures())
-        middleware.serve(SERVICES_OWNER, (screenshot_service(self.screenshot),), self._screenshots.submit)
+        middleware.serve(OWNER, (screenshot_service(self.screenshot),), self._screenshots.submit)
 
     def cycle(self) -> None:
         """Receive commands and service calls, make one step unless time stands still, publish what is due.
@@ -191,7 +188,7 @@ class SimulationServer:
         """Return when the next cycle is due."""
         if self.stands:
             self.pace.restart()
-            self.middleware.sleep_until(self.middleware.now() + IDLE)
+            self.middleware.sleep_until(self.middleware.now() + PAUSE_PERIOD)
         else:
             self.pace.wait(self.simulation.time)
 
@@ -224,7 +221,7 @@ class SimulationServer:
         """Go on as long as the robot moves; return why that is to end, empty: it rests."""
         begin = 6 if self.simulation.floating else 0
         left = round(COAST_TIME / STEP) if isinstance(self._followers, StepHook) and not self.paused else 0
-        while left and np.abs(self.simulation.v[begin:]).max(initial=0.0) > REST_SPEED_OF_JOINTS:
+        while left and np.abs(self.simulation.v[begin:]).max(initial=0.0) > 0.05:  # [rad/s]
             cycle()
             self.wait()
             left -= 1
@@ -235,7 +232,7 @@ class SimulationServer:
     def _recover(self, error: SimulationError) -> None:
         """Put the robot into its start, as a reset does; raise `error` if that was done a moment ago."""
         time = self.simulation.time
-        if time - self._diverged < SIMULATION_REPEAT_PERIOD:
+        if time - self._diverged < 1.0:  # [s]; it has no good state
             raise error
         logger.error("%s: the robot is put into its start", error)
         self._diverged = time
@@ -245,7 +242,7 @@ class SimulationServer:
     def _repeat(self) -> None:
         """Publish the last measurements once more."""
         now = self.middleware.now()
-        if now - self._idle >= IDLE:
+        if now - self._idle >= PAUSE_PERIOD:
             self._idle = now
             for publication in self._publications:
                 publication.repeat()

@@ -12,16 +12,8 @@ from solfer.simulation.simulation import Simulation
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import Flag
 
-SERVICES_OWNER = "simulator"
+OWNER = "simulator"
 """Owner of these services."""
-
-LARGEST_COUNT = 1000
-"""Most steps of one request; between two requests the simulator receives others."""
-
-DRAWING = 20.0
-"""Longest time until a picture is there; the first one starts a process [s]."""
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -48,8 +40,8 @@ class PushRequest:
     """A wrench on a link; see `Pushes.add`."""
 
     link: str
-    force: tuple[float, ...] = ZERO
-    torque: tuple[float, ...] = ZERO
+    force: tuple[float, ...] = (0.0, 0.0, 0.0)
+    torque: tuple[float, ...] = (0.0, 0.0, 0.0)
     duration: float = 0.0
 
 
@@ -93,7 +85,7 @@ def screenshot_service(screenshot: Callable[[str], Path]) -> Service:
         ScreenshotRequest,
         reply=Answer,
         handler=lambda request: Answer(True, str(screenshot(request.path))),
-        timeout=DRAWING,
+        timeout=20.0,  # the first picture starts a process
     )
 
 
@@ -108,8 +100,8 @@ def simulator_services(server: SteppedSimulation) -> tuple[Service, ...]:
     def step(request: StepRequest) -> None:
         if not server.paused:
             raise SimulationError("the simulation is not paused", expected="simulator/pause before")
-        if not 1 <= request.count <= LARGEST_COUNT:
-            raise SimulationError(f"{request.count} steps", expected=f"from 1 to {LARGEST_COUNT}")
+        if not 1 <= request.count <= 1000:  # between two requests the simulator receives others
+            raise SimulationError(f"{request.count} steps", expected="from 1 to 1000")
         server.advance(request.count)
 
     def push(request: PushRequest) -> None:

@@ -10,7 +10,10 @@ from solfer.config import Record
 from solfer.config.records.bounds import COORDINATE, LENGTH, Bounds
 
 DEFAULT_FRICTION = 0.3
+"""Coefficient of a link of a robot."""
+
 GROUND_FRICTION = 1.0
+"""Coefficient of the ground and of what stands on it."""
 
 FRICTION: Bounds = {"ge": 0.0, "le": 10.0}
 """Bounds of a coefficient."""
@@ -32,19 +35,18 @@ class Friction:
 
 
 GROUND_NAME = "ground"
-STEEPEST = 1.0
-"""Largest slope of the ground [rad]."""
 
 Length = Annotated[float, Field(**LENGTH)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
 Near = Annotated[float, Field(ge=-1000.0, le=1000.0)]
-STEP_LENGTH: Bounds = {"ge": LENGTH["ge"], "le": 10.0}  # a hundred of them are a box that may be
+STEP_LENGTH: Bounds = {"ge": LENGTH["ge"], "le": 10.0}
+"""Height and depth of a step [m]: a hundred of them are a box that may be."""
 
 
 class GroundRecord(Record):
     """A plane through the origin of the world."""
 
-    slope: float = Field(default=0.0, ge=-STEEPEST, le=STEEPEST, description="angle by which it rises along x [rad]")
+    slope: float = Field(default=0.0, ge=-1.0, le=1.0, description="angle by which it rises along x [rad]")
     friction: float | None = Field(
         default=None, **FRICTION, description="coefficient; default: that of the robot's bundle"
     )

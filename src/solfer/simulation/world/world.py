@@ -13,9 +13,6 @@ from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_rp
 from solfer.simulation.physics import PhysicsEngine, Pose
 from solfer.simulation.world.records import GROUND_NAME, BoxRecord, StairsRecord, WorldRecord
 
-WORLDS = "package://solfer/config/worlds"
-FAR_AWAY = 1e3  # [m]
-COLOUR = (0.58, 0.55, 0.50, 1.0)
 FLAT_WORLD = WorldRecord()
 
 
@@ -27,7 +24,7 @@ def find_world(name: str) -> Path:
     """
     if "/" in name or name.endswith(".yaml"):
         return Path(name)
-    folder = located(WORLDS, ".")
+    folder = located("package://solfer/config/worlds", ".")
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     if name not in known:
         raise UnknownName("world", name, known)
@@ -82,8 +79,8 @@ class World:
     def orientation(self, yaw: float = 0.0) -> np.ndarray:
         """Compute the quaternion (x, y, z, w) of a body upright on the ground, turned by `yaw` [rad] from its x."""
         tilt = rotation_from_rpy((0.0, -self._slope, 0.0))
-        turn = rotation_from_rpy((0.0, 0.0, yaw))
-        return quaternion_from_rotation(tilt @ turn)
+        heading = rotation_from_rpy((0.0, 0.0, yaw))
+        return quaternion_from_rotation(tilt @ heading)
 
     def reset(self) -> None:
         """Put everything back to where it was, at rest."""
@@ -94,7 +91,7 @@ class World:
     def scatter(self) -> None:
         """Put everything that can move far away from everything else."""
         for index, (body, (_, orientation)) in enumerate(self._movable):
-            self._engine.place(body, ([0.0, 0.0, FAR_AWAY * (index + 1)], orientation))
+            self._engine.place(body, ([0.0, 0.0, 1e3 * (index + 1)], orientation))
 
     def poses(self) -> list[Pose]:
         """Read positions [m] and quaternions (x, y, z, w) of the boxes that can move, in the order of the record."""
@@ -141,7 +138,8 @@ class World:
 
     def _box(self, box: BoxRecord) -> int:
         pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))
-        body = self._engine.add_box(box.size, pose, box.mass or 0.0, friction=box.friction, colour=COLOUR)
+        colour = (0.58, 0.55, 0.50, 1.0)
+        body = self._engine.add_box(box.size, pose, box.mass or 0.0, friction=box.friction, colour=colour)
         if box.mass is not None:
             self._movable.append((body, pose))
         return body

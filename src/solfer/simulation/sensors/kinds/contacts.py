@@ -11,7 +11,6 @@ from solfer.simulation.sensors.sensor import Sensor
 from solfer.simulation.state import SimulationState
 from solfer.transport.messages import WrenchMessage
 
-WORLD = "world"
 logger = logging.getLogger(__name__)
 
 
@@ -49,7 +48,7 @@ class ContactSensors(Sensor):
         self.topics = [f"contacts/{name}{axes}" for name in self.names for axes in ("", "/link")]
         self._links = [record.end_frame for record in present]
         self._owners = [state.owner[link] for link in self._links]
-        self._world = [WrenchMessage(WORLD) for _ in present]
+        self._world = [WrenchMessage("world") for _ in present]
         self._local = [WrenchMessage(link) for link in self._links]
 
     @classmethod

@@ -20,9 +20,8 @@ from solfer.transport.messages import ImuMessage
 
 _Bias = Annotated[float, Field(ge=-NOISE["le"], le=NOISE["le"])]
 Bias = tuple[_Bias, _Bias, _Bias]
-NO_BIAS = (0.0, 0.0, 0.0)
-FILTERING: Bounds = {"ge": 0.01, "le": 3600.0}
-_MOUNTING = ("link", "offset_position", "offset_orientation")
+FILTER_TIME: Bounds = {"ge": 0.01, "le": 3600.0}
+"""Times of the filter [s]."""
 
 
 class ImuNoiseRecord(Record):
@@ -36,8 +35,8 @@ class ImuNoiseRecord(Record):
 class ImuBiasRecord(Record):
     """Bias that an inertial measurement unit adds to each sample, in its own axes."""
 
-    angular: Bias = Field(default=NO_BIAS, description="[rad/s]")
-    acceleration: Bias = Field(default=NO_BIAS, description="[m/s^2]")
+    angular: Bias = Field(default=(0.0, 0.0, 0.0), description="[rad/s]")
+    acceleration: Bias = Field(default=(0.0, 0.0, 0.0), description="[m/s^2]")
 
 
 class DriftRecord(Record):
@@ -53,8 +52,8 @@ class DriftRecord(Record):
 class AttitudeRecord(Record):
     """The filter that computes an orientation from gyroscopes and accelerometers."""
 
-    time_constant: float = Field(default=2.0, **FILTERING, description="time in which a wrong tilt decays [s]")
-    bias_time: float = Field(default=30.0, **FILTERING, description="time in which a bias of tilt is learned [s]")
+    time_constant: float = Field(default=2.0, **FILTER_TIME, description="time in which a wrong tilt decays [s]")
+    bias_time: float = Field(default=30.0, **FILTER_TIME, description="time in which a bias of tilt is learned [s]")
 
 
 class ImuRecord(Record):
@@ -82,7 +81,11 @@ class ImuRecord(Record):
 
     def effective(self) -> "ImuRecord":
         """Return the record, without errors if it is `exact`."""
-        return ImuRecord(**{key: getattr(self, key) for key in _MOUNTING}) if self.exact else self
+        if not self.exact:
+            return self
+        return ImuRecord(
+            link=self.link, offset_position=self.offset_position, offset_orientation=self.offset_orientation
+        )
 
 
 class Imu(SingleSensor):
@@ -112,10 +115,10 @@ class Imu(SingleSensor):
         self._link = record.link
         state.now.require(record.link, record.where("link"))
         record = record.effective()
-        place = record.offset_position
-        turn = record.offset_orientation
-        self._place = np.zeros(3) if place is None else place.vector()
-        self._turn = np.eye(3) if turn is None else turn.matrix()
+        position = record.offset_position
+        orientation = record.offset_orientation
+        self._position = np.zeros(3) if position is None else position.vector()
+        self._rotation = np.eye(3) if orientation is None else orientation.matrix()
         self._deviations = record.noise
         self._angular_bias = np.array(record.bias.angular)
         self._acceleration_bias = np.array(record.bias.acceleration)
@@ -148,7 +151,7 @@ class Imu(SingleSensor):
         now = self.state.now
         before = self._velocity(self.state.before)[:3]
         velocity = self._velocity(now)
-        rotation = now.rotation(self._link) @ self._turn
+        rotation = now.rotation(self._link) @ self._rotation
         message = self._message
         deviations = self._deviations
         message.stamp = self.state.time
@@ -190,16 +193,16 @@ class Imu(SingleSensor):
     def _velocity(self, moment: Moment) -> np.ndarray:
         """Compute the velocity of the sensor and its angular velocity in world axes, shape (6,)."""
         velocity = moment.velocity(self._link)
-        velocity[:3] += cross(velocity[3:], moment.rotation(self._link) @ self._place)
+        velocity[:3] += cross(velocity[3:], moment.rotation(self._link) @ self._position)
         return velocity
 
     def _turned(self, rotation: np.ndarray) -> np.ndarray:
-        """Add noise to a rotation, a small turn about axes of the sensor."""
+        """Add noise to a rotation, a small rotation about axes of the sensor."""
         if not self._deviations.orientation:
             return rotation
-        turn = np.zeros(3)
-        self.noise.add(turn, self._deviations.orientation)
-        return rotation @ rotation_from_quaternion((*(0.5 * turn), 1.0))
+        vector = np.zeros(3)
+        self.noise.add(vector, self._deviations.orientation)
+        return rotation @ rotation_from_quaternion((*(0.5 * vector), 1.0))
 
 
 def _drift(seed: int, sensor: str, record: DriftRecord) -> Drift:

@@ -6,15 +6,12 @@ import numpy as np
 from pydantic import Field
 
 from solfer.config import Record
-from solfer.config.records.bounds import NOISE, Bounds
+from solfer.config.records.bounds import NOISE
 from solfer.simulation.sensors.equipment import Equipment
 from solfer.simulation.sensors.noise import Noise
 from solfer.simulation.sensors.sensor import SingleSensor
 from solfer.simulation.state import SimulationState
 from solfer.transport.messages import JOINT_MESSAGES, JointMessage
-
-RESOLUTION: Bounds = {"ge": 1e-9, "le": 1e4}
-"""Steps of encoders [rad, m]; the largest positions are still whole numbers of them."""
 
 
 class JointNoiseRecord(Record):
@@ -27,7 +24,10 @@ class JointNoiseRecord(Record):
         default=0.0, **NOISE, description="largest offset of a torque sensor, between - and + of it by seed [Nm, N]"
     )
     resolution: float | None = Field(
-        default=None, **RESOLUTION, description="step of positions, default: none; 9.58738e-5: 16 bits a turn [rad, m]"
+        default=None,
+        ge=1e-9,  # the largest positions are still whole numbers of steps
+        le=1e4,
+        description="step of positions, default: none; 9.58738e-5: 16 bits a turn [rad, m]",
     )
     exact: bool = Field(default=False, description="leaves out all of these")
 
