@@ -404,6 +404,21 @@ def test_positions_that_cease_are_named_and_it_comes_to_rest(make, caplog):
     assert "no position for 0.55 s" in caplog.text
 
 
+def test_positions_that_repeat_before_they_are_reached_are_a_stream(make, caplog):
+    """A sender that waits for the pace repeats its last position; without more of them the base rests where it is."""
+    component = make()
+    references = component.references
+    x, y = references.position[:2].tolist()
+    for index in range(200):
+        guide(component, (x + 0.2 * PERIOD * min(index, 100), y, 0.0))
+        component.pace = 1.0 if index < 100 else 0.0
+    left = x + 0.2 * PERIOD * 100 - references.position[0]
+    component.pace = 1.0
+    cycle(component, 400)
+    assert "no position for 0.55 s, it comes to rest" in caplog.text and not references.velocity.any()
+    assert x + 0.2 * PERIOD * 100 - references.position[0] > 0.3 * left > 0.01
+
+
 def test_a_position_that_jumps_is_named_and_ignored(make, caplog):
     component = make()
     begin = component.references.position.copy()

@@ -38,7 +38,7 @@ class Stream:
 
     Attributes:
         is_followed: Whether references go to the last one.
-        is_moving: Whether the last one was another one than that before it: more of them are expected.
+        is_moving: Whether more of them are expected: the last ones moved, and the references have not arrived since.
         age: Time since the last one [s].
     """
 
@@ -51,9 +51,15 @@ class Stream:
         """Whether no more places come, though the last ones moved."""
         return self.is_followed and self.is_moving and self.age > STREAM_TIMEOUT
 
-    def note(self, step: float) -> None:
-        """Take over a place that is so far from the one before [m or rad]."""
-        self.is_moving = self.is_followed and self.age <= STREAM_TIMEOUT and step > 0.0
+    def note(self, step: float, left: float) -> None:
+        """Take over a place.
+
+        Args:
+            step: How far it is from the one before [m or rad].
+            left: How far references are from the one before [m or rad].
+        """
+        goes_on = step > 0.0 or (self.is_moving and left > 1e-3)  # a sender may wait for the pace
+        self.is_moving = self.is_followed and self.age <= STREAM_TIMEOUT and goes_on
         self.age = 0.0
         self.is_followed = True
 
@@ -228,7 +234,7 @@ class Targets:
             and (step > 0.3 or yaw > 0.5)  # [m, rad] from which on a place is a mistake
         ):
             return f"'{BASE_PORT}' jumps by {step:.2f} m and {yaw:.2f} rad"
-        self._base.note(step + yaw)
+        self._base.note(step + yaw, left=float(np.abs(self._errors[:2]).max()))
         self._places[0] = pose[:3]
         self._places[1, 2] = heading
         return ""
@@ -239,7 +245,7 @@ class Targets:
         if self._vertices.is_moving and self._vertices.age <= STREAM_TIMEOUT and step > 0.3:
             return f"'{VERTICES_PORT}' jump by {step:.2f} m"
         self._age = math.inf
-        self._vertices.note(step)
+        self._vertices.note(step, left=float(np.abs(self._errors[2:]).max()))
         self._places[2:] = places
         return ""
 
