@@ -8,7 +8,7 @@ from estimation_cases.baseline import RestingGyroscope, WheeledBody, series
 from estimation_cases.log import PERIOD
 from estimation_cases.measurements import Sample
 
-from solfer.components.odometry.measured_base import rotation_vector
+from solfer.components.odometry.sensing.measured_base import rotation_vector
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.transport.messages import ImuMessage
 

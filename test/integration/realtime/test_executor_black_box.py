@@ -12,7 +12,7 @@ from solfer.config import load
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
-from solfer.plugins.cycle_timing import STAGES
+from solfer.plugins.timing.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.recording.reader import read

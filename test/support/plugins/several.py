@@ -8,9 +8,9 @@ from solfer.components import Component
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Plugin, PluginParts, PluginSet
 from solfer.plugins.life.plugin_set import NOTHING
-from solfer.plugins.loop import PluginLoop
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.plugins.timing.loop import PluginLoop
 from solfer.transport import Inbox
 
 PERIOD = 1.0 / RATE
