@@ -17,7 +17,7 @@ PERIOD = 1.0 / RATE
 
 
 class Counted(Component):
-    """Counts its steps, lasts as long as it is told, and fails where it is told."""
+    """Counts its steps, takes a given time, and fails at a given step."""
 
     def __init__(self, robot, name, several):
         super().__init__(robot, name=name)
