@@ -77,17 +77,17 @@ def layer(folder: Path, rate: float) -> Path:
             "name": "centauro",
             "rate": rate,
             "echo": {
-                "feedback": {"list": ["wanted", "goal"]},
+                "feedback": {"list": ["commands", "goal"]},
                 "actuators": {"read": False},
                 "contacts": {"read": False},
             },
         },
-        "feedback": {"wanted": joints | {"function": "reference"}, "goal": point},
+        "feedback": {"commands": joints | {"function": "reference"}, "goal": point},
         "controller": {"wanted_back": joints | {"type": "reference"}, "goal_back": point | {"type": "reference"}},
         "xbot": {
             "source": {"urdf": "/robot_description", "srdf": "/robot_semantic_description"},
             "feedback": {
-                "wanted": {"source": "wanted", "message": JOINTS, "layer": "NRT"},
+                "commands": {"source": "commands", "message": JOINTS, "layer": "NRT"},
                 "goal": {"source": "goal", "message": POINT, "layer": "NRT"},
             },
             "controller": {
@@ -191,7 +191,7 @@ def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, .
         return JointMessage(joints, numbers, numbers)
 
     ways = {
-        "joint reference": Way(ros, "wanted", JOINTS, command, lambda message: message.position[0]),
+        "joint reference": Way(ros, "commands", JOINTS, command, lambda message: message.position[0]),
         "Point": Way(
             ros,
             "goal",

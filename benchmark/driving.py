@@ -4,7 +4,7 @@
 Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--count M] [--world FILE]
 [--robot FILE] [--transport FILE] [--estimated] [--model] [--jobs N]`. A course is one of `driving_cases/courses.py`,
 `mixed`, which the seed draws, or a scenario file, which is played from where the robot is; default: all of the first.
-The robot is CENTAURO unless a file tells another one. Plugins and PyBullet run in memory, faster than real time;
+The robot is CENTAURO unless a file names another one. Plugins and PyBullet run in memory, faster than real time;
 progress is on stderr. A line has
 
 - `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
@@ -28,7 +28,7 @@ With `--estimated` the base is that of the odometry, and sensors err as in the r
 `--transport` puts the faults of a file, such as `config/transport/busy.yaml`, between PyBullet and the plugins, and
 lets the loops of these leave cycles out.
 
-`--model` drives in the model alone, where the robot does what it is told. Then `lost` is the time [s] that the course
+`--model` drives in the model alone, where the robot does what is commanded. Then `lost` is the time [s] that the course
 loses by each cause: `speeds` that are larger than they may be, `wheels` that have to turn first, `joints` at their
 bounds and what else holds a motion, the acceleration when it goes on (`start`), and wheels that are lifted (`lift`).
 

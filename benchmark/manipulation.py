@@ -157,7 +157,7 @@ def rms(errors: list[float]) -> float:
 
 
 def out_of_reach(seed: int, directions: int) -> Iterator[Figure]:
-    """Want a hand, or every third time both, 1 m farther than they can reach, in drawn directions."""
+    """Desire a hand, or every third time both, 1 m farther than they can reach, in drawn directions."""
     rng, warnings, robot = np.random.default_rng(seed), Warnings(), upper_body()
     logger = logging.getLogger("solfer.components")
     logger.addHandler(warnings)

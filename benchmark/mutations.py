@@ -79,7 +79,7 @@ class Mutation(NamedTuple):
 
     @property
     def key(self) -> tuple[str, int, str]:
-        """What tells it from others."""
+        """What distinguishes it."""
         return self.file, self.line, self.diff
 
     def applied(self, text: str) -> str | None:

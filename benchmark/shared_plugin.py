@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 from form import Figures, parser_of
 from support.shared.figure_5 import ORDER, SharedWorld, module, write  # noqa: E402
 
-from solfer.plugins.cycle_timing import STAGES  # noqa: E402
+from solfer.plugins.timing.cycle_timing import STAGES  # noqa: E402
 
 READER = "reader"
 TURN = 0.1

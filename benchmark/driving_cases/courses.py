@@ -1,4 +1,4 @@
-"""Courses by velocities: what is wanted of base and vertices, second by second."""
+"""Courses by velocities: what is desired of base and vertices, second by second."""
 
 import math
 from typing import NamedTuple
@@ -118,8 +118,8 @@ class Profile:
         self.base[:2] += _shortened(change, ACCELERATION * self._period)
         self.base[2] += _shortened(np.array((part.turn,)) - self.base[2], TURN_ACCELERATION * self._period)[0]
         self.up += _shortened(np.array((part.up,)) - self.up, VERTEX_ACCELERATION * self._period)[0]
-        for column, wanted in ((0, part.longer * ENDS), (1, part.wider * SIDES)):
-            change = wanted - self.vertices[:, column]
+        for column, desired in ((0, part.longer * ENDS), (1, part.wider * SIDES)):
+            change = desired - self.vertices[:, column]
             self.vertices[:, column] += _shortened(change, VERTEX_ACCELERATION * self._period)
         self.is_over = index >= len(self._parts) and not (self.base.any() or self.vertices.any() or self.up)
 

@@ -29,7 +29,7 @@ WAYS: dict[str, dict[str, Any]] = {"default": {}, "original": {"law": "original"
 
 
 class Cycle:
-    """The component on a robot that does what it is told, driven by `cmd_vel`.
+    """The component on a robot that does what is commanded, driven by `cmd_vel`.
 
     Args:
         is_whole: Whether the Robot is the whole robot, or its lower body.
@@ -56,7 +56,7 @@ class Cycle:
         return self._robot.size
 
     def move(self) -> None:
-        """Let the robot be where it was told to be, and a message come now and then."""
+        """Let the robot be where it was commanded to be, and a message come now and then."""
         state, command, moved = self._robot.state, self._robot.command, self._component.moved
         if self._count:
             state.position[moved], state.velocity[moved] = command.position[moved], command.velocity[moved]

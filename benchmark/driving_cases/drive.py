@@ -41,11 +41,11 @@ class Row(NamedTuple):
     """A cycle; places are in the world, vertices are seen from the base's heading.
 
     Attributes:
-        reference: Wanted x, y of what is tracked, and heading, shape (3,).
+        reference: Desired x, y of what is tracked, and heading, shape (3,).
         truth: The same as it is; with an estimated base as it is seen from there, so that a drift does not count.
-        wanted: Vertices that are wanted, x and y, shape (4, 2) [m].
+        desired: Desired vertices, x and y, shape (4, 2) [m].
         vertices: The same as they are.
-        height: Height of the base, less what is wanted [m].
+        height: Height of the base, less the desired one [m].
         margin: Distance of the centre of mass from the nearest edge of the support polygon [m].
         joint_error: Largest distance of a joint from its command [rad].
         torque: Largest torque of a joint, by its limit.
@@ -57,7 +57,7 @@ class Row(NamedTuple):
 
     reference: np.ndarray
     truth: np.ndarray
-    wanted: np.ndarray
+    desired: np.ndarray
     vertices: np.ndarray
     height: float
     margin: float
@@ -70,7 +70,7 @@ class Row(NamedTuple):
 
 
 class Recorder:
-    """Looks what the robot does beside what is wanted.
+    """Looks what the robot does beside what is desired.
 
     Args:
         world: The robot.
@@ -100,9 +100,9 @@ class Recorder:
         vertices, truth, drift = world.vertices(), np.array((*tracked[:2], heading)), np.zeros(3)
         if world.is_estimated:
             links = component.model.kinematics
-            told, told_heading = links.position(base), heading_of(links.rotation(base))
-            truth[:2] = told[:2] + seen_from(-told_heading, seen_from(heading, tracked[:2] - pelvis[:2]))
-            truth[2], drift[:2], drift[2] = told_heading, told[:2] - pelvis[:2], told_heading - heading
+            estimated, estimated_heading = links.position(base), heading_of(links.rotation(base))
+            truth[:2] = estimated[:2] + seen_from(-estimated_heading, seen_from(heading, tracked[:2] - pelvis[:2]))
+            truth[2], drift[:2], drift[2] = estimated_heading, estimated[:2] - pelvis[:2], estimated_heading - heading
         error = component.model.command.position[self._commanded] - simulation.q[self._true]
         torque = np.abs(simulation.torque[self._true])
         self.rows.append(
@@ -162,7 +162,7 @@ def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: 
     errors = recorder.rows[-1]
     away = max(
         float(np.linalg.norm(errors.reference[:2] - errors.truth[:2])),
-        float(np.linalg.norm(errors.wanted - errors.vertices, axis=1).max()),
+        float(np.linalg.norm(errors.desired - errors.vertices, axis=1).max()),
         figures.get("goal_base", 0.0),
         figures.get("goal_vertex", 0.0),
     )
@@ -189,7 +189,7 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
     rest, taken = round(REST / PERIOD), 0.0
 
     def follow() -> None:
-        """Write what the course wants."""
+        """Write what the course desires."""
         nonlocal cycles
         if world.plugin.running and cycles > START:
             if cycles % EVERY == 0:
@@ -221,7 +221,7 @@ def columns_of(rows: Sequence[NamedTuple]) -> dict[str, np.ndarray]:
 def tracking_of(columns: dict[str, np.ndarray], duration: float) -> dict[str, Any]:
     """Compute how well a course was followed, which took a share `duration` of its time."""
     error = columns["truth"] - columns["reference"]
-    vertex = np.linalg.norm(columns["vertices"] - columns["wanted"], axis=2)
+    vertex = np.linalg.norm(columns["vertices"] - columns["desired"], axis=2)
     return {
         "com_rms": _rms(np.linalg.norm(error[:, :2], axis=1)),
         "heading_rms": _rms((error[:, 2] + math.pi) % (2.0 * math.pi) - math.pi),
@@ -274,13 +274,13 @@ def _lag(columns: dict[str, np.ndarray]) -> float | None:
     """Find the lag by which base and vertices follow their references best [s]; None: nothing moves."""
     weights = np.array((1.0, 1.0, ARM))
     motions = []
-    for base, vertices in (("reference", "wanted"), ("truth", "vertices")):
+    for base, vertices in (("reference", "desired"), ("truth", "vertices")):
         places = columns[base] * weights
         places[:, 2] = np.unwrap(columns[base][:, 2]) * ARM
         motions.append(np.hstack((places, columns[vertices].reshape(len(places), -1))))
-    wanted, found = motions
-    if np.ptp(wanted, axis=0).max() < 0.01:
+    desired, found = motions
+    if np.ptp(desired, axis=0).max() < 0.01:
         return None
     first = len(LAGS)
-    costs = [float(np.sum((found[first:] - wanted[first - lag : len(wanted) - lag]) ** 2)) for lag in range(first)]
+    costs = [float(np.sum((found[first:] - desired[first - lag : len(desired) - lag]) ** 2)) for lag in range(first)]
     return float(LAGS[int(np.argmin(costs))])

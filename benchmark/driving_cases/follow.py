@@ -1,4 +1,4 @@
-"""What a course wants of a component, cycle by cycle."""
+"""What a course desires of a component, cycle by cycle."""
 
 from collections.abc import Sequence
 from concurrent.futures import Future
@@ -28,7 +28,7 @@ class Follower:
         self._has_begun = False
 
     def step(self) -> None:
-        """Write what is wanted in the next cycle.
+        """Write what is desired in the next cycle.
 
         Raises:
             ComponentError: A wheel cannot be lifted, or put down.

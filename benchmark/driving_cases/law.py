@@ -236,7 +236,7 @@ class WheeledLaw:
         return error
 
     def _rates(self, state: Measured, references: References, error: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        """Return the rates of all tasks: K e, bounded with a pace, and at the pace those that are wanted."""
+        """Return the rates of all tasks: K e, bounded with a pace, and at the pace the desired ones."""
         tags, rows, rates = self._tags, self._rows, self._gain * error
         is_paced, steer = tags.is_paced, rows["STEERING"]
         if is_paced:

@@ -1,4 +1,4 @@
-"""One drive in the model alone: the robot does what it is told, to the number; see `drive` for one in PyBullet."""
+"""One drive in the model alone: the robot does what is commanded, to the number; see `drive` for one in PyBullet."""
 
 import sys
 import tempfile
@@ -43,14 +43,14 @@ class ModelRow(NamedTuple):
 
     reference: np.ndarray
     truth: np.ndarray
-    wanted: np.ndarray
+    desired: np.ndarray
     vertices: np.ndarray
     height: float
     margin: float
 
 
 class Model:
-    """A robot that does what it is told, without lower level and pipes.
+    """A robot that does what is commanded, without lower level and pipes.
 
     Args:
         folder: Where the configuration is written.
@@ -88,7 +88,7 @@ class Model:
         self.lost = np.zeros(len(CAUSES))
 
     def cycle(self) -> None:
-        """Run one cycle, and let the robot be where it was told to be."""
+        """Run one cycle, and let the robot be where it was commanded to be."""
         self._note()
         begun = time.thread_time()
         self._robot.update()
@@ -147,7 +147,7 @@ def drive_model(name: str, course: Sequence[Part] | Scenario, seed: int, **optio
         figures |= goal_errors(model.rows, profile.goal)
     away = max(
         float(np.linalg.norm(last.reference[:2] - last.truth[:2])),
-        float(np.linalg.norm(last.wanted - last.vertices, axis=1).max()),
+        float(np.linalg.norm(last.desired - last.vertices, axis=1).max()),
     )
     why = why or ("" if away <= SETTLED else f"{away:.3f} m from its references at the end")
     if why:

@@ -262,12 +262,12 @@ class OriginalLaw:
             found["CONTACT_POINTS"].append(forward[0] * error.real + forward[1] * error.imag)
             moved = geometric - np.vstack((self._before_rows, np.zeros_like(linear[2])))
             rows["CONTACT_POINTS"].append(forward @ moved - forward @ np.cross(NORMAL, offset) * angular[2])
-            for task, (value, row), wanted in (
+            for task, (value, row), desired in (
                 ("CAMBER", self._camber(wheel), wish.camber),
                 ("CASTER", self._caster(carrier), wish.caster),
             ):
-                found[task].append(soft(wanted[index], value, 2.0))
-                wanted[index] = value + found[task][-1]
+                found[task].append(soft(desired[index], value, 2.0))
+                desired[index] = value + found[task][-1]
                 rows[task].append(row)
         self._before, self._before_rows, self._is_first = (place.copy(), heading), linear[:2].copy(), False
         errors["CONSTRAINTS"] = np.zeros(3 * len(self._wheels))

@@ -64,7 +64,7 @@ class WheeledBody:
 
 
 class RestingGyroscope:
-    """What a gyroscope tells of a robot that rests: the mean of it is its bias, as programs of real robots learn it.
+    """What a gyroscope measures of a robot that rests: the mean of it is its bias, as programs of real robots learn it.
 
     Attributes:
         bias: Axes of the sensor, shape (3,) [rad/s].
@@ -75,7 +75,7 @@ class RestingGyroscope:
         self.bias, self.rests, self._count, self._before = np.zeros(3), False, 0, np.zeros(0)
 
     def hear(self, position: np.ndarray, angular: np.ndarray, period: float) -> None:
-        """Take positions of joints [rad] and what the gyroscope tells [rad/s], after a period [s]."""
+        """Take positions of joints [rad] and what the gyroscope measures [rad/s], after a period [s]."""
         known = len(self._before) > 0
         self.rests = known and float(np.abs(position - self._before).max()) <= REST * period
         self._before = position.copy()

@@ -121,7 +121,7 @@ class ForcesWorld:
 
 
 class Legs:
-    """Joints of the legs that put the wheels where they are wanted, seen from the base.
+    """Joints of the legs that put the wheels where they are desired, seen from the base.
 
     Args:
         world: Where the robot stands.
@@ -140,10 +140,10 @@ class Legs:
 
     def reach(self, leg: int, offset: np.ndarray) -> tuple[float, ...]:
         """Return the positions of the joints of a leg that put its wheel off from where it was, shape (3,) [m]."""
-        robot, wanted = self._robot, self._places[leg - 1] + offset
+        robot, desired = self._robot, self._places[leg - 1] + offset
         dofs = [robot.dof(joint) for joint in self.joints[leg - 1]]
         for _ in range(100):
-            error = wanted - self._place(leg)
+            error = desired - self._place(leg)
             if abs(error).max() < 1e-6:
                 break
             jacobian = robot.kinematics.jacobian(f"wheel_{leg}")[:3, dofs]

@@ -37,7 +37,7 @@ class Plugins:
         folder: Where their configuration is written.
         names: Methods of `odometry`; `ground_forces` works on the base of the first one.
         radii: Radii of the wheels that they believe, shape (4,) [m].
-        noise: Factor of the errors, which the tags of the filter tell it.
+        noise: Factor of the errors, which the tags of the filter set.
         faults: What goes wrong between the sensors and them; None: nothing.
 
     Attributes:

@@ -24,9 +24,9 @@ class PointContacts:
     """Orientation, velocity, place, places of contacts and biases of the IMU, with the right-invariant error.
 
     Between two samples the IMU's angular velocity and specific force move its pose. Each contact that touches is a
-    point d at rest in the world, and encoders tell where it is from the IMU: R h + p - d = 0. Wheels roll: here d goes
-    on by the way that its own joints tell, which is zero for a foot. Two things are added to the published filter, so
-    that it can know what the others know: contacts slip less while no joint moves, which tells the gyroscope's bias,
+    point d at rest in the world, and encoders measure where it is from the IMU: R h + p - d = 0. Wheels roll: here d
+    goes on by the way that its joints measure, which is zero for a foot. Two things are added to the published filter,
+    so that it can know what the others know: contacts slip less while no joint moves, which shows the gyroscope's bias,
     and a contact that contradicts what is expected begins anew.
 
     Args:

@@ -8,7 +8,7 @@ from estimation_cases.baseline import RestingGyroscope, WheeledBody, series
 from estimation_cases.log import PERIOD
 from estimation_cases.measurements import Sample
 
-from solfer.components.odometry.measured_base import rotation_vector
+from solfer.components.odometry.sensing.measured_base import rotation_vector
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.transport.messages import ImuMessage
 
@@ -65,12 +65,12 @@ class RollingSquares:
 
 def twist(body: WheeledBody, angular: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solve for velocity and angular velocity of the base, axes of the world; `angular` is that of the IMU [rad/s]."""
-    rows, told = [np.hstack((np.zeros((3, 3)), np.eye(3)))], [angular]
+    rows, measured = [np.hstack((np.zeros((3, 3)), np.eye(3)))], [angular]
     for wheel in np.flatnonzero(body.touching):
         x, y, z = body.arms[wheel]
         rows.append(np.array(((1.0, 0.0, 0.0, 0.0, z, -y), (0.0, 1.0, 0.0, -z, 0.0, x), (0.0, 0.0, 1.0, y, -x, 0.0))))
-        told.append(-body.jacobian[3 * wheel : 3 * wheel + 3] @ body.velocity)
+        measured.append(-body.jacobian[3 * wheel : 3 * wheel + 3] @ body.velocity)
     stacked = np.vstack(rows)
     # without wheels nothing is known of the velocity
-    solved = np.linalg.lstsq(stacked, np.concatenate(told), rcond=None)[0]
+    solved = np.linalg.lstsq(stacked, np.concatenate(measured), rcond=None)[0]
     return solved[:3], solved[3:]

@@ -135,12 +135,12 @@ def swings() -> Iterator[Row]:
 
 
 def deflected(*plugins: str) -> float:
-    """Hold the robot by plugins; how far its arms are from where they are wanted after a while [rad]."""
+    """Hold the robot by plugins; how far its arms are from where they are commanded after a while [rad]."""
     world = World()
-    wanted, *_ = [world.plugin(name) for name in plugins]
+    commanding, *_ = [world.plugin(name) for name in plugins]
     world.run(2.0)
-    arms = np.array([name.startswith("j_arm") for name in wanted.robot.dofs])
-    away = world.simulation.q - wanted.robot.command.position
+    arms = np.array([name.startswith("j_arm") for name in commanding.robot.dofs])
+    away = world.simulation.q - commanding.robot.command.position
     world.close()
     return float(np.linalg.norm(away[arms]))
 

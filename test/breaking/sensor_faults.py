@@ -451,13 +451,13 @@ def velocities_zero(trial: "SensorTrial") -> None:
 def velocities_lag(trial: "SensorTrial") -> None:
     """Let all velocities of joints be those of 0.2 s ago for a while."""
     trial.lasts = LASTS
-    heard: deque[tuple[float, np.ndarray]] = deque()
+    received: deque[tuple[float, np.ndarray]] = deque()
 
     def change(message: Any, time: float) -> None:
-        heard.append((time, message.velocity))
-        while heard[0][0] < time - LAG:
-            heard.popleft()
-        message.velocity = heard[0][1].copy()
+        received.append((time, message.velocity))
+        while received[0][0] < time - LAG:
+            received.popleft()
+        message.velocity = received[0][1].copy()
 
     trial.spoil("joint_states", change)
 

@@ -14,7 +14,7 @@ from system import START, Robot, end, started, subscribers, wait_for
 from solfer.msg import JointCommand
 
 COMMAND = "/position_controller/command"
-TOLD = ("/joint_states", "/imu")
+MEASURED = ("/joint_states", "/imu")
 
 
 class BagsTest(unittest.TestCase):
@@ -29,14 +29,14 @@ class BagsTest(unittest.TestCase):
 
     def is_recorded(self) -> bool:
         """Return whether rosbag receives measurements and commands."""
-        receives = all(any(node.startswith("/record") for node in subscribers(topic)) for topic in TOLD)
+        receives = all(any(node.startswith("/record") for node in subscribers(topic)) for topic in MEASURED)
         return receives and self.publisher.get_num_connections() == 2
 
     def test_a_recorded_command_is_played_again(self):
         """After a reset, rosbag's player alone brings the torso back to 0.3 rad; the bag holds all topics."""
         with tempfile.TemporaryDirectory() as folder:
             bag = str(Path(folder, "command.bag"))
-            with started("rosbag", "record", "-O", bag, COMMAND, *TOLD, "/tf") as process:
+            with started("rosbag", "record", "-O", bag, COMMAND, *MEASURED, "/tf") as process:
                 wait_for(self.is_recorded, START, "rosbag that receives all")
                 self.publisher.publish(name=["torso_yaw"], position=[0.3])
                 self.robot.arrive({"torso_yaw": 0.3}, START)
@@ -46,7 +46,7 @@ class BagsTest(unittest.TestCase):
             recorded = {topic["topic"]: topic for topic in shown("rosbag", "info", "--yaml", bag)["topics"]}
             self.assertEqual(recorded[COMMAND]["messages"], 1)
             self.assertEqual(recorded[COMMAND]["type"], "solfer/JointCommand")
-            for topic in TOLD:
+            for topic in MEASURED:
                 self.assertGreater(recorded[topic]["messages"], 200)
             output("rosbag", "check", bag)
             self.assertTrue(shown("rosservice", "call", "/simulator/reset", "{}")["success"])

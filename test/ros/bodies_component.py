@@ -6,7 +6,7 @@ WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
 class Balance(Component):
-    """Tells `center_of_mass` and `wheels`, the origins of their links, of the measured Robot."""
+    """Publishes `center_of_mass` and `wheels`, the origins of their links, of the measured Robot."""
 
     def __init__(self, robot, tags=None, name=""):
         super().__init__(robot, tags, name)

@@ -90,7 +90,7 @@ class ClaimsTest(unittest.TestCase):
             self.assertTrue(left, self.robot.speeds())
 
     def check_a_refusal(self) -> None:
-        """Start a second plugin: it is refused, and told the owner."""
+        """Start a second plugin: it is refused, and the refusal names the owner."""
         code, output = run(*PLUGIN, "-n", "joint_lower")
         self.assertEqual(code, 2, output)
         for text in ("error: plugin 'joint_lower'", "'/joint_lower' cannot", "'/joint_states'", "hip_yaw_1"):

@@ -24,7 +24,7 @@ from solfer.transport import JointMessage, MessageStatus
 FIRST = 5.0
 """Simulated time at which the node starts [s]."""
 
-TELL = ("rostopic", "pub", "--latch", "/clock", "rosgraph_msgs/Clock", f"{{clock: {{secs: {FIRST:.0f}}}}}")
+PUBLISH_CLOCK = ("rostopic", "pub", "--latch", "/clock", "rosgraph_msgs/Clock", f"{{clock: {{secs: {FIRST:.0f}}}}}")
 
 RIVALS = 4
 """Nodes that start in the same moment."""
@@ -79,13 +79,13 @@ class ClockTest(unittest.TestCase):
         cls.addClassCleanup(rospy.set_param, "/use_sim_time", False)
         cls.without_clock = run(*program("plugin", "-p", "joint_states"))
         cls.rivals = rivals()
-        with started(*TELL):
+        with started(*PUBLISH_CLOCK):
             cls.middleware = RosMiddleware(RosNode("clock_test"))
         cls.publisher = rospy.Publisher("/clock", Clock, queue_size=10, tcp_nodelay=True)
         wait_for(lambda: cls.publisher.get_num_connections() > 0, START, "a connection of /clock")
 
     def publish(self, simulated: float) -> None:
-        """Tell the time [s], and wait until the node knows it."""
+        """Publish the time [s], and wait until the node knows it."""
         stamp = genpy.Time.from_sec(simulated)
         self.publisher.publish(Clock(stamp))
         wait_for(lambda: rospy.Time.now() == stamp, START, f"time {simulated:g} s")

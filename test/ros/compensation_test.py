@@ -75,12 +75,12 @@ class CompensationTest(unittest.TestCase):
         for line in lines:
             rospy.wait_for_service(line.split()[2], START)
         move, lift, put_down = lines
-        wanting = "/desired_state", "/desired_joints"
-        wait_for(lambda: recording.rests(*wanting), START, "a plugin at rest that wants joints somewhere")
+        commanding = "/desired_state", "/desired_joints"
+        wait_for(lambda: recording.rests(*commanding), START, "a plugin at rest that commands joints")
         self.obey(move)
-        wait_for(lambda: bool(recording.begins(*wanting)), START, "a motion")
+        wait_for(lambda: bool(recording.begins(*commanding)), START, "a motion")
         wait_for(lambda: abs(sent.effort("hip_pitch_1")) > 10.0, START, "legs that carry")
-        wait_for(lambda: max(sent.by_step) > recording.begins(*wanting)[0] + MOTION, START, "a motion")
+        wait_for(lambda: max(sent.by_step) > recording.begins(*commanding)[0] + MOTION, START, "a motion")
         compared = sent.by_step
         robot.arrive({"torso_yaw": 0.3}, START)
         before = sent.effort("hip_pitch_3")
@@ -88,10 +88,10 @@ class CompensationTest(unittest.TestCase):
         wait_for(lambda: abs(sent.effort("hip_pitch_3") - before) > 5.0, START, "more load on the others")
         self.obey(put_down)
         wait_for(lambda: abs(sent.effort("hip_pitch_3") - before) < 2.0, START, "the load as before")
-        self.carry_what_is_wanted(robot, sent)
-        self.compare(compared, recording.begins(*wanting)[0], move)
+        self.carry_the_desired_load(robot, sent)
+        self.compare(compared, recording.begins(*commanding)[0], move)
 
-    def carry_what_is_wanted(self, robot, sent):
+    def carry_the_desired_load(self, robot, sent):
         """Let the plugin that carries start anew with one other tag, on the desired state."""
         subprocess.run(["rosnode", "kill", "/gravity_compensation"], check=True, capture_output=True)
         with tempfile.TemporaryDirectory() as folder:

@@ -104,7 +104,7 @@ class Figure4Test(unittest.TestCase):
         self.compare(
             {step: np.concatenate([each.position, each.orientation]) for step, each in base.items()}, recording.base
         )
-        sent = {one.step: one for one in recording.wanted(f"/{COMMAND}", f"/{PLUGINS[2]}") if one.step in commands}
+        sent = {one.step: one for one in recording.commanded(f"/{COMMAND}", f"/{PLUGINS[2]}") if one.step in commands}
         for step, one in sent.items():
             self.assertEqual(list(one.position), list(commands[step].names))
         self.compare(

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Figs. 2 and 3 of the paper: a plugin on a part of the robot, and two of which one goes by what the other moves.
 
-Simulator and plugins run in lock-step, so that what a plugin wants is known to the last digits without asking solfer.
+Simulator and plugins run in lock-step, so that commands are known to the last digits without
+asking solfer.
 """
 
 import contextlib
@@ -97,8 +98,8 @@ class Figures(unittest.TestCase):
     def move(self, recording: Recording) -> int:
         """Move the left arm; the step at which the plugin has set out."""
         ask = rospy.ServiceProxy("/move/trajectory", MoveJoints)
-        wait_for(lambda: recording.rests(DESIRED, "/move"), START, "a plugin that wants something")
-        start = recording.wanted(DESIRED, "/move")[0].position
+        wait_for(lambda: recording.rests(DESIRED, "/move"), START, "a plugin that commands")
+        start = recording.commanded(DESIRED, "/move")[0].position
         goals = [start[joint] + distance for joint, distance in zip(SOURCES, MOTION, strict=True)]
         reply = ask(joints=SOURCES, positions=goals, speed=SPEED)
         self.assertTrue(reply.success, reply.message)
@@ -118,11 +119,13 @@ class Figures(unittest.TestCase):
         times = (np.array(steps) - begin) * STEP + PERIOD
         return np.stack([ramp(times, distance, self.duration()) for distance in MOTION], axis=-1)
 
-    def wants(self, recording: Recording, topic: str, sender: str, joints: tuple[str, ...], begin: int) -> None:
+    def assert_commands(
+        self, recording: Recording, topic: str, sender: str, joints: tuple[str, ...], begin: int
+    ) -> None:
         """Check that the references of a node are the predicted motion."""
-        wanted = recording.wanted(topic, sender)
-        got = np.array([[each.position[joint] for joint in joints] for each in wanted])
-        self.assertLess(np.abs(got - got[0] - self.way([each.step for each in wanted], begin)).max(), 1e-9)
+        commands = recording.commanded(topic, sender)
+        got = np.array([[each.position[joint] for joint in joints] for each in commands])
+        self.assertLess(np.abs(got - got[0] - self.way([each.step for each in commands], begin)).max(), 1e-9)
 
     def goes(self, recording: Recording, joints: tuple[str, ...], begin: int) -> None:
         """Check that the simulated joints move as predicted, as far as springs can."""
@@ -136,9 +139,9 @@ class Figures(unittest.TestCase):
         self.assertEqual(len(changed_lines(FILE.read_text(), Path(upper).read_text())), 2)
         with self.scene(move=upper) as recording:
             begin = self.move(recording)
-            self.wants(recording, COMMANDS, "/move", SOURCES, begin)
+            self.assert_commands(recording, COMMANDS, "/move", SOURCES, begin)
             self.goes(recording, SOURCES, begin)
-            commanded = set(recording.wanted(COMMANDS, "/move")[0].position)
+            commanded = set(recording.commanded(COMMANDS, "/move")[0].position)
             joints = rospy.ServiceProxy("/position_controller/get_joint_names", GetJointNames)().names
         legs = {joint for joint in joints if joint.startswith(("hip", "knee", "ankle"))}
         self.assertEqual(commanded, set(joints) - legs)
@@ -154,10 +157,10 @@ class Figures(unittest.TestCase):
 
     def follows_what_is_measured(self, recording: Recording) -> None:
         """Each command is as far from the first as the newest measurement of the left arm is from that one's."""
-        wanted = recording.wanted(COMMANDS, "/follow")
+        commands = recording.commanded(COMMANDS, "/follow")
         steps = np.array(sorted(recording.joints))
-        newest = steps[np.searchsorted(steps, [each.step for each in wanted], side="right") - 1]
-        got = np.array([[each.position[joint] for joint in TARGETS] for each in wanted])
+        newest = steps[np.searchsorted(steps, [each.step for each in commands], side="right") - 1]
+        got = np.array([[each.position[joint] for joint in TARGETS] for each in commands])
         measured = np.array([[recording.position(joint, step) for joint in SOURCES] for step in newest])
         self.assertLess(np.abs((got - got[0]) - (measured - measured[0])).max(), 1e-9)
         self.assertGreater(np.abs(got - got[0]).max(), 0.2)

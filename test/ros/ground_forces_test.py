@@ -25,11 +25,11 @@ class GroundForcesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("forces_test")
-        cls.told, cls.true = {}, {}
+        cls.estimated, cls.true = {}, {}
         for leg in LEGS:
-            for kept, topic in ((cls.told, f"/ground_forces/{leg}"), (cls.true, f"/contacts/{leg}/link")):
+            for kept, topic in ((cls.estimated, f"/ground_forces/{leg}"), (cls.true, f"/contacts/{leg}/link")):
                 rospy.Subscriber(topic, WrenchStamped, cls.keep, (kept, leg), queue_size=10)
-        wait_for(lambda: {*cls.told} == {*cls.true} == {*LEGS}, START, "the wrenches of all legs")
+        wait_for(lambda: {*cls.estimated} == {*cls.true} == {*LEGS}, START, "the wrenches of all legs")
         begin = rospy.get_time()
         wait_for(lambda: rospy.get_time() > begin + 4.0, START, "4 s of simulated time")
 
@@ -42,16 +42,17 @@ class GroundForcesTest(unittest.TestCase):
     def test_each_leg_has_the_wrench_of_a_sensor(self):
         def errors():
             return [
-                abs(numbers(self.told[leg].wrench.force) - numbers(self.true[leg].wrench.force)).max() for leg in LEGS
+                abs(numbers(self.estimated[leg].wrench.force) - numbers(self.true[leg].wrench.force)).max()
+                for leg in LEGS
             ]
 
         wait_for(lambda: max(errors()) < AGREES, START, lambda: f"forces that agree: {errors()}")
         for leg in LEGS:
-            told, true = self.told[leg], self.true[leg]
-            self.assertEqual(told.header.frame_id, true.header.frame_id)
-            self.assertGreater(told.header.stamp.to_sec(), 0.0)
-            self.assertGreater(np.linalg.norm(numbers(told.wrench.force)), 100.0)
-            torque = numbers(told.wrench.torque) - numbers(true.wrench.torque)
+            estimated, true = self.estimated[leg], self.true[leg]
+            self.assertEqual(estimated.header.frame_id, true.header.frame_id)
+            self.assertGreater(estimated.header.stamp.to_sec(), 0.0)
+            self.assertGreater(np.linalg.norm(numbers(estimated.wrench.force)), 100.0)
+            torque = numbers(estimated.wrench.torque) - numbers(true.wrench.torque)
             self.assertLess(abs(torque).max(), 0.1 * AGREES)
 
     def test_the_command_of_the_page_shows_a_force(self):

@@ -73,16 +73,16 @@ class HardwareTest(unittest.TestCase):
             readings = dict(zip(self.published.name, self.published.velocity, strict=True))
             return {wheel: self.encoders[wheel].direction * readings[self.encoders[wheel].name] for wheel in goal}
 
-        def turn(wanted, timeout):
+        def turn(desired, timeout):
             wait_for(
-                lambda: all(abs(speeds()[wheel] - speed) < 0.05 for wheel, speed in wanted.items()),
+                lambda: all(abs(speeds()[wheel] - speed) < 0.05 for wheel, speed in desired.items()),
                 timeout,
                 lambda: f"wheels at their speeds, not at {speeds()}",
             )
 
         for factor in (1.0, 0.0):
-            wanted = {wheel: factor * speed for wheel, speed in goal.items()}
-            move(functools.partial(turn, wanted), joints=list(wanted), velocities=list(wanted.values()))
+            desired = {wheel: factor * speed for wheel, speed in goal.items()}
+            move(functools.partial(turn, desired), joints=list(desired), velocities=list(desired.values()))
 
 
 if __name__ == "__main__":

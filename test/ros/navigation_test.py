@@ -86,7 +86,7 @@ class NavigationTest(unittest.TestCase):
         self.assertAlmostEqual(across, 0.195 * math.sin(0.5), delta=0.01)
         self.assertEqual((turn, any(self.base.wheels), tuple(self.base.camber)), (0.0, False, (0.0,) * 4))
         self.assertEqual((self.base.newest.x, self.base.newest.y), (0.0, 0.0))
-        wait_for(lambda: self.base.progress.done, START, "the end, told")
+        wait_for(lambda: self.base.progress.done, START, "the end, published")
         self.assertEqual((self.base.progress.count, self.base.progress.left), (3, 0.0))
 
     @soak
@@ -98,7 +98,7 @@ class NavigationTest(unittest.TestCase):
             pause = rospy.ServiceProxy("navigation/pause", SetBool)
             self.assertTrue(pause(True).success)
             wait_for(lambda: self.base.velocity == (0.0, 0.0, 0.0), START, "a base at rest")
-            wait_for(lambda: self.base.progress.paused, START, "the pause, told")
+            wait_for(lambda: self.base.progress.paused, START, "the pause, published")
             here = self.base.pose[:2]
             rospy.sleep(0.5)
             self.assertEqual(self.base.pose[:2], here)

@@ -21,8 +21,8 @@ def step_of(stamp: rospy.Time) -> int:
     return round(stamp.to_sec() / STEP)
 
 
-class Wanted(NamedTuple):
-    """What a node wants of joints at a step: positions and velocities by name, as far as it sends them."""
+class Commanded(NamedTuple):
+    """What a node commands of joints at a step: positions and velocities by name, as far as it sends them."""
 
     step: int
     position: dict[str, float]
@@ -30,7 +30,7 @@ class Wanted(NamedTuple):
 
 
 class Recording:
-    """Subscribes to what a simulated robot measures and what plugins want.
+    """Subscribes to what a simulated robot measures and what plugins command.
 
     Args:
         topics: Topics of solfer/JointCommand.
@@ -43,7 +43,7 @@ class Recording:
         self.names: tuple[str, ...] = ()
         self._joints: dict[int, np.ndarray] = {}
         self._base: dict[int, np.ndarray] = {}
-        self._wanted: dict[tuple[str, str], list[Wanted]] = {}
+        self._commanded: dict[tuple[str, str], list[Commanded]] = {}
         self._subscribers = [
             rospy.Subscriber("/joint_states", JointState, self._receive_joints, queue_size=QUEUE, tcp_nodelay=True),
             rospy.Subscriber("/floating_base", Odometry, self._receive_base, queue_size=QUEUE, tcp_nodelay=True),
@@ -68,20 +68,20 @@ class Recording:
         for subscriber in self._subscribers:
             subscriber.unregister()
 
-    def wanted(self, topic: str, sender: str) -> list[Wanted]:
+    def commanded(self, topic: str, sender: str) -> list[Commanded]:
         """Return what a node has published on a topic so far."""
-        return list(self._wanted.get((topic, sender), ()))
+        return list(self._commanded.get((topic, sender), ()))
 
     def rests(self, topic: str, sender: str) -> bool:
         """Return whether the last two messages of a node are equal."""
-        wanted = self.wanted(topic, sender)
-        return len(wanted) > 1 and wanted[-1][1:] == wanted[-2][1:]
+        commanded = self.commanded(topic, sender)
+        return len(commanded) > 1 and commanded[-1][1:] == commanded[-2][1:]
 
     def begins(self, topic: str, sender: str) -> list[int]:
         """Find the steps at which the references of a node at rest began to move."""
-        wanted = self.wanted(topic, sender)
-        news = [one[1:] != other[1:] for one, other in zip(wanted, wanted[1:], strict=False)]
-        return [wanted[index + 1].step for index, new in enumerate(news) if new and not (index and news[index - 1])]
+        commanded = self.commanded(topic, sender)
+        news = [one[1:] != other[1:] for one, other in zip(commanded, commanded[1:], strict=False)]
+        return [commanded[index + 1].step for index, new in enumerate(news) if new and not (index and news[index - 1])]
 
     def position(self, joint: str, step: int) -> float:
         """Measured position of a joint [rad]."""
@@ -96,8 +96,8 @@ class Recording:
         self._base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
 
     def _receive_wanted(self, message: JointCommand, topic: str) -> None:
-        wanted = Wanted(
+        commanded = Commanded(
             step_of(message.header.stamp),
             *(dict(zip(message.name, values, strict=False)) for values in (message.position, message.velocity)),
         )
-        self._wanted.setdefault((topic, message._connection_header["callerid"]), []).append(wanted)
+        self._commanded.setdefault((topic, message._connection_header["callerid"]), []).append(commanded)

@@ -5,7 +5,7 @@ from solfer.components.joint_states import JointStates
 
 
 class Witness(JointStates):
-    """Tells in `events` how often it was started, reset and updated."""
+    """Publishes in `events` how often it was started, reset and updated."""
 
     def __init__(self, robot, tags=None, name=""):
         super().__init__(robot, tags, name)

@@ -104,8 +104,8 @@ class ResetsTest(unittest.TestCase):
         self.robot.settle()
         measured = self.robot.positions()
         names = rospy.wait_for_message(COMMANDS, JointCommand, START).name
-        for name, wanted in zip(names, after[0, 1:], strict=True):
-            self.assertLess(abs(measured[name] - wanted), SAG, name)
+        for name, expected in zip(names, after[0, 1:], strict=True):
+            self.assertLess(abs(measured[name] - expected), SAG, name)
         self.assertLess(max(map(abs, self.robot.speeds())), 0.05)
 
     @soak

@@ -99,7 +99,7 @@ class RivalsTest(unittest.TestCase):
             yield process
 
     def reports_why(self) -> bool:
-        """Return whether the plugin reports the topic and the senders of messages that it cannot tell apart."""
+        """Return whether the plugin reports the topic and the senders of messages that it cannot distinguish."""
         try:
             reply = ask(state="reset")
         except rospy.ServiceException:

@@ -2,7 +2,7 @@
 """A node with several plugins, its components; `<plugin>/switch` starts and stops one of them.
 
 Usage: several.py FILE NAME... The node is `limbs`. A plugin that fails is reported and closed, and the others go on.
-The service `count` tells, as JSON, what the process holds, and what its cycles cost.
+The service `count` returns, as JSON, what the process holds, and what its cycles cost.
 """
 
 import gc

@@ -114,7 +114,7 @@ class SharedLockstepTest(unittest.TestCase):
         self.assertEqual([name for name in LISTED if not states[name].startswith("RUNNING")], ["upper_body"], states)
 
     def state(self, name):
-        """State of a plugin, as it tells it."""
+        """State of a plugin, as it publishes it."""
         return rospy.ServiceProxy(f"/{name}/state", Trigger)().message
 
     def compare(self, expected, sent, last):

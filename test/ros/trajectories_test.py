@@ -58,9 +58,9 @@ class TrajectoriesTest(unittest.TestCase):
         self.send(to(*(at[name] for name in NECK), 0.1))
         return self.theirs.wait_for_result(rospy.Duration(5.0)) and self.theirs.get_state() == GoalStatus.SUCCEEDED
 
-    def send(self, wanted, **tolerances):
+    def send(self, trajectory, **tolerances):
         """Send a goal by actionlib's client."""
-        goal = FollowJointTrajectoryGoal(trajectory=wanted, **tolerances)
+        goal = FollowJointTrajectoryGoal(trajectory=trajectory, **tolerances)
         self.theirs.send_goal(goal, feedback_cb=self.feedback.append)
 
     def moves(self):
@@ -73,7 +73,7 @@ class TrajectoriesTest(unittest.TestCase):
         self.assertTrue(self.theirs.wait_for_result(rospy.Duration(START)))
         self.assertEqual(self.theirs.get_state(), state, self.theirs.get_goal_status_text())
 
-    def tells(self, ours, state):
+    def await_state(self, ours, state):
         """Check what our client prints next."""
         self.assertEqual(ours.stdout.readline().strip(), state)
 
@@ -88,11 +88,11 @@ class TrajectoriesTest(unittest.TestCase):
     @soak
     def test_a_goal_of_a_killed_plugin_is_lost(self):
         with self.plugin() as process, started(*OURS) as ours:
-            self.tells(ours, "ACTIVE")
+            self.await_state(ours, "ACTIVE")
             process.kill()
             process.wait()
             with self.plugin() as again:
-                self.tells(ours, "LOST")
+                self.await_state(ours, "LOST")
                 self.assertEqual(end(again, signal.SIGINT)[0], 0)
 
     def succeeds(self):
@@ -128,9 +128,9 @@ class TrajectoriesTest(unittest.TestCase):
         """Take over from our client; the switch aborts the goal, and others are refused until it is on again."""
         switch = rospy.ServiceProxy("/joint_states/switch", SetBool)
         with started(*OURS) as ours:
-            self.tells(ours, "ACTIVE")
+            self.await_state(ours, "ACTIVE")
             self.send(to(0.3, 0.2, 30.0))
-            self.tells(ours, "PREEMPTED")
+            self.await_state(ours, "PREEMPTED")
         self.moves()
         self.assertTrue(switch(False).success)
         self.becomes(GoalStatus.ABORTED)

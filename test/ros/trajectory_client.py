@@ -35,12 +35,12 @@ def main(argv: list[str]) -> int:
         name = "joint_states/follow_joint_trajectory"
         types = (messages.FollowGoal, messages.FollowFeedback)
         client = ActionClient(middleware, name, messages.FOLLOW, *types, result=messages.FollowResult)
-        sent, told = taken(client), None
+        sent, printed = taken(client), None
         while middleware.running():
             client.poll()
-            if sent.status is not told and (sent.feedback is not None or sent.status.ended):
-                told = sent.status
-                print(told.name, flush=True)
+            if sent.status is not printed and (sent.feedback is not None or sent.status.ended):
+                printed = sent.status
+                print(printed.name, flush=True)
             if sent.status.ended:
                 break
             time.sleep(0.01)

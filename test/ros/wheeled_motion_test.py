@@ -85,15 +85,15 @@ class WheeledMotionTest(unittest.TestCase):
 
     @soak
     def test_vertices_of_a_wrong_number_are_refused(self):
-        told = []
-        rospy.Subscriber("/rosout", Log, lambda message: told.append(message.msg), queue_size=100)
+        texts = []
+        rospy.Subscriber("/rosout", Log, lambda message: texts.append(message.msg), queue_size=100)
         before = self.base()
         support = rospy.Publisher("/wheeled_motion/wheels_support", WheelsSupport, queue_size=1)
-        wanted = "/wheeled_motion/wheels_support: a message of /driving"
+        expected = "/wheeled_motion/wheels_support: a message of /driving"
 
         def refusal():
             support.publish(WheelsSupport(velocity=[0.1, 0.2]))
-            return next((each for each in list(told) if wanted in each), "")
+            return next((each for each in list(texts) if expected in each), "")
 
         wait_for(lambda: bool(refusal()), START, "a refusal")
         self.assertIn("velocity: 2 numbers; expected: 12", refusal())

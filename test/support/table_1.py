@@ -105,7 +105,7 @@ class System(abc.ABC):
         """Check that an arm gives way as stiffness and spring say, and only where stiffness is commanded."""
         self.run(self.ask(joints=tuple(ARM), positions=tuple(ARM.values())) + 1.0)
         before = [self.joint(joint)[0] for joint in ARM if joint != ELBOW]
-        own = self.spring.robot.command["stiffness"][self.spring.robot.dof(ELBOW)]  # as the lower level told it
+        own = self.spring.robot.command["stiffness"][self.spring.robot.dof(ELBOW)]  # as the lower level reports it
         soft, hard = self.sag(ELBOW, 300.0), self.sag(ELBOW, 600.0)
         after = [self.joint(joint)[0] for joint in ARM if joint != ELBOW]
         held = self.sag(ELBOW, own)

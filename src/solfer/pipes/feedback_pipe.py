@@ -9,9 +9,9 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError, SolferError, UnknownName, Unrelated
 from solfer.pipes.pipe_warnings import PipeWarnings
 from solfer.pipes.precedence import Watch
+from solfer.transport.clocks.sender_clock import SenderClock
 from solfer.transport.endpoints import NEW, OLD, PUBLISHER_TIMEOUT, MessageStatus, Reader
 from solfer.transport.messages import Message
-from solfer.transport.sender_clock import SenderClock
 
 logger = logging.getLogger(__name__)
 

@@ -5,9 +5,9 @@ from solfer.plugins.generation.generator import Generator, generate
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.together import Members, budget_of, generate_shared
 from solfer.plugins.life.plugin_set import PluginSet
-from solfer.plugins.loop import LoopStatistics, run
 from solfer.plugins.plugin import Plugin, PluginParts
 from solfer.plugins.sharing.robots import Sharing
+from solfer.plugins.timing.loop import LoopStatistics, run
 from solfer.plugins.trace import CycleTrace, TraceEvent, TraceLog
 from solfer.transport.plugin_state import PluginState
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from solfer.components import Component
 from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.measured_guard import MeasuredGuard
-from solfer.plugins.robot_time import RobotTime
+from solfer.plugins.timing.robot_time import RobotTime
 from solfer.recording.log import Logger
 
 

@@ -10,16 +10,16 @@ from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.component_cycle import ComponentCycle
-from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.outputs import Outputs
-from solfer.plugins.overload import Overload
 from solfer.plugins.peers import Peers
 from solfer.plugins.readiness import FORGET, HOLD, WORK, CycleVerdict, Readiness
 from solfer.plugins.requests import RequestNotes
-from solfer.plugins.robot_time import RobotTime
+from solfer.plugins.timing.cycle_timing import NO_TIMES, CycleTiming, Stage
+from solfer.plugins.timing.overload import Overload
+from solfer.plugins.timing.robot_time import RobotTime
 from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET

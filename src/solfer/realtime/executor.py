@@ -9,12 +9,12 @@ import numpy as np
 
 from solfer.errors import MiddlewareError
 from solfer.interfaces.declaration import Service
-from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.life.budget import BudgetRules, LeakyCounter
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.plugin_set import NOTHING, PluginSet
 from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
+from solfer.plugins.timing.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import Interruptions
 from solfer.telemetry.black_box import BlackBox

@@ -12,7 +12,7 @@ from solfer.plugins.generation.generator import Generator
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.plugin import Plugin
-from solfer.plugins.robot_time import RobotTime
+from solfer.plugins.timing.robot_time import RobotTime
 from solfer.replay.feedback import RecordedFeedbackPipe
 from solfer.replay.rows import RecordedRows
 from solfer.robot import Robot

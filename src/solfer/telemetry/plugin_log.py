@@ -12,8 +12,8 @@ from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.pipes.sharing.cached_feedback import CachedFeedbackPipe
-from solfer.plugins.cycle_timing import STAGES
 from solfer.plugins.plugin import Plugin
+from solfer.plugins.timing.cycle_timing import STAGES
 from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
 from solfer.recording.log import Logger, LogSource, with_units
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND

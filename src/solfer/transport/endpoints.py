@@ -6,8 +6,8 @@ import math
 from collections.abc import Container, Sequence
 from typing import Any
 
+from solfer.transport.clocks.sender_clock import SenderClock
 from solfer.transport.messages import Message
-from solfer.transport.sender_clock import SenderClock
 
 
 class MessageStatus(enum.IntEnum):

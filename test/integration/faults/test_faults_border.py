@@ -21,7 +21,7 @@ PERIOD = 0.005
 """Time from one message of the peer to the next, and from one turn of the bridge to the next [s]."""
 
 LARGEST_STEP = 1.001 * SPEED * PERIOD
-"""What the peer wants from one message to the next [rad]."""
+"""What the peer's command changes from one message to the next [rad]."""
 
 SILENT = 0.2 + 2 * PERIOD
 """Time without a message that fits until it counts: the pipe's own, and the bridge's [s]."""

@@ -46,14 +46,14 @@ def start(robot, file):
     return robot.start(NODE, str(file), "--namespace", robot.name)
 
 
-def reaches(robot, process, wanted=PluginState.RUNNING):
+def reaches(robot, process, expected=PluginState.RUNNING):
     """Wait until the plugin of a node is in a stage of its life."""
 
     def there():
         assert process.poll() is None, process.stdout.read()
-        return robot.state() is wanted
+        return robot.state() is expected
 
-    until(there, f"a plugin that is {wanted.name}")
+    until(there, f"a plugin that is {expected.name}")
 
 
 def turning(robot):
@@ -132,14 +132,14 @@ reader = node.reader("joint_states", "sensor_msgs/JointState")
 while not reader.read():
     time.sleep(0.01)
 published = reader.message
-wanted = JointMessage.empty(published.names, ("position", "velocity"))
-wanted.position[:] = published.position
+command = JointMessage.empty(published.names, ("position", "velocity"))
+command.position[:] = published.position
 for wheel in {wheels!r}:
-    wanted.velocity[published.names.index(wheel)] = {speed}
+    command.velocity[published.names.index(wheel)] = {speed}
 writers = [node.writer(topic, "solfer/JointCommand") for topic in ("upper_body", "lower_body")]
 while True:
     for writer in writers:
-        writer.write(wanted)
+        writer.write(command)
     time.sleep(0.005)
 """
 """A process outside the layer that publishes references of the joints, and turns the wheels."""

@@ -110,8 +110,8 @@ def test_the_version_is_that_of_the_catkin_package(environment, repository):
 def test_all_that_ships_is_installed_once(config, repository):
     """Programs that once made a robot's files stay behind."""
     shipped = {path.relative_to(repository / "config") for path in (repository / "config").rglob("*") if path.is_file()}
-    wanted = {path for path in shipped if path.suffix not in (".py", ".pyc")}
-    assert wanted == {path.relative_to(config) for path in config.rglob("*") if path.is_file()}
+    expected = {path for path in shipped if path.suffix not in (".py", ".pyc")}
+    assert expected == {path.relative_to(config) for path in config.rglob("*") if path.is_file()}
 
 
 def test_a_shipped_configuration_is_checked(environment, config):

@@ -1,4 +1,4 @@
-"""The demonstration of Fig. 5 on the virtual clock: it drives, and its table tells what truly happened."""
+"""The demonstration of Fig. 5 on the virtual clock: it drives, and its table has what truly happened."""
 
 import re
 from contextlib import closing
@@ -63,7 +63,7 @@ class Log:
 @pytest.mark.soak
 def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     """Each row of its table agrees with the simulator's own state: way, heading, errors, slip, ground forces."""
-    course, told = tmp_path / "course.yaml", []
+    course, reports = tmp_path / "course.yaml", []
     course.write_text(COURSE)
     node, log = MemoryMiddleware(world.bus, "demo"), Log(world, "locomotion", "hands")
     recorder = DrivingRecorder(node)
@@ -71,8 +71,10 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     world.run(3.0)
     waited = driving.wait_for_robot(node, recorder, 0.0, lambda: None)
     shown = driving.Driving(node, recorder, waited.robot, waited.legs, course)
-    assert shown.run(Told(told)) == 0
-    assert told[-1][1] == told[-1][2] > 2.0 and "waits for the topics of others" in {title for title, *_ in told}
+    assert shown.run(KeptProgress(reports)) == 0
+    assert reports[-1][1] == reports[-1][2] > 2.0 and "waits for the topics of others" in {
+        title for title, *_ in reports
+    }
     seen = driving_report.see(shown.robot, shown.legs, recorder)
     places = driving_report.tracked(recorder, seen, log.recording())
     rows = dict(driving_report.table(shown.robot, recorder, seen, places, {}))
@@ -90,15 +92,15 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     assert path.read_bytes().startswith(b"GIF89a") and path.stat().st_size > 3000
 
 
-class Told(centauro.Progress):
+class KeptProgress(centauro.Progress):
     """Keeps what is shown."""
 
-    def __init__(self, told):
+    def __init__(self, reports):
         super().__init__()
-        self._told = told
+        self._reports = reports
 
     def __call__(self, *shown):
-        self._told.append(shown)
+        self._reports.append(shown)
 
 
 def test_a_slow_machine_is_told():

@@ -60,8 +60,8 @@ def test_one_tag_chooses_the_state_that_is_carried(state, tmp_path):
     """The same commands to the last digits in memory and in shared memory."""
     file = write_offline(tmp_path) if state == "offline" else CONFIG / "centauro.yaml"
     for plugin in in_both(("desired_joints",), "gravity_compensation", file, tmp_path):
-        state_, wanted = plugin.robot.state.position[6:], plugin.robot.command.position[6:]
-        assert np.array_equal(state_, wanted) == (state == "offline")
+        state_, desired = plugin.robot.state.position[6:], plugin.robot.command.position[6:]
+        assert np.array_equal(state_, desired) == (state == "offline")
 
 
 @pytest.mark.soak

@@ -28,8 +28,8 @@ def test_it_drives_while_the_hands_wave(tmp_path):
             rows.append((base[:2], hands, waving.desired["left"].copy()))
 
         world.play(read_scenario(file), look)
-        base, hands, wanted = (np.array(each) for each in zip(*rows, strict=True))
-        assert np.ptp(wanted, axis=0)[2] > 0.25  # they wave
+        base, hands, desired = (np.array(each) for each in zip(*rows, strict=True))
+        assert np.ptp(desired, axis=0)[2] > 0.25  # they wave
         assert world.center_of_legs()[0] - begin[0] == pytest.approx(0.3, abs=0.01)
         assert np.linalg.norm(base, axis=1).max() < 0.01 and np.linalg.norm(hands, axis=2).max() < 0.03  # soft springs
         assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}

@@ -39,7 +39,7 @@ CYCLE = [
     "full_compensation publishes position_controller",
     "full_compensation publishes velocity_controller",
 ]
-"""What section 2.3 of the paper tells of an update, in its order: kinematics of the legs, the estimate that is written
+"""What section 2.3 of the paper says of an update, in its order: kinematics of the legs, the estimate that is written
 there, kinematics and dynamics of the whole robot, kinematics of the legs anew, and nothing of the whole robot any more.
 A measurement of the joints waits for the sample of the IMU after it: a cycle may have none, and the next one two of
 them. At 500 Hz most cycles have none, and their first kinematics are missing."""
@@ -116,8 +116,8 @@ def test_it_drives_while_the_hands_wave(world, tmp_path):
         rows.append((base, vertices, hands, world.center_of_mass() - center, waving.desired["left"].copy()))
 
     world.play(read_scenario(file), look)
-    base, vertices, hands, away, wanted = (np.array(each) for each in zip(*rows, strict=True))
-    assert np.ptp(wanted, axis=0)[2] > 0.25  # they wave
+    base, vertices, hands, away, desired = (np.array(each) for each in zip(*rows, strict=True))
+    assert np.ptp(desired, axis=0)[2] > 0.25  # they wave
     assert world.center_of_legs()[0] - begin[0] == pytest.approx(0.2955, abs=0.003)  # as the file, 1 % of its way
     assert (np.abs(world.footprint() - footprint)[:, 1] > 0.01).all()
     assert np.linalg.norm(base, axis=1).max() < 4e-3

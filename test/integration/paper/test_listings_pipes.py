@@ -75,7 +75,7 @@ def listed(repository, tmp_path):
     return write
 
 
-def tell(plugin, start):
+def send(plugin, start):
     """Write a posture into the desired State."""
     plugin.robot.command.position[:] = np.linspace(start, start + 1.0, plugin.robot.size)
     return plugin.robot.command.position
@@ -87,9 +87,9 @@ def test_listing_8_crosses_outwards(listed, tmp_path):
     world = BridgedWorld(tmp_path, [load(file, "inside", middleware="XBOT")])
     inside, outside = world.plugin("inside", file), world.outside("outside", file)
     for start in (0.0, 0.3):
-        wanted = tell(inside, start)
+        sent = send(inside, start)
         world.run(0.2)
-        assert_allclose(outside.robot.state.position, wanted)
+        assert_allclose(outside.robot.state.position, sent)
     assert world.bridge.crossings["desired_state"].refused == 0
     measured = [world.simulation.q[inside.robot.dof(inside.robot.dofs[dof])] for dof in inside.robot.actuated]
     assert_allclose(inside.robot.state.position[inside.robot.actuated], measured, atol=1e-3)
@@ -101,9 +101,9 @@ def test_listing_8_crosses_inwards(listed, tmp_path):
     world = BridgedWorld(tmp_path, [load(file, "inside", middleware="XBOT")])
     inside, outside = world.plugin("inside", file), world.outside("outside", file)
     for start in (0.0, 0.3):
-        wanted = tell(outside, start)
+        sent = send(outside, start)
         world.run(0.2)
-        assert_allclose(inside.robot.state.position[:6], wanted[:6])
+        assert_allclose(inside.robot.state.position[:6], sent[:6])
     assert world.bridge.crossings["desired_state"].refused == 0
     world.close()
 

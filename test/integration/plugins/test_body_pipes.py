@@ -27,7 +27,7 @@ IMU = {
     "convention": {"position": {"type": "NONE"}},
     "initialize": True,
 }
-TOLD = {
+PUBLISHED = {
     "space": "OPERATIONAL",
     "type": "reference",
     "function": "state",
@@ -114,9 +114,9 @@ def test_a_wrong_convention_is_another_base(world, tmp_path, orientation):
 
 
 def test_a_published_body_gives_another_robots_base(world, tmp_path):
-    received = {key: value for key, value in TOLD.items() if key not in ("type", "sink")} | {"source": "hand"}
+    received = {key: value for key, value in PUBLISHED.items() if key not in ("type", "sink")} | {"source": "hand"}
     (tmp_path / "listener").mkdir()
-    published = world.plugin("test", pipes(tmp_path, BASE, TOLD))
+    published = world.plugin("test", pipes(tmp_path, BASE, PUBLISHED))
     world.run(0.1)
     plugin, (q, v) = moved(world, pipes(tmp_path / "listener", received), "listener")
     hand, pelvis = published.robot.kinematics.position("arm1_7"), published.robot.kinematics.position("pelvis")
@@ -169,7 +169,7 @@ def test_mistakes_name_their_place(world, tmp_path, changes, error, match):
     ],
 )
 def test_mistakes_of_published_bodies_have_a_place(world, tmp_path, changes, match):
-    path = pipes(tmp_path, None, TOLD, **changes)
+    path = pipes(tmp_path, None, PUBLISHED, **changes)
     with pytest.raises(SolferError, match=match) as caught:
         world.plugin("test", path)
     assert caught.value.where.startswith(str(path))

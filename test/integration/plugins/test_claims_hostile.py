@@ -42,7 +42,7 @@ def test_ten_thousand_random_messages(world):
     """
     rng, simulation = np.random.default_rng(11), world.simulation
     lower_level, kinematics = simulation.lower_level, simulation.kinematics
-    # that joints swing wildly is what is wanted here: it would hold, and refuse everything from then on
+    # that joints swing wildly is the purpose here: it would hold, and refuse everything from then on
     lower_level.safeguard = Safeguard(kinematics, LowerLevelRecord(tilt=0.0, overspeed=0.0))
     nodes = [MemoryMiddleware(world.bus, f"hostile_{number}") for number in range(3)]
     writers = [

@@ -44,4 +44,4 @@ def test_a_wheel_is_lifted_and_put_down():
         world.run(1.0)
         assert abs(now.position("wheel_1")[2] - height) < 4e-3  # without forces it does not feel the ground
         assert set(world.simulation.contact_links()) <= set(WHEELS)
-        np.testing.assert_allclose(now.position("pelvis"), place, atol=0.02)  # as exactly as odometry tells it
+        np.testing.assert_allclose(now.position("pelvis"), place, atol=0.02)  # as exactly as odometry estimates it

@@ -42,13 +42,13 @@ def test_a_hand_stays_where_it_was_pushed(tmp_path):
 
 
 def held(*plugins):
-    """Hold CENTAURO where it stands by plugins; how far its arms are from where they are wanted, in the end [rad]."""
+    """Hold CENTAURO where it stands by plugins; return how far its arms are from their commands in the end [rad]."""
     with contextlib.closing(World()) as world:
-        wanted, *_ = [world.plugin(name) for name in plugins]
+        commanding, *_ = [world.plugin(name) for name in plugins]
         world.run(1.6)
-        arms = np.array([name.startswith("j_arm") for name in wanted.robot.dofs])
+        arms = np.array([name.startswith("j_arm") for name in commanding.robot.dofs])
         assert np.abs(world.simulation.torque[arms]).max() > 10.0
-        return np.linalg.norm((world.simulation.q - wanted.robot.command.position)[arms])
+        return np.linalg.norm((world.simulation.q - commanding.robot.command.position)[arms])
 
 
 @pytest.mark.soak

@@ -30,15 +30,15 @@ def test_lifts_and_a_push_are_seen():
             goal = legs.reach(3, lean + (0.0, 0.0, height))
             made.run(made.move(joints=legs.joints[2], positions=goal, speed=0.4) + 0.5)
         pushes = forces.push(made, 1, np.random.default_rng(11))
-        told = forces.figures(made, begin, pushes)
-        assert told["changes"] >= 2 and told["contact_right"] > 99.5
-        assert told["wheel_rms"] < 2.0 and told["sum_rms"] < 2.0
-        assert told["push_error_worst"] < 20.0 and told["push_20ms_least"] > 20.0
+        figures = forces.figures(made, begin, pushes)
+        assert figures["changes"] >= 2 and figures["contact_right"] > 99.5
+        assert figures["wheel_rms"] < 2.0 and figures["sum_rms"] < 2.0
+        assert figures["push_error_worst"] < 20.0 and figures["push_20ms_least"] > 20.0
         component, true = made.forces.component, made.simulation.sensors["joints"]._offset
-        names, told = made.simulation.state.joints, component.law.offsets.value
+        names, offsets = made.simulation.state.joints, component.law.offsets.value
         lifted = [names.index(f"{joint}_3") for joint in ("hip_yaw", "hip_pitch", "knee_pitch", "ankle_pitch")]
         dofs = [component.model.dof(names[index]) for index in lifted]
-        np.testing.assert_allclose(told[dofs], true[lifted], atol=0.6)
+        np.testing.assert_allclose(offsets[dofs], true[lifted], atol=0.6)
 
 
 def test_commanded_efforts_make_gravity_forces():

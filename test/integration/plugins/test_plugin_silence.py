@@ -14,7 +14,7 @@ MEASURED, RELAYED = "joint_states", "relayed_states"
 
 
 class Relay:
-    """Tells joint states on another topic, until it does not; the robot itself goes on."""
+    """Publishes joint states on another topic, until it does not; the robot itself goes on."""
 
     def __init__(self, world):
         middleware = MemoryMiddleware(world.bus, "relay")

@@ -14,7 +14,7 @@ SPEED, TURN = 0.2, 0.3  # [m/s], [rad/s]
 
 
 class Driven(World):
-    """A `World` whose robot is told where to go."""
+    """A `World` whose robot receives where to go."""
 
     def __init__(self):
         super().__init__()
@@ -62,10 +62,10 @@ def test_it_goes_where_it_is_driven(driven, motion):
     heading = driven.driver.component.references.heading
     driven.drive(1.0, **motion)
     way, references = driven.pose() - before, driven.driver.component.references
-    wanted = references.position - position
-    np.testing.assert_allclose(way[:2], wanted[:2], atol=5e-3)
+    desired = references.position - position
+    np.testing.assert_allclose(way[:2], desired[:2], atol=5e-3)
     assert abs(way[3] - (references.heading - heading)) < 5e-3 and abs(way[2]) < 5e-3
-    gone = max(np.linalg.norm(wanted[:2]), abs(references.heading - heading))
+    gone = max(np.linalg.norm(desired[:2]), abs(references.heading - heading))
     assert gone > 0.15  # a part of the time goes into turning the wheels
     assert np.linalg.norm(driven.footprint() - standing, axis=1).max() < 8e-3
     assert set(driven.simulation.contact_links()) == {f"wheel_{leg}" for leg in (1, 2, 3, 4)}

@@ -12,7 +12,7 @@ from solfer.config import load
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
-from solfer.plugins.cycle_timing import STAGES
+from solfer.plugins.timing.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.recording.reader import read
@@ -101,9 +101,9 @@ def test_each_cycle_is_recorded_whole(world, executor, plugin, tmp_path):
     measured = found[f"{PLUGIN}/measured/position"].values[stages == PluginState.RUNNING][:, joints]
     assert all(row.tobytes() in known for row in measured) and np.ptp(measured, axis=0).max() > 0.3
     wheels = [dofs.index(name) for name in WHEELS]
-    wanted = found[f"{PLUGIN}/wanted/velocity"].values[:, wheels]
-    np.testing.assert_array_equal(wanted[stages == PluginState.RUNNING][-1], SPEED)
-    np.testing.assert_array_equal(wanted[-1], 0.0)  # it holds
+    desired = found[f"{PLUGIN}/wanted/velocity"].values[:, wheels]
+    np.testing.assert_array_equal(desired[stages == PluginState.RUNNING][-1], SPEED)
+    np.testing.assert_array_equal(desired[-1], 0.0)  # it holds
     assert [(each.plugin, each.kind) for each in found.events] == [
         (PLUGIN, "initialized"),
         (PLUGIN, "start"),
@@ -128,9 +128,9 @@ def check_the_rest(found, running):
     np.testing.assert_array_equal(position.values[running], measured[running])
     assert (found[f"{pipe}/age"].values[running] <= 0.01).all() and set(position.units) == {"rad"}
     assert found[f"{PLUGIN}/gate"].columns[0] == "position_controller not finite"
-    ramp, wanted = found[f"{PLUGIN}/log/ramp/position"], found[f"{PLUGIN}/wanted/position"]
-    inner = [wanted.columns.index(name) for name in ramp.columns]
-    np.testing.assert_array_equal(ramp.values[running], wanted.values[running][:, inner])
+    ramp, desired = found[f"{PLUGIN}/log/ramp/position"], found[f"{PLUGIN}/wanted/position"]
+    inner = [desired.columns.index(name) for name in ramp.columns]
+    np.testing.assert_array_equal(ramp.values[running], desired.values[running][:, inner])
     assert found[f"{PLUGIN}/timing"].columns == STAGES
     assert set(found.attachments) == {f"{PLUGIN}/{name}" for name in ("configuration.yaml", "robot.urdf", "robot.srdf")}
     assert b"position_controller" in found.attachments[f"{PLUGIN}/configuration.yaml"]

@@ -79,7 +79,7 @@ def test_a_start_blends_in_from_the_measured_state(layer, world):
 
     def init():
         original()
-        plugin.component._position[:] += 0.3  # a component that wants to be elsewhere at once
+        plugin.component._position[:] += 0.3  # a component that commands a jump
 
     plugin.component.init = init
     assert world.ask("joint_states/switch", data=True).success

@@ -81,9 +81,9 @@ def check(found: Recording) -> np.ndarray:
     sent = found["joint_states/command/velocity_controller/velocity"]
     assert sent.columns == WHEELS
     wheels = [found["joint_states/measured/velocity"].columns.index(wheel) for wheel in WHEELS]
-    wanted, measured = (found[f"joint_states/{state}/velocity"].values[:, wheels] for state in ("wanted", "measured"))
+    desired, measured = (found[f"joint_states/{state}/velocity"].values[:, wheels] for state in ("wanted", "measured"))
     running = found["loop/states"].column("joint_states") == PluginState.RUNNING
-    np.testing.assert_array_equal(sent.values[running], wanted[running])
+    np.testing.assert_array_equal(sent.values[running], desired[running])
     return measured[running & (sent.values > SPEED / 2).all(axis=1)]
 
 

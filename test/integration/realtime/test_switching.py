@@ -12,7 +12,7 @@ def test_random_switches_leave_nothing(tmp_path):
     first = layer.held()
     layer.switch_at_random(SWITCHES)
     assert layer.held() == first and first["leases"] == 0
-    assert layer.refused > SWITCHES // 10  # two that want the same
+    assert layer.refused > SWITCHES // 10  # two that claim the same
     assert all(managed.starts > SWITCHES // 10 and not managed.aborts for managed in layer.executor.plugins)
     assert not layer.world.simulation.lower_level.refusals
     layer.close()

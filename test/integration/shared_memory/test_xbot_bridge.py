@@ -15,7 +15,7 @@ from solfer.transport.endpoints import MessageStatus
 from solfer.transport.inbox import Inbox
 from solfer.transport.messages import ROBOT_POINTS, BodyMessage, JointMessage, PointsMessage
 
-INWARDS = [Route("wanted", "solfer/JointCommand"), Route("goals", ROBOT_POINTS)]
+INWARDS = [Route("commands", "solfer/JointCommand"), Route("goals", ROBOT_POINTS)]
 
 
 class Layer:
@@ -45,8 +45,8 @@ def layer(tmp_path):
 
 
 def test_joints_and_points_go_in(layer):
-    joints, points = layer.rt.reader("wanted", "solfer/JointCommand"), layer.rt.reader("goals", ROBOT_POINTS)
-    layer.nrt.writer("wanted", "solfer/JointCommand").write(JointMessage(("a", "b"), position=np.array([1.0, 2.0])))
+    joints, points = layer.rt.reader("commands", "solfer/JointCommand"), layer.rt.reader("goals", ROBOT_POINTS)
+    layer.nrt.writer("commands", "solfer/JointCommand").write(JointMessage(("a", "b"), position=np.array([1.0, 2.0])))
     layer.nrt.writer("goals", ROBOT_POINTS).write(PointsMessage("world", ("hand",), np.array([[1.0, 2.0, 3.0]])))
     layer.turn()
     assert joints.read() is MessageStatus.NEW and points.read() is MessageStatus.NEW
@@ -56,7 +56,7 @@ def test_joints_and_points_go_in(layer):
 
 def test_a_later_body_is_forwarded_without_a_circle(layer):
     received = layer.nrt.reader("hand", "nav_msgs/Odometry")
-    layer.nrt.writer("wanted", "solfer/JointCommand").write(JointMessage(("a",), position=np.array([1.0])))
+    layer.nrt.writer("commands", "solfer/JointCommand").write(JointMessage(("a",), position=np.array([1.0])))
     layer.turn()
     writer = layer.rt.writer("hand", "nav_msgs/Odometry")
     layer.turn(1.0)
@@ -64,17 +64,17 @@ def test_a_later_body_is_forwarded_without_a_circle(layer):
     layer.turn()
     assert received.read() is MessageStatus.NEW
     assert received.message.position.tolist() == [1.0, 2.0, 3.0]
-    assert layer.bridge.crossings["wanted"].passed == 1
+    assert layer.bridge.crossings["commands"].passed == 1
     layer.turn(1.0)
-    assert layer.bridge.crossings["wanted"].passed == 1
+    assert layer.bridge.crossings["commands"].passed == 1
 
 
 def test_known_topics_and_services_are_left_out(layer):
     layer.rt.writer("hand", "nav_msgs/Odometry").write(BodyMessage("world", "arm1_7"))
     layer.rt.serve("arm", [Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, Reply)], Inbox().submit)
-    assert {each.topic for each in published_topics(layer.namespace)} == {"hand", "goals", "wanted"}
+    assert {each.topic for each in published_topics(layer.namespace)} == {"hand", "goals", "commands"}
     assert [each.name for each in services(layer.namespace)] == ["arm/trajectory"]
-    assert [each.topic for each in published_topics(layer.namespace, {"hand", "goals"})] == ["wanted"]
+    assert [each.topic for each in published_topics(layer.namespace, {"hand", "goals"})] == ["commands"]
     assert not services(layer.namespace, {"arm/trajectory"})
 
 

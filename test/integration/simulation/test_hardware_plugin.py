@@ -86,11 +86,11 @@ def test_system_alone_moves_plugins_to_hardware(make, tmp_path, system, middlewa
     world.run(reply.duration + 1.0)
     goal = robot.semantics.states["mammal_wide_high"]
     joints = [joint for joint in goal if joint not in WHEELS]
-    wanted = np.array([goal[joint] for joint in joints])
+    desired = np.array([goal[joint] for joint in joints])
     assert len(joints) == 35
-    np.testing.assert_allclose(target(world, joints), wanted, atol=1e-9)
+    np.testing.assert_allclose(target(world, joints), desired, atol=1e-9)
     give = np.array([LOADED if joint.startswith(("hip", "knee", "ankle")) else UNLOADED for joint in joints])
-    assert (np.abs(physical(world, robot, joints) - wanted) < give).all()
+    assert (np.abs(physical(world, robot, joints) - desired) < give).all()
     assert len(world.simulation.contact_links()) == 4
 
     single = {"torso_yaw": 0.3, "j_arm1_1": 0.2, "j_arm2_1": 0.1, "neck_yaw": -0.4}
@@ -130,15 +130,15 @@ def test_another_calibration_leads_to_another_posture(make, tmp_path):
     world.run(reply.duration + 1.0)
     goal = plugin.robot.semantics.states["mammal_wide_high"]
     joints = [joint for joint in goal if joint not in WHEELS]
-    wanted = np.array([goal[joint] for joint in joints])
+    desired = np.array([goal[joint] for joint in joints])
     entries = load(file, "joint_states").calibrations["encoders"].joints
     signs = np.array([entries[joint].sign for joint in joints])
     places = np.array([list(entries).index(joint) for joint in joints])
     # h = s q + o', and really q = s (h - o): every drive holds s (o' - o) beside the goal
-    wrong = target(world, joints) - wanted
+    wrong = target(world, joints) - desired
     np.testing.assert_allclose(wrong, signs * SHIFT * (-1.0) ** places, atol=1e-9)
     torso = joints.index("torso_yaw")
-    reached = physical(world, plugin.robot, joints)[torso] - wanted[torso]
+    reached = physical(world, plugin.robot, joints)[torso] - desired[torso]
     assert reached == pytest.approx(wrong[torso], abs=0.01) and abs(reached) > SHIFT - 0.01
 
 
@@ -163,7 +163,7 @@ def test_a_part_uses_only_its_calibration(make, tmp_path):
 
 
 def test_wrong_zeros_keep_plugins_from_starting(make, tmp_path):
-    """Where an encoder tells the knee at 5 rad, no plugin starts: neither alone nor in a real-time layer."""
+    """Where an encoder measures the knee at 5 rad, no plugin starts: neither alone nor in a real-time layer."""
     world = make("HW")
     before = world.simulation.q.copy()
 

@@ -175,11 +175,11 @@ def test_an_arm_in_the_ground_is_told(tmp_path, caplog):
     """The rod hangs from z = 0 into the ground."""
     urdf = tmp_path / "rod.urdf"
     shape = '<collision><origin xyz="0 0 {z}"/><geometry><box size="0.1 0.1 0.4"/></geometry></collision>'
-    for z, told in ((-0.05, True), (0.3, False)):
+    for z, warns in ((-0.05, True), (0.3, False)):
         text = BODY.format(inertial="", inertia=f"{SOUND}</inertial>{shape.format(z=z)}")
         urdf.write_text(text.replace("</collision></inertial>", "</collision>"))
         caplog.clear()
         run(Simulation.from_file(bundle(tmp_path, "rod.urdf")), 0)
         assert [text.startswith("link 'arm' begins 0.250 m inside of the world") for text in caplog.messages] == (
-            [True] if told else []
+            [True] if warns else []
         )

@@ -1,4 +1,4 @@
-"""CENTAURO that is carried by its torques, with what it may hold, and arms where a test wants them."""
+"""CENTAURO that is carried by its torques, with what it may hold, and arms where a test puts them."""
 
 import re
 import tempfile

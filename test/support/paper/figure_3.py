@@ -1,4 +1,4 @@
-"""Fig. 3 of the paper on what is wanted instead of on what is measured."""
+"""Fig. 3 of the paper on the desired State instead of the measured one."""
 
 from pathlib import Path
 

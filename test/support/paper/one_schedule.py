@@ -67,7 +67,7 @@ def with_filters_of_nodes(folder: Path) -> Path:
 
 
 class Outside:
-    """Navigation on the course of the demonstration, and who tells the hands where to go, in one loop.
+    """Navigation on the course of the demonstration, and what moves the hands, in one loop.
 
     Args:
         middleware: Carries all of it.

@@ -15,7 +15,7 @@ PARTS = {"springs": ["position_controller"], "drives": ["velocity_controller"], 
 
 
 def parts(folder):
-    """Write a configuration with all PARTS, which want what `joint_states` wants otherwise."""
+    """Write a configuration with all PARTS, which command what `joint_states` commands otherwise."""
     path = configuration(folder, **{"class": CLASS})
     tree = yaml.safe_load(path.read_text())
     modules = tree["mwoibn"]["modules"]

@@ -93,7 +93,7 @@ SRDF = """<robot name="cart"><group name="front"><joint name="free"/><joint name
 
 
 class Reader(Component):
-    """Keeps what it sees of its Robot, and wants a number of its own."""
+    """Keeps what it sees of its Robot, and commands a number of its own."""
 
     def init(self):
         self.seen = []

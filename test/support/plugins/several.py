@@ -8,16 +8,16 @@ from solfer.components import Component
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Plugin, PluginParts, PluginSet
 from solfer.plugins.life.plugin_set import NOTHING
-from solfer.plugins.loop import PluginLoop
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.plugins.timing.loop import PluginLoop
 from solfer.transport import Inbox
 
 PERIOD = 1.0 / RATE
 
 
 class Counted(Component):
-    """Counts its steps, lasts as long as it is told, and fails where it is told."""
+    """Counts its steps, takes a given time, and fails at a given step."""
 
     def __init__(self, robot, name, several):
         super().__init__(robot, name=name)

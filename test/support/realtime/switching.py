@@ -21,7 +21,7 @@ STAY = ["bells", "simulated_time"]
 COSTS = 400  # cycles
 WAIT = 60.0  # [s]
 TOGETHER = ("springs", "drives")
-"""Plugins that run side by side; each other one wants what they want."""
+"""Plugins that run side by side; every second one claims the joints of the others."""
 
 
 def held():
@@ -31,7 +31,7 @@ def held():
 
 
 class SwitchedLayer(Layer):
-    """An executor with plugins that want the same joints, switched by the services of the layer.
+    """An executor with plugins that claim the same joints, switched by the services of the layer.
 
     Args:
         folder: Where its files and its namespace are.

@@ -84,8 +84,8 @@ class Strong(Sine):
     def update(self):
         super().update()
         roll = self.model.dof("roll")
-        wanted, position = self.model.command.position, self.model.state.position
-        wanted[roll] += 0.1 * (wanted[roll] - position[roll])
+        desired, position = self.model.command.position, self.model.state.position
+        desired[roll] += 0.1 * (desired[roll] - position[roll])
 
 
 def tree(component="Sine"):

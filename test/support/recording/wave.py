@@ -1,4 +1,4 @@
-"""A component of 15 lines: what it wants depends on all that it has received."""
+"""A component of 15 lines: what it commands depends on all that it has received."""
 
 import math
 
@@ -11,6 +11,6 @@ class Wave(Component):
 
     def update(self):
         self._time += self.period
-        wanted, position = self.model.command.position, self.model.state.position
-        wanted[:] = 0.9 * wanted + 0.1 * self._begin + 0.04 * math.sin(math.pi * self._time)
-        wanted += 0.03 * (wanted - position)
+        desired, position = self.model.command.position, self.model.state.position
+        desired[:] = 0.9 * desired + 0.1 * self._begin + 0.04 * math.sin(math.pi * self._time)
+        desired += 0.03 * (desired - position)

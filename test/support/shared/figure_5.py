@@ -33,7 +33,7 @@ def hang(simulation):
 
 
 class Part(Component):
-    """Counts its cycles, and fails when it is told how.
+    """Counts its cycles, and fails as a test sets it.
 
     Attributes:
         fault: What goes wrong from now on: `update`, `send`, `nan` or `slow`; empty: nothing.
@@ -94,7 +94,7 @@ class Forces(Part):
 
 
 class Locomotion(Part):
-    """Wants a motion of the legs, lifted by what the ground does to them."""
+    """Desires a motion of the legs, lifted by what the ground does to them."""
 
     def init(self):
         model = self.model
@@ -115,7 +115,7 @@ class Locomotion(Part):
 
 
 class Compensation(Part):
-    """Commands what the others want, with the efforts that carry the robot."""
+    """Commands what the others desire, with the efforts that carry the robot."""
 
     def init(self):
         self.model.dynamics.subscribe({BIAS: 1})

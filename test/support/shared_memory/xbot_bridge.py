@@ -7,7 +7,7 @@ from solfer.middleware.shared_memory.discovery import declared_topics, published
 def made(namespace, inside, outside, inwards, outwards):
     """Make a bridge as the node does."""
 
-    def wanted(known):
+    def desired(known):
         published = {each.topic for each in published_topics(namespace)}
         return [Route(each.topic, each.message) for each in declared_topics(namespace, (*known, *published))]
 
@@ -22,6 +22,6 @@ def made(namespace, inside, outside, inwards, outwards):
                 for each in services(namespace, known)
             ],
             lambda known: [Route(each.topic, each.message) for each in published_topics(namespace, known)],
-            wanted,
+            desired,
         ),
     )

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 from support.unit.cart import URDF
-from support.unit.endpoints import Told
+from support.unit.endpoints import StandInReader
 
 from solfer.config.records.conventions import ConventionRecord
 from solfer.model import Description, Kinematics, State
@@ -50,7 +50,7 @@ def make(  # noqa: PLR0913, PLR0917 a test names what it changes
     mount = SensorMount(DESCRIPTION, link, state, offset, None if turn is None else turn.as_matrix())
     reading = READINGS[message](link, convention, axes)
     sensor = BodySensor(mount, reading, convention.position.type == "FULL", calibrated)
-    reader = reader or Told()
+    reader = reader or StandInReader()
     chart = Kinematics(DESCRIPTION).base
     pipe = BodyFeedbackPipe("base", reader, state, chart, sensor, fields=fields, reception=Reception(low_pass=low_pass))
     return pipe, reader, state

@@ -1,4 +1,4 @@
-"""A stand-in of a robot that drives: it integrates what it is told, and publishes its odometry."""
+"""A stand-in of a robot that drives: it integrates received velocities, and publishes its odometry."""
 
 import math
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class DrivenBase:
         delay: Cycles until a contact is lifted.
 
     Attributes:
-        pace: Returns the share of what it is told with which it goes on, which it publishes; None: whole, and silent.
+        pace: Returns the ratio of its velocities with which it goes on, which it publishes; None: whole, and silent.
     """
 
     def __init__(self, bus: Bus, target: str = "wheeled_motion", heading: float = 0.0, lifts: bool = True, delay=10):
@@ -59,16 +59,16 @@ class DrivenBase:
             self.velocity += (
                 cos * linear["x"] - sin * linear["y"], sin * linear["x"] + cos * linear["y"], angular["z"],
             )  # fmt: skip
-        told = self.pace()
-        share = 1.0 if told is None else told if math.isfinite(told) else 0.0
-        if told is not None:
-            self._pace.write(FieldsMessage({"data": told}))
+        pace = self.pace()
+        ratio = 1.0 if pace is None else pace if math.isfinite(pace) else 0.0
+        if pace is not None:
+            self._pace.write(FieldsMessage({"data": pace}))
         if self._state.read():
             fields = self._state.message.fields
-            self.velocity += share * np.array((fields["x"], fields["y"], fields["rz"]))
-            self.z, self.camber = self.z + share * fields["z"] * PERIOD, fields["cs"]
+            self.velocity += ratio * np.array((fields["x"], fields["y"], fields["rz"]))
+            self.z, self.camber = self.z + ratio * fields["z"] * PERIOD, fields["cs"]
         if self._support.read():
-            self.vertices += share * np.reshape(self._support.message.fields["velocity"], (4, 3)) * PERIOD
+            self.vertices += ratio * np.reshape(self._support.message.fields["velocity"], (4, 3)) * PERIOD
         self.pose += self.velocity * PERIOD
         self.moved += float(np.abs(self.velocity).sum()) * PERIOD
         if not self.is_silent:

@@ -6,7 +6,7 @@ from solfer.transport import MessageStatus, Reader, Writer
 from solfer.transport.endpoints import Publisher
 
 
-class Told(Reader):
+class StandInReader(Reader):
     """A topic on which the test publishes."""
 
     topic = "told"

@@ -79,7 +79,7 @@ class Others:
     """The robot's lower level, and those who publish what a plugin receives."""
 
     def __init__(self, folder: Path):
-        self.bus, self.heard = Bus(), Digest()
+        self.bus, self.digest = Bus(), Digest()
         self._way, self._newest = 0.01 * np.arange(1.0, 1.0 + len(JOINTS)), 0.0
         node = MemoryMiddleware(self.bus, "cart")
         self._inbox = Inbox()
@@ -135,7 +135,7 @@ class Others:
     def run(self, plugin: Plugin) -> None:
         """Let a plugin cycle, and digest all that it publishes."""
         for topic in self.bus._topics.values():
-            topic.listeners.append(lambda message, name=topic.name: self.heard.add((name, message)))
+            topic.listeners.append(lambda message, name=topic.name: self.digest.add((name, message)))
         for k in range(2, CYCLES):
             self.bus.run_until(self.bus.time + 1.0 / plugin.rate)
             self.publish(k)
@@ -177,8 +177,8 @@ def digest_of(configuration: Configuration, folder: Path, name: str = "joint_sta
     robot = plugin.robot
     states = [robot.state, robot.motor, robot.command, robot.lower_limits, robot.upper_limits]
     parts = [robot.maps, robot.selectors, robot.actuators, robot.contacts, robot.contacts.constraints]
-    others.heard.add([robot.name, states, parts, robot.kinematics.tree, robot.dynamics.inertia, robot.semantics])
-    return others.heard.add(plugin).text()
+    others.digest.add([robot.name, states, parts, robot.kinematics.tree, robot.dynamics.inertia, robot.semantics])
+    return others.digest.add(plugin).text()
 
 
 def module(name: str, **options: str) -> Callable[[Path], str]:
@@ -199,24 +199,24 @@ def simulation(folder: Path) -> str:
     """Step the robot in its world, and publish what it measures."""
     world = folder / "world.yaml"
     bundle = read_bundle(folder / "bundle.yaml")
-    heard, bus = Digest().add(robot_parameters(bundle)), Bus()
+    digest, bus = Digest().add(robot_parameters(bundle)), Bus()
     with closing(Simulation.from_file(folder / "bundle.yaml", world=world)) as robot:
         server = SimulationServer(robot, MemoryMiddleware(bus, "cart"))
         with closing(server):
             for topic in bus._topics.values():
-                topic.listeners.append(lambda message, name=topic.name: heard.add((name, message)))
+                topic.listeners.append(lambda message, name=topic.name: digest.add((name, message)))
             command = MemoryMiddleware(bus, "walk").writer("wheel_controller/command", "solfer/JointCommand")
             for _ in range(STEPS):
                 command.write(JointMessage(("roll",), velocity=np.array([2.0])))
                 server.cycle()
             bullet, client, *_ = raw_bullet(robot)
             bodies = [bullet.getBodyUniqueId(index, client) for index in range(bullet.getNumBodies(client))]
-            heard.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
-            heard.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])
-            heard.add([bullet.getCollisionShapeData(body, -1, client) for body in bodies])
-            heard.add([robot.q, robot.v, robot.torque, robot._groups, robot.lower_level, robot.body.links])
-            heard.add([server.inbox, server._lower_level])
-    return heard.text()
+            digest.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
+            digest.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])
+            digest.add([bullet.getCollisionShapeData(body, -1, client) for body in bodies])
+            digest.add([robot.q, robot.v, robot.torque, robot._groups, robot.lower_level, robot.body.links])
+            digest.add([server.inbox, server._lower_level])
+    return digest.text()
 
 
 class Listening(MemoryMiddleware):
@@ -259,15 +259,15 @@ def bridge(folder: Path) -> str:
 
 def hardware(folder: Path) -> str:
     """Step the robot behind the wiring of its hardware."""
-    heard, bus = Digest(), Bus()
+    digest, bus = Digest(), Bus()
     mock = MockHardware.from_file(folder / "mock.yaml", MemoryMiddleware(bus, "cart"))
     with closing(mock):
         for topic in bus._topics.values():
-            topic.listeners.append(lambda message, name=topic.name: heard.add((name, message)))
+            topic.listeners.append(lambda message, name=topic.name: digest.add((name, message)))
         for _ in range(STEPS):
             mock.cycle()
-        heard.add([mock.simulation.q, mock.simulation.lower_level, mock._wiring])
-    return heard.text()
+        digest.add([mock.simulation.q, mock.simulation.lower_level, mock._wiring])
+    return digest.text()
 
 
 def layer(folder: Path, file: str = "layer.yaml") -> str:

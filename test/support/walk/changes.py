@@ -47,7 +47,7 @@ IN_RT, IMU_IN_RT = (benches.module(name, middleware="XBOT", layer="RT") for name
 
 
 COMMANDED_GAINS = {f"{OUT}arm_controller/interface/{gain}": True for gain in ("stiffness", "damping")}
-"""With these a plugin may tell the lower level gains."""
+"""With these a plugin may send the lower level gains."""
 
 
 def each(bench: Callable[[Path], str], prefix: str, **values: Any) -> dict[str, Change]:

@@ -18,7 +18,7 @@ from solfer.config import Record
 from solfer.config.loading.configuration import Configuration
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.middleware.memory.bus import Bus, Topic
-from solfer.plugins.cycle_timing import CycleTiming
+from solfer.plugins.timing.cycle_timing import CycleTiming
 from solfer.points.point import Layout
 from solfer.points.program import Instruction, Program
 from solfer.throttle import Throttle

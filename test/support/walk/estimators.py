@@ -26,7 +26,7 @@ def estimating(component: type, key: str, stamped: bool = False):
     """
 
     def run(folder: Path) -> str:
-        robot, heard = lower_body(), Digest()
+        robot, digest = lower_body(), Digest()
         made = component(robot, read(folder / "estimators.yaml", component.Tags, (key,)))
         made.set_rate(RATE)
         if stamped:
@@ -46,8 +46,8 @@ def estimating(component: type, key: str, stamped: bool = False):
             made.update()
             numbers = robot.state.position, robot.state.velocity, robot.contacts.wrenches
             published = [topic.collect() for topic in made.topics() if isinstance(topic, TopicOut)]
-            heard.add([[array.tobytes().hex() for array in numbers], sorted(made.outputs), str(published)])
-        return heard.text()
+            digest.add([[array.tobytes().hex() for array in numbers], sorted(made.outputs), str(published)])
+        return digest.text()
 
     return run
 

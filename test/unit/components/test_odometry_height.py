@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from solfer.components.odometry.height_kernel import FLOOR_TOLERANCE
-from solfer.components.odometry.height_map import HeightMap
+from solfer.components.odometry.ground.height_kernel import FLOOR_TOLERANCE
+from solfer.components.odometry.ground.height_map import HeightMap
 
 PERIOD, SPEED, RADIUS, HEIGHT = 0.005, 0.3, 0.078, 0.6
 PLACES = np.array(((0.55, 0.3), (0.55, -0.3), (-0.55, 0.3), (-0.55, -0.3)))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.unit.golden import lower_body
 
-from solfer.components.odometry.imu_samples import LONGEST_LAG
-from solfer.components.odometry.samples import SortedSamples
-from solfer.components.odometry.stamps import StampCheck
-from solfer.components.odometry.streams import LONGEST_EXTRAPOLATION, Streams
+from solfer.components.odometry.sensing.imu_samples import LONGEST_LAG
+from solfer.components.odometry.sensing.samples import SortedSamples
+from solfer.components.odometry.sensing.stamps import StampCheck
+from solfer.components.odometry.sensing.streams import LONGEST_EXTRAPOLATION, Streams
 from solfer.model.history import History
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002

@@ -58,7 +58,7 @@ def play(bus):
     return play
 
 
-class Told:
+class ProgressMessages:
     """The messages of progress."""
 
     def __init__(self, bus):
@@ -71,7 +71,7 @@ class Told:
 
 
 def test_it_goes_to_way_points_and_ends_at_rest(bus, go):
-    base, recorded = DrivenBase(bus, heading=0.7), Told(bus)
+    base, recorded = DrivenBase(bus, heading=0.7), ProgressMessages(bus)
     assert go((1.0, 0.5), (1.5, -0.5, -1.0)).run() == 0
     assert math.dist(base.pose[:2], (1.5, -0.5)) < 0.02 and abs(base.pose[2] + 1.0) < 0.02
     messages = recorded.messages()
@@ -109,7 +109,7 @@ def test_it_plays_a_scenario_along_the_heading_of_the_beginning(bus, play, repos
     own = Player(scenario)
     while own.step():
         pass
-    base, recorded = DrivenBase(bus, heading=0.7), Told(bus)
+    base, recorded = DrivenBase(bus, heading=0.7), ProgressMessages(bus)
     start = base.pose.copy()
     assert play(scenario).run() == 0
     x, y, z, heading = own.base - scenario.base
@@ -125,7 +125,7 @@ def test_it_pauses_at_rest_and_goes_on(bus, play, tmp_path):
     """Two seconds of pause: the base rests, the progress reports it, and the whole way is completed all the same."""
     pattern = [{"type": "move", **STAY, "base": 0}]
     base = DrivenBase(bus)
-    start, recorded = base.pose[0], Told(bus)
+    start, recorded = base.pose[0], ProgressMessages(bus)
     navigation = play(made(tmp_path, pattern, vel=0.2, base_ref=[[1.0, 0.0, 0.0, 0.0]]))
     seen = []
     bus.every(1e9, lambda: bus.call("navigation/pause", data=True), start=3.0)
@@ -198,7 +198,7 @@ def test_legs_that_are_lifted_need_names_of_contacts(bus, play, tmp_path):
 
 
 def test_without_odometry_it_stops_and_goes_on_later(bus, go):
-    base, recorded = DrivenBase(bus), Told(bus)
+    base, recorded = DrivenBase(bus), ProgressMessages(bus)
 
     def silence(silent):
         base.is_silent = silent
@@ -255,7 +255,7 @@ def test_a_scenario_follows_the_pace(bus, play, tmp_path):
     own = Player(scenario)
     while own.step():
         pass
-    base, recorded = DrivenBase(bus), Told(bus)
+    base, recorded = DrivenBase(bus), ProgressMessages(bus)
     start = base.pose.copy()
     base.pace = lambda: 0.0 if bus.time < 3.0 else 0.5 + 0.5 * math.sin(bus.time)
     assert play(scenario).run() == 0
@@ -364,7 +364,7 @@ def test_a_base_that_is_located_elsewhere_goes_on_from_there(bus):
 
 
 def test_without_a_localisation_it_stops_and_says_what_is_missing(bus):
-    base, recorded = DrivenBase(bus), Told(bus)
+    base, recorded = DrivenBase(bus), ProgressMessages(bus)
     correction, node = Correction(bus, 1), MemoryMiddleware(bus, "navigation")
     follower = WaypointFollower([Waypoint(3.0, 2.0)], DriveLimits())
     course = WaypointCourse(node, follower, "wheeled_motion", "odometry/odom", correction)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.unit.endpoints import Told
+from support.unit.endpoints import StandInReader
 from support.unit.joint_pipes import dofs, make_robot, received
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
@@ -19,7 +19,7 @@ def make_pipe(robot, **changes):
     """Make the pipe that is shared."""
     context = PipeContext(robot, MemoryMiddleware(Bus(), "cart"), {}, 200.0)
     pipe = factory.feedback(record(**changes), context)
-    pipe.reader = Told()
+    pipe.reader = StandInReader()
     return pipe
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.endpoints import Kept, Told
+from support.unit.endpoints import Kept, StandInReader
 
 from solfer.errors import SizeMismatch
 from solfer.model import BidirectionalMap, State
@@ -30,7 +30,7 @@ def calibration():
 
 
 def test_measurements_are_converted_to_the_model(mapping, calibration):
-    reader = Told(
+    reader = StandInReader(
         JointMessage(
             HARDWARE, np.array([7.0, 0.5, 9.0, -1.5]), np.array([1.0, 2.0, 9.0, 3.0]), np.array([-4.0, 5.0, 9.0, -6.0])
         )
@@ -55,7 +55,7 @@ def test_measurements_are_converted_to_the_model(mapping, calibration):
 
 
 def test_names_of_the_model_are_refused(mapping, calibration):
-    reader = Told(JointMessage(("wheel", "yaw", "knee"), np.zeros(3)))
+    reader = StandInReader(JointMessage(("wheel", "yaw", "knee"), np.zeros(3)))
     pipe = JointFeedbackPipe(
         "joints", reader, mapping, State(DOFS), ("position",), reception=Reception(), sender=JointSender(calibration)
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.plugins import LoopStatistics, PluginState, run
-from solfer.plugins.cycle_timing import CycleTiming, Stage
+from solfer.plugins.timing.cycle_timing import CycleTiming, Stage
 
 RATE, CYCLES = 200.0, 200
 PERIOD = 1.0 / RATE

@@ -7,7 +7,7 @@ from support.unit.watch import Stage
 
 from solfer.config.records.modules import OverloadRecord
 from solfer.plugins.life.managed_plugin import ManagedPlugin
-from solfer.plugins.overload import Overload
+from solfer.plugins.timing.overload import Overload
 from solfer.transport.health import Health
 from solfer.transport.plugin_state import PluginState
 

@@ -5,7 +5,7 @@ from support.plugins.fleet import RATE, Fleet, still, tree
 
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins.life.plugin_set import PluginSet
-from solfer.plugins.loop import PluginLoop
+from solfer.plugins.timing.loop import PluginLoop
 from solfer.transport.health import Health
 
 

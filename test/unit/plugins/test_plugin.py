@@ -6,7 +6,7 @@ import pytest
 from support.unit.watch import PERIOD, Stage
 
 from solfer.plugins import PluginState
-from solfer.plugins.cycle_timing import STAGES, PassedPeriods
+from solfer.plugins.timing.cycle_timing import STAGES, PassedPeriods
 
 
 def test_each_stage_has_its_time():

@@ -12,9 +12,9 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.plugins import Plugin, PluginParts, PluginSet, PluginState
 from solfer.plugins.life.budget import BudgetRules
-from solfer.plugins.loop import PluginLoop
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.plugins.timing.loop import PluginLoop
 from solfer.transport import Inbox
 from solfer.transport.lower_level import Answer
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solfer.plugins.robot_time import LATEST, RobotTime
+from solfer.plugins.timing.robot_time import LATEST, RobotTime
 
 PERIOD = 0.005
 

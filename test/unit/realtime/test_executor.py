@@ -9,7 +9,7 @@ from support.plugins.several import PERIOD, Several
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
-from solfer.plugins.cycle_timing import STAGES
+from solfer.plugins.timing.cycle_timing import STAGES
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.telemetry.statistics import LoopCount, LoopTime

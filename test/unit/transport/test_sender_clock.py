@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solfer.transport.sender_clock import SenderClock
+from solfer.transport.clocks.sender_clock import SenderClock
 
 PERIOD, CLOCK = 0.002, 1.7e9
 """Period of the messages, and what the sender's clock is ahead of that of arrivals [s]."""

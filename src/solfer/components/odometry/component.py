@@ -12,7 +12,6 @@ from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
-from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.messages import (
     SetBase,
     StampedUncertainPose,
@@ -21,7 +20,8 @@ from solfer.components.odometry.messages import (
     transform,
 )
 from solfer.components.odometry.pose_covariances import PoseCovariances
-from solfer.components.odometry.streams import Streams
+from solfer.components.odometry.sensing.measured_base import MeasuredBase, about_vertical
+from solfer.components.odometry.sensing.streams import Streams
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite

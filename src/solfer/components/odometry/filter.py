@@ -6,9 +6,9 @@ import numpy as np
 
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.consensus import COMPARISON_TIME, WheelConsensus, yaw_of
-from solfer.components.odometry.ground_plane import GroundPlane
+from solfer.components.odometry.ground.ground_plane import GroundPlane
 from solfer.components.odometry.kalman import HEADING, NO_SAMPLE, ImuSample, WheelInertialFilter
-from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
+from solfer.components.odometry.sensing.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheel_motion import WheelMotion
 from solfer.components.odometry.wheels import Wheels

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.measured_base import MeasuredBase, about_vertical, rotation_vector
+from solfer.components.odometry.sensing.measured_base import MeasuredBase, about_vertical, rotation_vector
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError
 from solfer.numerics.filters import LowPass

@@ -8,11 +8,11 @@ from time import monotonic_ns
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.plugins.cycle_timing import STAGES, Stage
 from solfer.plugins.life.budget import Budget, BudgetRules
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
+from solfer.plugins.timing.cycle_timing import STAGES, Stage
 from solfer.transport import Inbox
 from solfer.transport.plugin_state import FAILED_STATES, PluginState
 

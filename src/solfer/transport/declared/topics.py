@@ -6,9 +6,9 @@ import math
 from solfer.errors import ComponentError, SolferError
 from solfer.interfaces.declaration import TopicIn, TopicOut, full_name
 from solfer.throttle import Throttle
+from solfer.transport.clocks.stamp_faults import StreamClock
 from solfer.transport.declared.fields import message_of, require_carried, value_of
 from solfer.transport.middleware import Middleware
-from solfer.transport.stamp_faults import StreamClock
 
 logger = logging.getLogger(__name__)
 

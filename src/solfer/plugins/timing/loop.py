@@ -11,11 +11,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from solfer.errors import ClaimRefused, ComponentError, OutOfLimits, ReceiveTimeout, located
-from solfer.plugins.cycle_timing import Stage
 from solfer.plugins.life.budget import BudgetRules
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.plugin_set import NOTHING, PluginSet
 from solfer.plugins.plugin import Plugin
+from solfer.plugins.timing.cycle_timing import Stage
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop

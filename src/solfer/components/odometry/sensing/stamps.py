@@ -2,7 +2,7 @@
 
 import math
 
-from solfer.transport.stamp_faults import StampFault
+from solfer.transport.clocks.stamp_faults import StampFault
 
 
 class StampCheck:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry import height_kernel as kernel
+from solfer.components.odometry.ground import height_kernel as kernel
 
 
 class HeightMap:

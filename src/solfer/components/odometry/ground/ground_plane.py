@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry import filter_kernel
-from solfer.components.odometry.height_map import HeightMap
+from solfer.components.odometry.ground.height_map import HeightMap
 from solfer.components.odometry.kalman import WheelInertialFilter
 from solfer.components.odometry.wheel_motion import WheelMotion
 from solfer.points.contact.support_vertex import UP

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.imu_samples import CAPACITY, LONGEST_LAG, ImuSamples
-from solfer.components.odometry.samples import SensorHistory, SortedSamples
-from solfer.components.odometry.stamps import StampCheck
+from solfer.components.odometry.sensing.imu_samples import CAPACITY, LONGEST_LAG, ImuSamples
+from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
+from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.numerics.base_chart import BaseChart
 from solfer.robot import Robot
 

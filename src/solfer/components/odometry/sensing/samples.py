@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from solfer.components.odometry.stamps import StampCheck
+from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.history import History
 from solfer.robot import Robot
 

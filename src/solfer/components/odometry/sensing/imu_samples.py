@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.samples import SensorHistory, SortedSamples
-from solfer.components.odometry.stamps import StampCheck
+from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
+from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.state import State
 from solfer.numerics.base_chart import BaseChart
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from solfer.pipes import FeedbackPipe
-from solfer.plugins.cycle_timing import PassedPeriods
+from solfer.plugins.timing.cycle_timing import PassedPeriods
 
 EARLIEST = 0.03
 """Time by which the newest stamp may be before the robot's time: messages come early [s]."""

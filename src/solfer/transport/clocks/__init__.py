@@ -1,0 +1,1 @@
+"""Clocks of senders, and stamps that cannot be right."""
