@@ -109,16 +109,16 @@ def _unwrap(position, part, before, turns, added):
     Args:
         position: Positions, as they came; written.
         part: Indices of the positions that came.
-        before: The positions before, NaN: there is none; and the least and largest ones that came.
+        before: The positions before, NaN: there is none; and the lowest and highest ones that came.
         turns: What positions may jump by; 0: nothing.
         added: What was added before; written.
     """
     for k in part:
         if turns[k]:
             came = position[k]
-            least = min(before[1, k], came)
-            largest = max(before[2, k], came)
-            if before[0, k] == before[0, k] and largest - least <= turns[k] * (1.0 + 1e-6):
+            lowest = min(before[1, k], came)
+            highest = max(before[2, k], came)
+            if before[0, k] == before[0, k] and highest - lowest <= turns[k] * (1.0 + 1e-6):
                 added[k] = turns[k] * math.floor((before[0, k] - came) / turns[k] + 0.5)
             position[k] = came + added[k]
 

@@ -1,4 +1,4 @@
-"""A turn about z and a shift: how references move with a base whose estimate has jumped."""
+"""A rotation about z and a shift: how references move with a base whose estimate has jumped."""
 
 import math
 
@@ -10,7 +10,7 @@ from solfer.numerics.rotations import quaternion_product
 class PlanarMove:
     """Moves what is given in the world along with a base, whose estimate has jumped while the robot has not.
 
-    A place p goes to a + Rz (p - b), with the base's place before, b, and after, a. What leans is a matter of gravity,
+    A place p goes to a + Rz (p - b), with the base's place before, b, and after, a. The tilt is a matter of gravity,
     which has not changed.
 
     Args:

@@ -7,6 +7,9 @@ from solfer.lower_level.lower_level import LowerLevel
 
 logger = logging.getLogger(__name__)
 
+MISSED_CYCLES = 20
+"""Heartbeats that a process may miss in a row."""
+
 
 class HeartbeatSource(Protocol):
     """A process with a heartbeat in each of its cycles.
@@ -37,7 +40,7 @@ class HeartbeatMonitor:
         losses: How often it went missing.
     """
 
-    def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = 20):
+    def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = MISSED_CYCLES):
         self._lower_level = lower_level
         self._process = process
         self._cycles = cycles

@@ -31,16 +31,7 @@ SOLVED, INFEASIBLE, GAVE_UP, INACCURATE, NOT_FINITE = range(5)
 """Outcomes of a problem."""
 
 DEPENDENT = 1e-9
-"""Share of a normal outside the span of the active ones below which it counts as dependent on them."""
-
-ACTIVE_SET_FLATNESS = 1e-13
-"""Share of the largest entry of H below which a pivot of its decomposition counts as zero."""
-
-ACTIVE_SET_PRECISION, PASSES = 1e-3, 3
-"""Share of the tolerance at which x is not refined any more, and the most times that it is."""
-
-SHIFT, ACTIVE_SET_ROUNDS = 1e-9, 4
-"""Share of the largest entry of H that is added to its diagonal where H is almost singular, and how often at most."""
+"""Ratio of a normal outside the span of the active ones below which it counts as dependent on them."""
 
 
 @part
@@ -56,7 +47,7 @@ def _factorise(hessian, gradient, shift, factor, turned, x):
         for j in range(i):
             factor[i, j] = hessian[i, j]
         factor[i, i] = hessian[i, i] + shift
-    if not cholesky(factor, ACTIVE_SET_FLATNESS * largest):
+    if not cholesky(factor, 1e-13 * largest):
         return False
     # these are the rows of L^-1
     for i in range(size):
@@ -79,7 +70,7 @@ def _factorise(hessian, gradient, shift, factor, turned, x):
 
 @part
 def _directions(normal, turned, factor, active, d, z, r):
-    """Write d = turned normal, the step z of x, and the step -r of the multipliers; return the share of d in z."""
+    """Write d = turned normal, the step z of x, and the step -r of the multipliers; return the ratio of z in d."""
     size = len(normal)
     z[:] = 0.0
     inside = outside = 0.0
@@ -236,6 +227,8 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
     slope = vectors[5]
     hessian, gradient, shift = cost
     residual = np.inf
+    precise = 1e-3 * tolerance  # residual at which x is not refined any more
+    passes = 3  # times that it is refined, at most
     is_active[:] = 0
     if not _factorise(hessian, gradient, shift, factor, turned, x):
         return GAVE_UP, 0, residual
@@ -257,8 +250,8 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
                 multipliers,
                 x,
                 vectors,
-                ACTIVE_SET_PRECISION * tolerance,
-                PASSES,
+                precise,
+                passes,
             )
             which = _negative(names, multipliers, active, scale, tolerance)
             if which < 0 and _most_violated(limits, tolerance, x, normal, is_active)[0] < 0:
@@ -279,8 +272,8 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
                     multipliers,
                     x,
                     vectors,
-                    ACTIVE_SET_PRECISION * tolerance,
-                    PASSES,
+                    precise,
+                    passes,
                 )
             continue
         multiplier = 0.0
@@ -315,8 +308,6 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
 
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
-_PROBLEM = f"{_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}"
-_ACTIVE_SET_TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
 
 
 def solve(
@@ -359,9 +350,9 @@ def solve(
     entry = 0.0
     for i in range(len(x)):
         entry = max(entry, hessian[i, i])
-    shift = SHIFT * entry
+    shift = 1e-9 * entry
     before[:] = 0.0
-    for _ in range(ACTIVE_SET_ROUNDS):
+    for _ in range(4):
         for i in range(len(x)):
             moved[i] = gradient[i] - shift * before[i]
         outcome, more, residual = _attempt(
@@ -383,7 +374,11 @@ def solve(
 
 
 _compiled = cached(
-    f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED, sources=[DENSE, Path(residuals.__file__)]
+    f"Tuple((int64, int64, float64))({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, "
+    f"{_VECTOR}, {_VECTOR}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR})",
+    solve,
+    REORDERED,
+    sources=[DENSE, Path(residuals.__file__)],
 )
 
 

@@ -102,7 +102,7 @@ def side(name, limits):
 
 @part
 def lack(name, limits, x):
-    """Compute by how much x violates a constraint, as a share of its side where that is larger than 1."""
+    """Compute by how much x violates a constraint, as a ratio of its side where that is larger than 1."""
     sides = side(name, limits)
     return (sides - normal_times(name, limits, x)) / max(1.0, abs(sides))
 
@@ -127,9 +127,9 @@ def is_proof(name, names, active, r, limits, x, rest, tolerance):
     gap = side(name, limits)
     scale = max(1.0, abs(gap))
     for j in range(active):
-        share = r[j] * side(names[j], limits)
-        gap -= share
-        scale = max(scale, abs(share))
+        term = r[j] * side(names[j], limits)
+        gap -= term
+        scale = max(scale, abs(term))
         add_normal(names[j], -r[j], limits, rest)
     left = 0.0
     largest = 1.0
@@ -141,7 +141,7 @@ def is_proof(name, names, active, r, limits, x, rest, tolerance):
 
 @part
 def _balance(cost, limits, turned, factor, active, names, multipliers, x, slope, d):
-    """Write slope H x + g, d = turned slope, and the multipliers; return the share of the slope that they leave."""
+    """Write slope H x + g, d = turned slope, and the multipliers; return the ratio of the slope that they leave."""
     hessian, gradient, shift = cost
     size = len(x)
     largest = 0.0
@@ -182,7 +182,7 @@ def refine(cost, limits, turned, factor, active, names, multipliers, x, vectors,
     J1 R^-T (side - N^T x) - J2 J2^T (H x + g).
 
     Returns:
-        The largest of the shares that are left of slope and active constraints, and the scale of the slope.
+        The largest of the ratios that are left of slope and active constraints, and the scale of the slope.
     """
     slope = vectors[5]
     d = vectors[1]
