@@ -40,7 +40,7 @@ class Kinematics:
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
         tree: Joints as live arrays, the input of Points.
         followers: DoFs that follow others. Their columns of all Jacobians are zero, and those of their leaders contain
-            their share; positions and velocities have to be theirs.
+            them; positions and velocities have to be theirs.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 LARGE = 100
-"""DoFs from which on the fields are made one by one: all of Pinocchio's own take 140 MB here, and grow with n^3."""
+"""Number of DoFs from which on the fields are made one by one: Pinocchio's own take 140 MB here, and grow with n^3."""
 
 
 def working_data(model: pin.Model) -> pin.Data:
@@ -14,10 +14,10 @@ def working_data(model: pin.Model) -> pin.Data:
     model gets only what the kinematics, the inertia matrix and the bias force need, which is n^2 numbers; nothing
     else must be computed in it.
     """
-    return model.createData() if model.nv < LARGE else _lean(model)
+    return model.createData() if model.nv < LARGE else _small_data(model)
 
 
-def _lean(model: pin.Model) -> pin.Data:
+def _small_data(model: pin.Model) -> pin.Data:
     data = pin.Data()
     bodies = model.njoints
     size = model.nv

@@ -64,8 +64,8 @@ class _Measured:
 class Robot:
     """The robot as its components see it. DoFs have the order of `dofs` everywhere.
 
-    Several components of a process share what is measured, and what is computed of it: each has a `companion` of one
-    Robot, with a desired State of its own.
+    What is measured, and what is computed of it, several components of a process have in common: each has a `companion`
+    of one Robot, with a desired State of its own.
 
     Args:
         kinematics: Kinematics of the robot, and its description.
