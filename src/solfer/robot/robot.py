@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from solfer.robot.contacts import Contacts
 
 
-_MOVED = {(True, True): ("position", "velocity"), (True, False): ("position",), (False, True): ("velocity",)}
-"""Interfaces that have changed, by whether the position and the velocity have."""
-
-
 class _Measured:
     """What was computed of the measured State, for a Robot and all its companions.
 
@@ -286,7 +282,10 @@ class Robot:
         if not (moved or accelerated):
             return False
         self.kinematics.update(self._position, self._velocity)
-        self.state.touch(*_MOVED[moved, accelerated])
+        if moved:
+            self.state.touch("position")
+        if accelerated:
+            self.state.touch("velocity")
         measured.position = position
         measured.velocity = velocity
         measured.updates += 1

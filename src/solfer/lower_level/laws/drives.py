@@ -54,7 +54,7 @@ class Drives:
         swinging = held[springs.two_mass[held]] if springs else held[:0]
         self.torque_dofs, self.speed_dofs = np.concatenate((moved, swinging)), np.setdiff1d(held, swinging)
         self._law = _law(kinematics, self.torque_dofs, springs, posture=posture)
-        self._law.damping[swinging] = 1e7  # [Nms/rad]: a motor holds its speed, beside this nothing counts
+        self._law.damping[swinging] = 1e7  # [Nms/rad], with which a motor holds its speed
         self.torque = self._law.torque
         self.speed = np.zeros(len(self.speed_dofs))
         self._copies = [
