@@ -13,7 +13,7 @@ from solfer.lower_level.claims.refusals import Refusals
 from solfer.lower_level.emergency_stop import EmergencyStop
 from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.laws.drives import Drives
-from solfer.lower_level.laws.measured_turns import MeasuredPosition
+from solfer.lower_level.laws.measured_position import MeasuredPosition
 from solfer.lower_level.records import LowerLevelRecord
 from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.actuators import Actuators
@@ -82,7 +82,7 @@ class LowerLevel:
         self.refusals = Refusals()
         self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
-        self._measured = MeasuredPosition(kinematics.turns)
+        self._measured = MeasuredPosition(kinematics.revolutions)
         self.starts = 0
 
     @property

@@ -50,7 +50,7 @@ class Kinematics:
         upper_position: Upper limits [rad, m], shape (n,); inf where there is none.
         velocity_limit: Largest speeds [rad/s, m/s], shape (n,); inf where there is none.
         effort_limit: Largest efforts [Nm, N], shape (n,); inf where there is none.
-        turns: Turn after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
+        revolutions: Angle after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
 
     Raises:
         ModelError: Pinocchio cannot read the robot, or it has no DoF, or more than MAX_DOFS.
@@ -267,7 +267,7 @@ class Kinematics:
         self.upper_position = _limits([joint.upper if joint else None for joint in joints], np.inf)
         self.velocity_limit = _limits([joint.velocity if joint else None for joint in joints], np.inf)
         self.effort_limit = _limits([joint.effort if joint else None for joint in joints], np.inf)
-        self.turns = np.array([math.tau if joint and joint.type == "continuous" else 0.0 for joint in joints])
+        self.revolutions = np.array([math.tau if joint and joint.type == "continuous" else 0.0 for joint in joints])
 
     def _bound_leaders(self) -> None:
         """Give the limits of followers to their leaders; efforts of followers do not exist."""

@@ -98,7 +98,7 @@ class ReferenceFilter:
         """Move a reference and its target in the world, with what they are doing."""
         for numbers in (self.target[index], self.value[index]):
             move.move(numbers[:3])
-            move.turn_orientation(numbers[3:])
+            move.rotate_orientation(numbers[3:])
         for rates in (self.rate[index], self._stream[index]):
             move.rotate(rates[:3])
             move.rotate(rates[3:])

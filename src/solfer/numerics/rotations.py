@@ -203,11 +203,11 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
     return np.array(quaternion) / math.copysign(math.hypot(*quaternion), quaternion[3])
 
 
-def whole_turns(displacements: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Return the whole turns in displacements, shape (..., n) [rad]: without them, none is longer than half a turn.
+def whole_revolutions(displacements: np.ndarray, revolutions: np.ndarray) -> np.ndarray:
+    """Return whole revolutions in displacements, shape (..., n) [rad]: without them, none is longer than half of one.
 
     Args:
         displacements: Differences of positions, shape (..., n) [rad, m].
-        turns: The turn of each joint [rad]; 0: it has none.
+        revolutions: Angle after which each joint is where it was [rad]; 0: there is none.
     """
-    return np.asarray(turns * np.rint(displacements / np.where(turns > 0.0, turns, 1.0)))
+    return np.asarray(revolutions * np.rint(displacements / np.where(revolutions > 0.0, revolutions, 1.0)))

@@ -82,8 +82,8 @@ class Robot:
         command: Desired state.
         lower_limits: Lower limits of position, velocity, acceleration and torque; -inf where there is none.
         upper_limits: Upper limits; inf where there is none.
-        turns: Turn after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
-        added_turns: What measured positions have more than the robot's driver publishes, shape (n,) [rad]; live.
+        revolutions: Angle after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
+        added_revolutions: What measured positions have more than the robot's driver publishes, shape (n,) [rad]; live.
         maps: Bidirectional maps: `RBDL` (also called `MODEL`), `ACTUATED`, and those that a configuration adds.
         selectors: Unidirectional maps: `all` and every group of the SRDF.
         contact_records: Records of its contacts.
@@ -110,8 +110,8 @@ class Robot:
         kinematics.drive(self.actuators)
         self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
-        self.turns = kinematics.turns
-        self.added_turns = np.zeros(kinematics.size)
+        self.revolutions = kinematics.revolutions
+        self.added_revolutions = np.zeros(kinematics.size)
         self.actuated = actuated_dofs(kinematics, self.actuators)
         self.maps, self.selectors = (
             default_maps(kinematics, self.actuated),

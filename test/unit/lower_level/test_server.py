@@ -11,12 +11,12 @@ from solfer.transport.messages import REFUSALS, JointMessage
 
 
 class Stage:
-    """A cart whose lower level is on a bus, a node that hears its refusals, and one that commands its wheel."""
+    """A cart whose lower level is on a bus, a node that receives its refusals, and one that commands its wheel."""
 
     def __init__(self):
         self.bus, self.lower_level = Bus(), make()
         self.server = LowerLevelServer(self.lower_level, MemoryMiddleware(self.bus, "robot"), Inbox())
-        self._ear = MemoryMiddleware(self.bus, "ear").queue(REFUSALS_TOPIC, REFUSALS)
+        self._receiver = MemoryMiddleware(self.bus, "receiver").queue(REFUSALS_TOPIC, REFUSALS)
         self._driver = MemoryMiddleware(self.bus, "/driver").writer("wheel/command", "solfer/JointCommand")
 
     def drive(self, name="roll"):
@@ -27,7 +27,7 @@ class Stage:
         """Run a cycle, `later` [s] than the one before; return owners and claims of what was published."""
         self.bus.run_until(self.bus.time + later)
         self.server.receive_commands()
-        return [(message.owners, message.claims) for message in self._ear.drain()]
+        return [(message.owners, message.claims) for message in self._receiver.drain()]
 
 
 def test_a_new_beginning_ends_all_claims_once():

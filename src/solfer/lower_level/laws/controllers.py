@@ -14,7 +14,7 @@ from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.lower_level.laws.command_check import CommandCheck
 from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.transport.messages import JOINT_FIELDS
 
 VELOCITY_TIMEOUT = 0.5
@@ -114,8 +114,8 @@ class ImpedanceController(LowerLevelController):
         damping: Default damping, shape (len(joints),) [Nms/rad].
 
     Attributes:
-        position: Accepted position, of joints without ends on the turn nearest to the one before; it does not expire
-            [rad].
+        position: Accepted position, of joints without ends in the revolution nearest to the one before; it does not
+            expire [rad].
         target: Position of the springs: follows `position` by `CatchUp`, at most at the velocity limit of each joint
             [rad].
         effort: Commanded feed-forward torque [Nm].
@@ -145,7 +145,7 @@ class ImpedanceController(LowerLevelController):
         self._default = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
         self.stiffness, self.damping = (gain.copy() for gain in self._default.values())
         self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
-        self._turns = np.where(np.isinf(limits.upper), math.tau, 0.0)
+        self._revolutions = np.where(np.isinf(limits.upper), math.tau, 0.0)
         self.feed_forward = True
         self._feed_forward_ratio = 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
@@ -169,8 +169,10 @@ class ImpedanceController(LowerLevelController):
         super().apply(indices, given)
         if "position" in given:
             position = given["position"]
-            # joints without ends may be counted on another turn
-            self.position[indices] = position + whole_turns(self.position[indices] - position, self._turns[indices])
+            # joints without ends may be counted in another revolution
+            self.position[indices] = position + whole_revolutions(
+                self.position[indices] - position, self._revolutions[indices]
+            )
             self._catch_up.renew(indices)
         if "effort" in given:
             self.effort[indices] = given["effort"]
@@ -220,7 +222,7 @@ class ImpedanceController(LowerLevelController):
         if "position" not in given:
             return super().away(indices, given)
         steps = given["position"] - self.target[indices]
-        distances = np.abs(steps - whole_turns(steps, self._turns[indices]))
+        distances = np.abs(steps - whole_revolutions(steps, self._revolutions[indices]))
         furthest = int(np.argmax(distances))
         return self.joints[indices[furthest]], float(distances[furthest])
 
@@ -234,7 +236,7 @@ class ImpedanceController(LowerLevelController):
             held = self.target[index]
             limits = self.limits
             away = measured.get(joint, held) - held
-            away -= float(whole_turns(away, self._turns[index]))
+            away -= float(whole_revolutions(away, self._revolutions[index]))
             stretch = (limits.effort[index] + abs(self.applied_effort[index])) / self.stiffness[index]
             if abs(away) > margin + stretch:
                 raise Suspended(

@@ -91,7 +91,7 @@ def _reset_stray(before, k):
     before[STRAYED, k] = before[ALLOWED, k] = before[LIMIT, k] = 0.0
 
 
-def _find_leap(position, velocity, part, before, fastest, turns, endless, arrival, stamp):
+def _find_leap(position, velocity, part, before, fastest, revolutions, endless, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
@@ -107,7 +107,7 @@ def _find_leap(position, velocity, part, before, fastest, turns, endless, arriva
         part: Indices of the joints that were measured.
         before: What is remembered of each joint, shape (ROWS, n).
         fastest: Largest speed of each joint; infinity: none is known.
-        turns: What positions may jump by; 0: nothing.
+        revolutions: What positions may jump by; 0: nothing.
         endless: Whether each joint has no ends.
         arrival: Arrival of the measurement.
         stamp: Its stamp.
@@ -124,7 +124,7 @@ def _find_leap(position, velocity, part, before, fastest, turns, endless, arriva
         for k in part:
             before[SHAKEN_UNTIL, k] = stamp + shaking_time
     for k in part:
-        away = wrapped(position[k] - before[PLACE, k], turns[k])
+        away = wrapped(position[k] - before[PLACE, k], revolutions[k])
         elapsed = max(arrival - before[ARRIVAL, k], min(stamp - before[STAMP, k], LONGEST_INTERVAL))
         if wrong < 0 and abs(away) > 0.1 + 2.0 * fastest[k] * elapsed:
             wrong = k
@@ -135,7 +135,7 @@ def _find_leap(position, velocity, part, before, fastest, turns, endless, arriva
             if wrong < 0 and abs(fast) > 5.0 + 3.0 * fastest[k]:
                 wrong = k + len(position)
             is_frozen = fast == slow and fast != 0.0 and position[k] == before[LAST_POSITION, k]
-            step = wrapped(position[k] - before[LAST_POSITION, k], turns[k]) - 0.5 * passed * (fast + slow)
+            step = wrapped(position[k] - before[LAST_POSITION, k], revolutions[k]) - 0.5 * passed * (fast + slow)
             is_shaken = before[SHAKEN_UNTIL, k] - shaking_time <= stamp < before[SHAKEN_UNTIL, k]
             was_frozen = before[FROZEN_TIME, k] > GAP and not is_frozen
             if is_shaken or passed >= GAP or passed < -LONGEST_INTERVAL or was_frozen:
