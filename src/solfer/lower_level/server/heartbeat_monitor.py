@@ -7,9 +7,6 @@ from solfer.lower_level.lower_level import LowerLevel
 
 logger = logging.getLogger(__name__)
 
-MISSED_CYCLES = 20
-"""Heartbeats that a process may miss in a row."""
-
 
 class HeartbeatSource(Protocol):
     """A process with a heartbeat in each of its cycles.
@@ -39,6 +36,9 @@ class HeartbeatMonitor:
         lost: Whether the heartbeat is missing at present.
         losses: How often it went missing.
     """
+
+    MISSED_CYCLES = 20
+    """Default of `cycles`."""
 
     def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = MISSED_CYCLES):
         self._lower_level = lower_level
