@@ -25,7 +25,7 @@ from solfer.interfaces.trajectories import (
     JointTrajectory,
 )
 from solfer.numerics.ramp import Ramp
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.recording.log import Logger
 from solfer.recording.model import JOINTS_KIND
 from solfer.robot import Robot
@@ -138,7 +138,7 @@ class JointStates(Component):
         self._joints = np.setdiff1d(chain, self._wheels)
         self._goals = JointGoals(robot, self._joints, self._wheels, chain=self.tags.chain)
         self._limit = robot.upper_limits.velocity[self._joints]
-        self._turns = robot.turns[self._joints]
+        self._turns = robot.revolutions[self._joints]
         self._ramp = _JointRamp(len(self._joints))
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))
         self._follower = TrajectoryFollower(
@@ -278,7 +278,7 @@ class JointStates(Component):
         speed = self._speed(request.speed)
         goal, wheel_goal = self._goals.targets_of(request, self._goal, self._speeds.goal)
         moved = goal != self._goal
-        goal[moved] -= whole_turns(goal - self._position, self._turns)[moved]
+        goal[moved] -= whole_revolutions(goal - self._position, self._turns)[moved]
         if self._goals.moves_joints(request):
             self._follower.leave("a request of the service has taken over")
             self._plan(goal, np.minimum(speed, self._limit))

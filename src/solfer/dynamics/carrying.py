@@ -26,10 +26,10 @@ class CarryingTorques:
         tau = h - Q x,   x next to Q^T h of all that satisfy B x = h_free
 
     This is tau = (A without its columns `free`)^+ A h, with the null space A of J (A J^T = 0), for which no matrix of
-    the size of the robot is needed. The eigenvalues of B B^T, from 0 to 1, report how well the contacts hold `free`; in
-    directions with less than WEAK the share s counts as s / WEAK^2 instead of 1 / s. See Mistry, Buchli, Schaal (2010),
-    "Inverse dynamics control of floating base systems using orthogonal decomposition". Where no torques carry the
-    robot, as on contacts in one line, they carry what they can.
+    the size of the robot is needed. The eigenvalues s of B B^T, from 0 to 1, show how well the contacts hold `free`;
+    below WEAK, s / WEAK^2 counts instead of 1 / s. See Mistry, Buchli, Schaal (2010), "Inverse dynamics control of
+    floating base systems using orthogonal decomposition". Where no torques carry the robot, as on contacts in one line,
+    they carry what they can.
 
     Args:
         model: Dynamics of the robot.
@@ -52,7 +52,7 @@ class CarryingTorques:
         self._squares = np.zeros((2, size))
         self._along = np.zeros(size)
         self._held, self._factor = np.zeros((2, count, count))
-        self._load, self._shares, self._ratios = np.zeros((3, count))
+        self._load, self._parts, self._ratios = np.zeros((3, count))
         self._well = np.zeros(count, dtype=bool)
 
     def update(self, jacobian: np.ndarray) -> np.ndarray:
@@ -84,18 +84,18 @@ class CarryingTorques:
         )
         self.carried = len(self._free) if self.rank else 0
         if not is_held:
-            self._share_weakly()
+            self._bear_weakly()
             bear(bias, self._free, self._span, self.rank, self._load, self._along, self.torque)
         return self.torque
 
-    def _share_weakly(self) -> None:
+    def _bear_weakly(self) -> None:
         """Solve for `load` by the eigenvectors of what holds the DoFs `free`; those that little holds fade out."""
         # a symmetric matrix is its transpose, so LAPACK can work on its memory as it is
-        shares, vectors, _ = lapack.dsyev(self._held.T, overwrite_a=1)
-        np.dot(self._load, vectors, out=self._shares)
-        np.greater(shares, WEAK, out=self._well)
+        eigenvalues, vectors, _ = lapack.dsyev(self._held.T, overwrite_a=1)
+        np.dot(self._load, vectors, out=self._parts)
+        np.greater(eigenvalues, WEAK, out=self._well)
         self.carried = int(np.count_nonzero(self._well))
-        np.divide(shares, WEAK**2, out=self._ratios)
-        np.divide(1.0, shares, out=self._ratios, where=self._well)
-        self._shares *= self._ratios
-        np.dot(vectors, self._shares, out=self._load)
+        np.divide(eigenvalues, WEAK**2, out=self._ratios)
+        np.divide(1.0, eigenvalues, out=self._ratios, where=self._well)
+        self._parts *= self._ratios
+        np.dot(vectors, self._parts, out=self._load)

@@ -8,10 +8,6 @@ import math
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
-CANCELLED = 0.5
-"""Share of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
-made its rounding errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9."""
-
 
 @part
 def _dot(a, b):
@@ -34,7 +30,9 @@ def _span(jacobian, tolerance, span, squares):
     """Write orthonormal rows that span those of the Jacobian; return how many there are.
 
     Gram and Schmidt's method with the longest of the remaining rows first, which shows the rank as a QR decomposition
-    with column pivoting does: remainders shorter than `tolerance` times the first row count as zero.
+    with column pivoting does: remainders shorter than `tolerance` times the first row count as zero. A row of which
+    less than half of the squared length is left is made orthogonal a second time: cancellation has made its rounding
+    errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9.
     """
     count = len(jacobian)
     longest = 0.0
@@ -55,7 +53,7 @@ def _span(jacobian, tolerance, span, squares):
                 row[k], other[k] = other[k], row[k]
             left[best], left[r] = left[r], left[best]
             whole[best], whole[r] = whole[r], whole[best]
-        if left[r] < CANCELLED * whole[r]:
+        if left[r] < 0.5 * whole[r]:
             for j in range(r):
                 _add(-_dot(row, span[j]), span[j], row)
             left[r] = _dot(row, row)
@@ -91,7 +89,7 @@ def _carry(jacobian, bias, free, tolerance, weak, span, squares, held, factor, l
         jacobian: That of the contacts, shape (k, n).
         bias: Bias force h, shape (n,).
         free: DoFs without torque, shape (m,).
-        tolerance: Share of the longest row below which what is left of another one counts as zero.
+        tolerance: Ratio to the longest row below which what is left of another one counts as zero.
         weak: Least eigenvalue of B B^T where all is held well.
         span: Orthonormal rows Q^T, as many as the rank; shape (n, n).
         squares: Work space, shape (2, n).

@@ -61,7 +61,7 @@ class DynamicModel(Elements):
 
 
 class DynamicRobotView(RobotView, Protocol):
-    """A Robot with a model of its dynamics, which all its users share."""
+    """A Robot with a model of its dynamics, which all its users have in common."""
 
     @property
     def dynamics(self) -> DynamicModel:

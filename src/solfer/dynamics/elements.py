@@ -7,8 +7,14 @@ import numpy as np
 
 from solfer.dynamics.update_manager import Calls, UpdateManager
 
-BIAS, INERTIA, INERTIA_INVERSE = "bias", "inertia", "inertia_inverse"
-"""Names of the elements of a dynamic model."""
+BIAS = "bias"
+"""Name of the bias force as an element of a dynamic model."""
+
+INERTIA = "inertia"
+"""The same of the inertia matrix."""
+
+INERTIA_INVERSE = "inertia_inverse"
+"""The same of its inverse."""
 
 
 class Elements(ABC):

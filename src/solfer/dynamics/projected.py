@@ -37,7 +37,7 @@ class ProjectedDynamics(Elements):
         self._space = NullSpace(size)
         self._constrained = 0
         self._vector = np.zeros(size)
-        self._turned = np.zeros((size, size), order="F")
+        self._rotated = np.zeros((size, size), order="F")
         self._square = np.zeros((size, size), order="F")
         # one block of memory each, that is cut again when the rank changes
         self._factors = np.zeros(size * size)
@@ -82,7 +82,7 @@ class ProjectedDynamics(Elements):
         self._factor = self._factors[: free * free].reshape((free, free), order="F")
         self._solution = self._solutions[: free * size].reshape((free, size), order="F")
         self._bias = self._vector[:free]
-        self._inertia = self._turned[self.rank :]
+        self._inertia = self._rotated[self.rank :]
         self._inertia_inverse = self._solution.T
 
     def _with_constraints(self, stamp: Callable[[], Hashable]) -> Callable[[], Hashable]:
@@ -92,7 +92,7 @@ class ProjectedDynamics(Elements):
         self._space.project(self.model.bias, self._vector)
 
     def _compute_inertia(self) -> None:
-        self._space.project_columns(self.model.inertia, self._turned)
+        self._space.project_columns(self.model.inertia, self._rotated)
 
     def _compute_inverse(self) -> None:
         self._factor[:] = self._space.project_both(self.model.inertia, self._square)

@@ -7,10 +7,6 @@ from solfer.dynamics import kernel
 from solfer.errors import ModelError
 from solfer.model.view import RobotView
 
-DENSE_CALL, DENSE_SHARE = 3500, 0.125
-"""When LAPACK inverts faster: beyond this many products of the recursion over the tree, plus this share of n^3.
-Measured by `benchmark/growth.py`: it wins from some 30 joints in a row on, and loses where limbs branch off a base."""
-
 
 class _Branches:
     """Which bodies the kernels go over.
@@ -84,7 +80,9 @@ class Recursion:
         self._has_rotors = bool(self._tree.armature.any())
         self._branches = _Branches(self._tree.parents[1:] - 1, self._folds)
         self._bodies = _Bodies(size)
-        self._dense = self._branches.products > DENSE_CALL + DENSE_SHARE * size**3
+        # when LAPACK inverts faster, measured by `benchmark/growth.py`: from some 30 joints in a row on, but not where
+        # limbs branch off a base
+        self._dense = self._branches.products > 3500 + 0.125 * size**3
         # LAPACK's own order, so that it works in place
         self._factor = np.zeros((size, size), order="F" if self._dense else "C")
         self._roots = np.zeros(size)

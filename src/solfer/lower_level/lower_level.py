@@ -13,7 +13,7 @@ from solfer.lower_level.claims.refusals import Refusals
 from solfer.lower_level.emergency_stop import EmergencyStop
 from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.laws.drives import Drives
-from solfer.lower_level.laws.measured_turns import MeasuredPosition
+from solfer.lower_level.laws.measured_position import MeasuredPosition
 from solfer.lower_level.records import LowerLevelRecord
 from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.actuators import Actuators
@@ -24,12 +24,11 @@ from solfer.transport.messages import GAINS, JOINT_FIELDS, JointMessage
 
 logger = logging.getLogger(__name__)
 
-RELEASES = "a call of lower_level/reset_emergency_stop, which releases it"
-STARTS = "a start by lower_level/switch"
-FIRST_COMMAND_FAR_DISTANCE = 0.05
-"""Distance of a first command from the held position above which a warning is logged [rad, m]; springs sag by less."""
-NOWHERE: Mapping[str, float] = MappingProxyType({})
-"""No joint is measured."""
+STARTED = "a start by lower_level/switch"
+"""What commands of a stopped controller need."""
+
+UNMEASURED: Mapping[str, float] = MappingProxyType({})
+"""Positions of a claim that measures no joint."""
 
 
 class LowerLevel:
@@ -83,7 +82,7 @@ class LowerLevel:
         self.refusals = Refusals()
         self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
-        self._measured = MeasuredPosition(kinematics.turns)
+        self._measured = MeasuredPosition(kinematics.revolutions)
         self.starts = 0
 
     @property
@@ -118,7 +117,9 @@ class LowerLevel:
                 self.claims.bar(owner, self.emergency.reason or self.safeguard.reason)
                 self._check_suspended(f"command of '{owner}'")
             if not target.running:
-                raise Suspended(f"controller '{controller}' is stopped", where=f"command of '{owner}'", expected=STARTS)
+                raise Suspended(
+                    f"controller '{controller}' is stopped", where=f"command of '{owner}'", expected=STARTED
+                )
             indices, given = target.check(message)
             names = tuple(message.names)
             modes = tuple(given)
@@ -136,7 +137,7 @@ class LowerLevel:
         owner: str,
         requested: Sequence[ClaimedJoints],
         follows: Sequence[str] = (),
-        measured: Mapping[str, float] = NOWHERE,
+        measured: Mapping[str, float] = UNMEASURED,
     ) -> bool:
         """Grant joints to an owner, all or none; see `Claims.claim`. Fields without an owner return to the default.
 
@@ -153,7 +154,7 @@ class LowerLevel:
         for item in requested:
             if not self.controllers[item.controller].running:
                 raise Suspended(
-                    f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'", expected=STARTS
+                    f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'", expected=STARTED
                 )
             if "position" in item.modes:
                 self.controllers[item.controller].check_measured(item.indices, measured)
@@ -284,7 +285,7 @@ class LowerLevel:
     ) -> None:
         """Warn when a sender's first command is far from where the joints are held."""
         joint, distance = target.away(indices, given)
-        if distance > FIRST_COMMAND_FAR_DISTANCE:
+        if distance > 0.05:  # [rad, m]; springs sag by less
             self._throttle.warning(
                 target.name,
                 "'%s' begins %.3f away from where joint '%s' is held: it goes there smoothly",
@@ -303,7 +304,11 @@ class LowerLevel:
     def _check_suspended(self, where: str) -> None:
         """Raise a Suspended at `where` while no command is accepted."""
         if self.emergency:
-            raise Suspended(self.emergency.reason, where=where, expected=RELEASES)
+            raise Suspended(
+                self.emergency.reason,
+                where=where,
+                expected="a call of lower_level/reset_emergency_stop, which releases it",
+            )
         if self.safeguard.reason:
             raise Suspended(self.safeguard.reason, where=where, expected=self.safeguard.expected)
 

@@ -7,18 +7,14 @@ from pydantic import Field, model_validator
 
 from solfer.config import Record
 from solfer.config.records.bounds import DURATION, TIMEOUT
-from solfer.lower_level.laws.controllers import CONTROLLER_TIMEOUT
+from solfer.lower_level.laws.controllers import VELOCITY_TIMEOUT
 from solfer.transport.messages import LARGEST_GAIN
 
-LEASE = 0.3  # [s]
-RECORD_FADE = 0.5  # [s]
-TILT_LIMIT = 1.0472
-TILT_DURATION = 0.5  # 60 degrees [rad], [s]
-OVERSPEED = 2.0
-OVERSPEED_TIME = 0.05  # [s]
+LARGEST_RATION = 10_000
+"""Largest number of messages of a ration."""
 
-RATION_MESSAGES, RATION_BYTES = 10_000, 2**24
-"""Largest numbers of a ration: of messages, and of bytes."""
+LARGEST_MESSAGE = 2**24
+"""Largest number of bytes of a message that a ration may allow."""
 
 ALL = "all"
 """Group that every moving joint belongs to."""
@@ -34,7 +30,7 @@ class JointControllerRecord(Record):
     group: str = Field(default=ALL, min_length=1, description="group of the SRDF that it controls, or `all`")
     except_: str | None = Field(default=None, alias="except", min_length=1, description="group that it leaves out")
     timeout: float = Field(
-        default=CONTROLLER_TIMEOUT, **TIMEOUT, description="age at which a commanded velocity becomes zero [s]"
+        default=VELOCITY_TIMEOUT, **TIMEOUT, description="age at which a commanded velocity becomes zero [s]"
     )
 
 
@@ -44,26 +40,26 @@ class RationRecord(Record):
     owners: int = Field(
         default=16,
         ge=1,
-        le=RATION_MESSAGES,
+        le=LARGEST_RATION,
         description="commands of a controller in a cycle from senders that have a lease; they come first",
     )
-    others: int = Field(default=2, ge=1, le=RATION_MESSAGES, description="the same from all other senders")
+    others: int = Field(default=2, ge=1, le=LARGEST_RATION, description="the same from all other senders")
     requests: int = Field(
-        default=2, ge=1, le=RATION_MESSAGES, description="requests in a cycle; an emergency stop needs none"
+        default=2, ge=1, le=LARGEST_RATION, description="requests in a cycle; an emergency stop needs none"
     )
     waiting: int = Field(
-        default=64, ge=1, le=RATION_MESSAGES, description="commands of one sender, and requests, that may wait"
+        default=64, ge=1, le=LARGEST_RATION, description="commands of one sender, and requests, that may wait"
     )
     command: int | None = Field(
         default=None,
         ge=64,
-        le=RATION_BYTES,
+        le=LARGEST_MESSAGE,
         description="bytes of a command (default: twice those of one for all joints of the controller, and 1024)",
     )
     request: int | None = Field(
         default=None,
         ge=64,
-        le=RATION_BYTES,
+        le=LARGEST_MESSAGE,
         description="bytes of a request (default: twice those of the names of all joints, and 4096)",
     )
 
@@ -72,7 +68,7 @@ class LowerLevelRecord(Record):
     """Settings of the lower level's defences of its robot."""
 
     lease: float = Field(
-        default=LEASE, **TIMEOUT, description="time without a command after which a claim on joints ends [s]"
+        default=0.3, **TIMEOUT, description="time without a command after which a claim on joints ends [s]"
     )
     silence: Literal["keep", "hold", "stop", "damp"] = Field(
         default="hold",
@@ -80,26 +76,24 @@ class LowerLevelRecord(Record):
         "positions hold; stop: hold, and senders without a claim have to claim, too; damp: emergency stop",
     )
     fade: float = Field(
-        default=RECORD_FADE, ge=1e-3, le=60.0, description="time in which springs vanish in an emergency stop [s]"
+        default=0.5, ge=1e-3, le=60.0, description="time in which springs vanish in an emergency stop [s]"
     )
     tilt: float = Field(
-        default=TILT_LIMIT,
+        default=1.0472,  # 60 degrees
         ge=0.0,
         lt=math.pi,
         description="tilt of a floating base against the vertical "
         "beyond which the robot has fallen, and holds [rad]; 0: no tilt is too large",
     )
-    tilt_time: float = Field(default=TILT_DURATION, **DURATION, description="how long it has to be tilted so far [s]")
+    tilt_time: float = Field(default=0.5, **DURATION, description="how long it has to be tilted so far [s]")
     overspeed: float = Field(
-        default=OVERSPEED,
+        default=2.0,
         ge=0.0,
         le=100.0,
         description="multiple of its speed limit beyond which a joint "
         "is out of control, and the robot holds, 1 or more; 0: no speed is too large",
     )
-    overspeed_time: float = Field(
-        default=OVERSPEED_TIME, **DURATION, description="how long a joint has to be so fast [s]"
-    )
+    overspeed_time: float = Field(default=0.05, **DURATION, description="how long a joint has to be so fast [s]")
     gains_folders: tuple[str, ...] = Field(
         default=(),
         description="folders, beside this file's own, from which `load_gains` may read; relative to "

@@ -15,9 +15,6 @@ from solfer.errors import SolferError, UnknownName, raise_all
 _DAMPING: Bounds = {"ge": 0.0, "le": 1e5}
 _INERTIA: Bounds = {"ge": 0.0, "le": 1e4}
 
-SERIES_ELASTIC, UNACTUATED_TYPE, RIGID = "SEA", "UNACTUATED", "RIGID"
-"""Types of actuators: with a spring, none, and a drive of which nothing is known."""
-
 
 @dataclass(frozen=True)
 class SeriesElastic:
@@ -71,7 +68,7 @@ class ActuatorRecord(Record):
     @model_validator(mode="after")
     def _complete(self) -> "ActuatorRecord":
         given = [key for key in type(self).model_fields if key != "type" and getattr(self, key) is not None]
-        if self.type == UNACTUATED_TYPE:
+        if self.type == "UNACTUATED":
             if given:
                 raise ValueError(f"an UNACTUATED joint with '{given[0]}'; expected nothing but the type")
             return self
@@ -93,7 +90,7 @@ class ActuatorRecord(Record):
 
         None: there is no drive.
         """
-        if self.type == UNACTUATED_TYPE:
+        if self.type == "UNACTUATED":
             return None
         return SeriesElastic(
             stiffness=self.Ks,
@@ -123,7 +120,7 @@ class Actuators:
     Attributes:
         dofs: Names of the robot's DoFs.
         driven: Whether there is a drive: the actuation state, shape (n,).
-        types: Type of each DoF: `SEA`, `UNACTUATED_TYPE`, or `RIGID` for a drive of which nothing is known.
+        types: Type of each DoF: `SEA`, `UNACTUATED`, or `RIGID` for a drive of which nothing is known.
         names: Names of the DoFs with an actuator, in the robot's order.
         stiffness: [Nm/rad], shape (n,), zero without an actuator, as in all following arrays.
         damping: [Nms/rad], shape (n,).
@@ -195,8 +192,8 @@ class Actuators:
 
     def _type(self, name: str, driven: bool) -> str:
         if not driven:
-            return UNACTUATED_TYPE
-        return SERIES_ELASTIC if name in self._table else RIGID
+            return "UNACTUATED"
+        return "SEA" if name in self._table else "RIGID"
 
     def _array(self, attribute: str) -> np.ndarray:
         return np.array([getattr(self._table[name], attribute) if name in self._table else 0.0 for name in self.dofs])

@@ -14,7 +14,6 @@ _Coordinate = Annotated[float, Field(**OFFSET)]
 Place = tuple[_Coordinate, _Coordinate, _Coordinate]
 _Entry = Annotated[float, Field(**DIRECTION)]
 Row = tuple[_Entry, _Entry, _Entry, _Entry, _Entry, _Entry]
-_CLOSE = 0.02  # part of a wheel's radius by which its offset may differ: files have rounded numbers
 
 
 class AxisRecord(Record):
@@ -81,7 +80,7 @@ class ContactRecord(Record):
             return self
         length = math.hypot(*self.offset)
         radius = self.minor_axis + self.major_axis
-        if abs(length - radius) > _CLOSE * radius:
+        if abs(length - radius) > 0.02 * radius:  # files have rounded numbers
             raise ValueError(
                 f"an 'offset' of {length:g} m from a wheel's centre to the ground; expected the sum of its radii, "
                 f"{radius:g} m"

@@ -24,12 +24,7 @@ class PlacedElement(Element):
 XACRO = "xacro:"
 """Prefix of the elements that the program xacro expands."""
 
-EXPANSION = 60.0
-"""Longest time that an expansion may take [s]."""
-
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
-_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?\bencoding\s*=\s*["']([\w.-]+)["']""")
-_BARE_AMPERSAND = re.compile(r"&(?!(?:amp|lt|gt|quot|apos|#\d+|#x[0-9a-fA-F]+);)")
 
 
 def read_text(path: str | Path, kind: str) -> str:
@@ -53,7 +48,7 @@ def _decoded(content: bytes, where: str, kind: str) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        declared = _ENCODING.match(content)
+        declared = re.match(rb"""\s*<\?xml[^>]*?\bencoding\s*=\s*["']([\w.-]+)["']""", content)
         named = "utf-8" if declared is None else declared[1].decode().lower()
         encoding = "latin-1" if named.startswith("utf") else named
         try:
@@ -75,7 +70,7 @@ def _expanded(path: str | Path, kind: str) -> str:
         what = f"the {kind} is written for xacro, which is not installed"
         raise ModelError(what, where=str(path), expected=f"{expected}, or the Debian package of xacro")
     try:
-        done = subprocess.run([program, str(path)], capture_output=True, timeout=EXPANSION, check=True)
+        done = subprocess.run([program, str(path)], capture_output=True, timeout=60.0, check=True)
     except (OSError, subprocess.SubprocessError) as error:
         output = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
         reason = output[-1] if output else str(error)
@@ -141,7 +136,7 @@ def _refuse_xacro(robot: Element, where: str, kind: str) -> None:
 def _mended(text: str) -> str:
     """Blank out comments and what stands behind the robot, and write ampersands as XML does; lines stay."""
     text = _COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
-    text = _BARE_AMPERSAND.sub("&amp;", text)
+    text = re.sub(r"&(?!(?:amp|lt|gt|quot|apos|#\d+|#x[0-9a-fA-F]+);)", "&amp;", text)
     end = re.search(r"</robot\s*>", text)
     return text if end is None else text[: end.end()]
 

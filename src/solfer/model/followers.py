@@ -10,7 +10,7 @@ from solfer.model.urdf.elements import Mimic
 class Followers:
     """DoFs that follow others: q_f = r q_l + o, so that both are one degree of freedom, that of the leader l.
 
-    A follower keeps its place in all arrays. Where numbers of all DoFs are folded, the leader gets the share of its
+    A follower keeps its place in all arrays. Where numbers of all DoFs are folded, the leader gets those of its
     followers, whose own columns become zero.
 
     Args:

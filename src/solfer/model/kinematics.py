@@ -40,7 +40,7 @@ class Kinematics:
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
         tree: Joints as live arrays, the input of Points.
         followers: DoFs that follow others. Their columns of all Jacobians are zero, and those of their leaders contain
-            their share; positions and velocities have to be theirs.
+            them; positions and velocities have to be theirs.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
@@ -50,7 +50,7 @@ class Kinematics:
         upper_position: Upper limits [rad, m], shape (n,); inf where there is none.
         velocity_limit: Largest speeds [rad/s, m/s], shape (n,); inf where there is none.
         effort_limit: Largest efforts [Nm, N], shape (n,); inf where there is none.
-        turns: Turn after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
+        revolutions: Angle after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
 
     Raises:
         ModelError: Pinocchio cannot read the robot, or it has no DoF, or more than MAX_DOFS.
@@ -267,7 +267,7 @@ class Kinematics:
         self.upper_position = _limits([joint.upper if joint else None for joint in joints], np.inf)
         self.velocity_limit = _limits([joint.velocity if joint else None for joint in joints], np.inf)
         self.effort_limit = _limits([joint.effort if joint else None for joint in joints], np.inf)
-        self.turns = np.array([math.tau if joint and joint.type == "continuous" else 0.0 for joint in joints])
+        self.revolutions = np.array([math.tau if joint and joint.type == "continuous" else 0.0 for joint in joints])
 
     def _bound_leaders(self) -> None:
         """Give the limits of followers to their leaders; efforts of followers do not exist."""

@@ -4,9 +4,6 @@ import numpy as np
 
 from solfer.model.kinematics import Kinematics
 
-ITERATIONS = 50
-LINK_CLOSENESS = 1e-9  # [m]
-
 
 def neutral_posture(kinematics: Kinematics) -> np.ndarray:
     """Compute positions of all DoFs, shape (kinematics.size,) [rad, m]: as near to zero as the joints' limits allow.
@@ -24,10 +21,10 @@ def neutral_posture(kinematics: Kinematics) -> np.ndarray:
         return posture
     kinematics.update(np.zeros(kinematics.size))
     goal = _ground_plan(kinematics, tips)
-    for _ in range(ITERATIONS):
+    for _ in range(50):
         kinematics.update(posture)
         away = goal - _ground_plan(kinematics, tips)
-        if np.abs(away).max() < LINK_CLOSENESS:
+        if np.abs(away).max() < 1e-9:  # [m]
             break
         jacobian = np.concatenate([kinematics.jacobian(tip)[:2, free] for tip in tips])
         posture[free] += np.linalg.lstsq(jacobian, away, rcond=1e-6)[0]

@@ -12,10 +12,12 @@ from solfer.model.history import History
 DEFAULTS = ("position", "velocity", "acceleration", "torque")
 """Interfaces of every State."""
 
+POSE_COVARIANCE = "pose_covariance"
+"""Interface of who estimates a floating base: 36 numbers, row by row, of position and rotations about the axes of the
+world [m, rad]."""
 
-POSE_COVARIANCE, TWIST_COVARIANCE = "pose_covariance", "twist_covariance"
-"""Interfaces of who estimates a floating base, 36 numbers each, row by row: of position and turns about the axes of the
-world [m, rad], and of linear and angular velocity in the axes of the base's link [m/s, rad/s]."""
+TWIST_COVARIANCE = "twist_covariance"
+"""The same of linear and angular velocity in the axes of the base's link [m/s, rad/s]."""
 
 
 class _Interface:
@@ -105,7 +107,7 @@ class State:
         elif len(self._arrays[name]) != size:
             raise SizeMismatch(
                 f"an interface '{name}' of {size} numbers, which another component has with {len(self._arrays[name])}",
-                expected="one size for all that share the State, or another name",
+                expected="one size for all that have this State in common, or another name",
             )
         self._added.add(name)
         return self._arrays[name]

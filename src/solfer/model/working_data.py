@@ -3,21 +3,18 @@
 import numpy as np
 import pinocchio as pin
 
-LARGE = 100
-"""DoFs from which on the fields are made one by one: all of Pinocchio's own take 140 MB here, and grow with n^3."""
-
 
 def working_data(model: pin.Model) -> pin.Data:
     """Make the data of a model with one DoF a joint, n of them.
 
-    Pinocchio's `Data` of a model contains four tensors of n^3 numbers for second derivatives: 4 GB at 500 DoFs. A large
-    model gets only what the kinematics, the inertia matrix and the bias force need, which is n^2 numbers; nothing
-    else must be computed in it.
+    Pinocchio's `Data` of a model contains four tensors of n^3 numbers for second derivatives: 4 GB at 500 DoFs. A model
+    of 100 DoFs or more, where its fields take 140 MB, gets only what the kinematics, the inertia matrix and the bias
+    force need, which is n^2 numbers; nothing else must be computed in it.
     """
-    return model.createData() if model.nv < LARGE else _lean(model)
+    return model.createData() if model.nv < 100 else _small_data(model)
 
 
-def _lean(model: pin.Model) -> pin.Data:
+def _small_data(model: pin.Model) -> pin.Data:
     data = pin.Data()
     bodies = model.njoints
     size = model.nv

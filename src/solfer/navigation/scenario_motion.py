@@ -216,4 +216,4 @@ class ScenarioPositions(ScenarioMotion):
         move = self._jumps.find(self._pose, self._middleware.now())
         if move is not None:
             move.move(self._begin[BASE_PORT][:3])
-            self._heading += move.turn
+            self._heading += move.yaw

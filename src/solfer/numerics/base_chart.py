@@ -8,10 +8,6 @@ from numpy.typing import ArrayLike
 
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 
-SMALLEST_COSINE = 1e-3
-"""|cos(ry)| below which rates are computed as if it had this size: |ry| closer than 0.06 degrees to pi/2."""
-
-
 # These three are compiled as well (`solfer.numerics.twist_transport`).
 
 
@@ -51,8 +47,8 @@ def rates_of(rx, ry, wx, wy, wz):
     sx = math.sin(rx)
     cy = math.cos(ry)
     sy = math.sin(ry)
-    if abs(cy) < SMALLEST_COSINE:
-        cy = math.copysign(SMALLEST_COSINE, cy)
+    if abs(cy) < 1e-3:  # |ry| is closer than 0.06 degrees to pi/2
+        cy = math.copysign(1e-3, cy)
     yaw = (cx * wz - sx * wy) / cy
     return wx - sy * yaw, cx * wy + sx * wz, yaw
 
@@ -62,7 +58,7 @@ class BaseChart:
 
     With the origin's pose (p_o, R_o) in the world, the base is at p_o + R_o (x, y, z) and is rotated by
     R_o Rx(rx) Ry(ry) Rz(rz). The chart is singular at |ry| = pi/2, where rx and rz turn about the same axis: there
-    `from_pose` sets rz to zero, and rates that belong to a twist are bounded by `SMALLEST_COSINE`.
+    `from_pose` sets rz to zero, and rates that belong to a twist are computed with |cos(ry)| >= 1e-3.
 
     Args:
         position: Position of the origin in the world, shape (3,) [m].

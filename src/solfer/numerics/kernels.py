@@ -98,54 +98,54 @@ def _collect(arrays, dofs, out):
 
 
 @part
-def wrapped(displacement, turn):
-    """Return a displacement without whole turns; a turn of 0 is none."""
-    return displacement - turn * math.floor(displacement / turn + 0.5) if turn else displacement
+def wrapped(displacement, revolution):
+    """Return a displacement without whole revolutions; one of 0 is none."""
+    return displacement - revolution * math.floor(displacement / revolution + 0.5) if revolution else displacement
 
 
-def _unwrap(position, part, before, turns, added):
-    """Add whole turns to positions of senders that count within one turn, so that none moves by more than half of it.
+def _unwrap(position, part, before, revolutions, added):
+    """Add whole revolutions to positions of senders that count within one, so that none moves by more than half of it.
 
     Args:
         position: Positions, as they came; written.
         part: Indices of the positions that came.
-        before: The positions before, NaN: there is none; and the least and largest ones that came.
-        turns: What positions may jump by; 0: nothing.
+        before: The positions before, NaN: there is none; and the lowest and highest ones that came.
+        revolutions: What positions may jump by; 0: nothing.
         added: What was added before; written.
     """
     for k in part:
-        if turns[k]:
+        if revolutions[k]:
             came = position[k]
-            least = min(before[1, k], came)
-            largest = max(before[2, k], came)
-            if before[0, k] == before[0, k] and largest - least <= turns[k] * (1.0 + 1e-6):
-                added[k] = turns[k] * math.floor((before[0, k] - came) / turns[k] + 0.5)
+            lowest = min(before[1, k], came)
+            highest = max(before[2, k], came)
+            if before[0, k] == before[0, k] and highest - lowest <= revolutions[k] * (1.0 + 1e-6):
+                added[k] = revolutions[k] * math.floor((before[0, k] - came) / revolutions[k] + 0.5)
             position[k] = came + added[k]
 
 
 unwrap = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1])", _unwrap)
 
 
-def _keep_turns(position, part, before, added):
+def _keep_revolutions(position, part, before, added):
     """Keep positions that `unwrap` has written, for the next ones."""
     for k in part:
         came = position[k] - added[k]
         before[0, k], before[1, k], before[2, k] = position[k], min(before[1, k], came), max(before[2, k], came)
 
 
-keep_turns = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1])", _keep_turns)
+keep_revolutions = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1])", _keep_revolutions)
 
 
-def _shorten(displacements, turns):
-    """Remove whole turns from displacements, in place; a turn of 0 is none.
+def _shorten(displacements, revolutions):
+    """Remove whole revolutions from displacements, in place; one of 0 is none.
 
     Args:
         displacements: Differences of positions, one row at a time.
-        turns: What positions may jump by, one of each column.
+        revolutions: What positions may jump by, one of each column.
     """
     for row in displacements:
-        for k in range(len(turns)):
-            row[k] = wrapped(row[k], turns[k])
+        for k in range(len(revolutions)):
+            row[k] = wrapped(row[k], revolutions[k])
 
 
 shorten = cached("void(float64[:, ::1], float64[::1])", _shorten)

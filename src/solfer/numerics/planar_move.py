@@ -1,4 +1,4 @@
-"""A turn about z and a shift: how references move with a base whose estimate has jumped."""
+"""A rotation about z and a shift: how references move with a base whose estimate has jumped."""
 
 import math
 
@@ -10,27 +10,27 @@ from solfer.numerics.rotations import quaternion_product
 class PlanarMove:
     """Moves what is given in the world along with a base, whose estimate has jumped while the robot has not.
 
-    A place p goes to a + Rz (p - b), with the base's place before, b, and after, a. What leans is a matter of gravity,
+    A place p goes to a + Rz (p - b), with the base's place before, b, and after, a. The tilt is a matter of gravity,
     which has not changed.
 
     Args:
         before: Place of the base before, shape (3,) [m].
         after: Place of the base after, shape (3,) [m].
-        turn: Angle of Rz, by which the heading has changed [rad].
+        yaw: Angle of Rz, by which the heading has changed [rad].
 
     Attributes:
-        turn: See above.
+        yaw: See above.
         rise: How much higher the base is [m].
     """
 
-    def __init__(self, before: np.ndarray, after: np.ndarray, turn: float):
-        self.turn = turn
+    def __init__(self, before: np.ndarray, after: np.ndarray, yaw: float):
+        self.yaw = yaw
         self.rise = float(after[2] - before[2])
         self._before = np.array(before, dtype=float)
         self._after = np.array(after, dtype=float)
-        self._cos = math.cos(turn)
-        self._sin = math.sin(turn)
-        self._quaternion = 0.0, 0.0, math.sin(0.5 * turn), math.cos(0.5 * turn)
+        self._cos = math.cos(yaw)
+        self._sin = math.sin(yaw)
+        self._quaternion = 0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)
 
     @property
     def distance(self) -> float:
@@ -50,10 +50,10 @@ class PlanarMove:
         y = vector[1]
         vector[0], vector[1] = self._cos * x - self._sin * y, self._sin * x + self._cos * y
 
-    def turn_orientation(self, quaternion: np.ndarray) -> None:
-        """Turn an orientation, quaternion (x, y, z, w)."""
+    def rotate_orientation(self, quaternion: np.ndarray) -> None:
+        """Rotate an orientation, quaternion (x, y, z, w)."""
         quaternion[:] = quaternion_product(self._quaternion, quaternion.tolist())
 
-    def turn_angle(self, angle: float) -> float:
+    def rotate_heading(self, heading: float) -> float:
         """Return a heading after the move, from -pi to pi [rad]."""
-        return math.remainder(angle + self.turn, 2.0 * math.pi)
+        return math.remainder(heading + self.yaw, 2.0 * math.pi)

@@ -4,8 +4,6 @@ import numpy as np
 
 from solfer.errors import NotFinite, SizeMismatch
 
-_BISECTIONS = 60
-
 
 class Ramp:
     """Quintic motion of several joints that start together, possibly in motion, and come to rest together.
@@ -80,11 +78,11 @@ class Ramp:
             position[:] = self._goal
             velocity.fill(0.0)
             return
-        share = max(time, 0.0) / self.duration
-        _evaluate(self._leap, self._motion, share, out=position)
-        position *= share
+        u = max(time, 0.0) / self.duration
+        _evaluate(self._leap, self._motion, u, out=position)
+        position *= u
         position += self._start
-        _evaluate(self._start_velocity, self._speed, share, out=velocity)
+        _evaluate(self._start_velocity, self._speed, u, out=velocity)
 
     def _shortest(self, distance: np.ndarray, limits: np.ndarray) -> float:
         """Find the least common duration [s].
@@ -131,7 +129,7 @@ def _fastest_mean(ratio: np.ndarray) -> np.ndarray:
     """
     low = np.zeros_like(ratio)
     high = np.ones_like(ratio)
-    for _ in range(_BISECTIONS):
+    for _ in range(60):
         u = 0.5 * (low + high)
         slope = 6.0 * ratio * (5.0 * u - 3.0) * (u - u * u) ** 2 + (1.0 - ratio * _decay(u)) * (1.0 - 2.0 * u)
         np.copyto(low, u, where=slope > 0.0)

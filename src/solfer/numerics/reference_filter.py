@@ -8,28 +8,10 @@ from solfer.numerics.compilation import cached, part
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import UNIT_TOLERANCE
 
-SPEED_LIMIT, ACCELERATION_LIMIT = 0, 1
-"""Columns of the limits, of positions; those of orientations are behind them."""
-
-STREAM = 0.1
-"""Longest time between two targets of a stream [s]; slower ones are targets on their own."""
-
-FILTER_PATIENCE = 2.0
-"""A stream goes on until no target has come for so many of its periods."""
-
-FIRST_RATIO = 0.25
-"""Ratio of its limits within which a reference goes to a stream that it has not met since its start."""
-
-RATIO_GROWTH = 0.1
-"""Rate at which this ratio grows, so that the reference meets fast streams, too [1/s]."""
-
-REST_SUM = 1e-9
-"""Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
-
 FURTHEST_TARGET = 1e4
 """Largest coordinate of a target [m]; one beyond it counts as not finite."""
 
-TAKEN, NOT_FINITE, NOT_A_TURN = range(3)
+TAKEN, NOT_FINITE, NOT_A_ROTATION = range(3)
 """Outcomes of `ReferenceFilter.aim`."""
 
 
@@ -41,8 +23,8 @@ class ReferenceFilter:
     the period T. Its velocity changes by a T in a cycle at most. So it arrives without overshoot, but for what one
     period adds. Targets that come one after the other count as one that moves: their mean velocity is added, and the
     target goes on with it between two of them. Such a stream may have gone far away before a start: the reference goes
-    to it within a quarter of its limits, until it meets it. Orientations do the same with the rotation vector to the
-    target in world axes.
+    to it within a quarter of its limits, and a tenth of them more in each second, until it meets it. Orientations do
+    the same with the rotation vector to the target in world axes.
 
     Args:
         size: Number m of the references.
@@ -50,13 +32,15 @@ class ReferenceFilter:
 
     Attributes:
         period: Time by which the next `update` goes on [s]; may be set before each.
-        limits: Largest speed [m/s] and acceleration [m/s^2], then those of the turn [rad/s, rad/s^2], shape (m, 4); inf
-            where there is none.
+        limits: Largest speed [m/s] and acceleration [m/s^2], then those of the rotation [rad/s, rad/s^2], shape (m, 4);
+            inf where there is none.
         target: Targets, positions [m], then quaternions (x, y, z, w), shape (m, 7).
         value: The references, shape (m, 7); live.
         rate: Their velocities, linear [m/s], then angular in world axes [rad/s], shape (m, 6); live.
         all_still: Whether all were at their targets, at rest, in the last `update`.
     """
+
+    _FIRST_RATIO = 0.25  # of the limits, for a stream that was not met since the start
 
     def __init__(self, size: int, period: float):
         self.period = period
@@ -69,7 +53,7 @@ class ReferenceFilter:
         self._age = np.zeros(size)
         self._gap = np.zeros(size)
         # ratio of the limits that a stream is followed with
-        self._ratio = np.full(size, FIRST_RATIO)
+        self._ratio = np.full(size, self._FIRST_RATIO)
         self._is_still = np.ones(size, dtype=np.bool_)
         self.all_still = True
         self._work = np.zeros((3, 7))
@@ -81,7 +65,7 @@ class ReferenceFilter:
         self._stream[index] = 0.0
         self._age[index] = np.inf
         self._gap[index] = 0.0
-        self._ratio[index] = FIRST_RATIO
+        self._ratio[index] = self._FIRST_RATIO
         self._is_still[index] = True
 
     def aim(self, index: int, numbers: np.ndarray, first: int, stream: bool = False) -> int:
@@ -94,7 +78,7 @@ class ReferenceFilter:
             stream: Whether others follow, so that it moves in between.
 
         Returns:
-            TAKEN; NOT_FINITE, or NOT_A_TURN where the quaternion has not the length 1: then nothing has changed.
+            TAKEN; NOT_FINITE, or NOT_A_ROTATION where the quaternion has not the length 1: then nothing has changed.
         """
         return _aim(
             index,
@@ -114,7 +98,7 @@ class ReferenceFilter:
         """Move a reference and its target in the world, with what they are doing."""
         for numbers in (self.target[index], self.value[index]):
             move.move(numbers[:3])
-            move.turn_orientation(numbers[3:])
+            move.rotate_orientation(numbers[3:])
         for rates in (self.rate[index], self._stream[index]):
             move.rotate(rates[:3])
             move.rotate(rates[3:])
@@ -149,8 +133,8 @@ class ReferenceFilter:
 
 
 @part
-def _turn_to(target, value, out):
-    """Write the rotation vector that turns one quaternion into another, in world axes, at most a half turn."""
+def _write_rotation(target, value, out):
+    """Write the rotation vector that turns one quaternion into another, in world axes, at most pi."""
     ax = target[3]
     ay = target[4]
     az = target[5]
@@ -170,8 +154,8 @@ def _turn_to(target, value, out):
 
 
 @part
-def _turn_by(value, rate, time):
-    """Turn a quaternion by an angular velocity in world axes for some time."""
+def _rotate(value, rate, time):
+    """Rotate a quaternion by an angular velocity in world axes for some time."""
     x = 0.5 * time * rate[3]
     y = 0.5 * time * rate[4]
     z = 0.5 * time * rate[5]
@@ -242,18 +226,18 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
     if last == 7:
         length = math.sqrt(numbers[-4] ** 2 + numbers[-3] ** 2 + numbers[-2] ** 2 + numbers[-1] ** 2)
         if abs(length * length - 1.0) > UNIT_TOLERANCE:
-            return NOT_A_TURN
+            return NOT_A_ROTATION
     new = work[0]
-    turn = work[1]
+    rotation = work[1]
     for k in range(7):
         new[k] = target[k] if k < first or k >= last else numbers[k - first] / (length if k > 2 else 1.0)
-    _turn_to(new, target, turn)
+    _write_rotation(new, target, rotation)
     time = age[index]
     # the first of a stream says nothing of its velocity
-    is_stream = stream and 0.0 < time < STREAM
+    is_stream = stream and 0.0 < time < 0.1  # [s]; slower ones are targets on their own
     for k in range(3):
         velocity[k] = (new[k] - target[k]) / time if is_stream else 0.0
-        velocity[3 + k] = turn[k] / time if is_stream else 0.0
+        velocity[3 + k] = rotation[k] / time if is_stream else 0.0
     # what is faster than the reference may be is no motion, but another target
     if _norm(velocity[:3]) > limits[0] or _norm(velocity[3:]) > limits[2]:
         velocity[:] = 0.0
@@ -271,30 +255,30 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, ratios, s
     aim = work[2]
     all_still = True
     for i in range(len(target)):
-        if age[i] > FILTER_PATIENCE * gap[i]:
+        if age[i] > 2.0 * gap[i]:  # a stream goes on until no target has come for two of its periods
             stream[i] = 0.0
         aim[:] = target[i]
         if stream[i].any():
             for k in range(3):
                 aim[k] += stream[i, k] * age[i]
-            _turn_by(aim, stream[i], age[i])
+            _rotate(aim, stream[i], age[i])
         for k in range(3):
             error[k] = aim[k] - value[i, k]
         distance = _norm(error)
         ratio = ratios[i] if age[i] < math.inf else 1.0
         speed = ratio * limits[i, 0]
-        turn_speed = ratio * limits[i, 2]
+        angular_speed = ratio * limits[i, 2]
         _approach(error, stream[i, :3], rate[i, :3], speed, ratio * limits[i, 1], period, desired)
-        _turn_to(aim, value[i], error)
-        _approach(error, stream[i, 3:], rate[i, 3:], turn_speed, ratio * limits[i, 3], period, desired)
+        _write_rotation(aim, value[i], error)
+        _approach(error, stream[i, 3:], rate[i, 3:], angular_speed, ratio * limits[i, 3], period, desired)
         if ratio < 1.0:
-            has_met = distance <= speed * period and _norm(error) <= turn_speed * period
-            ratios[i] = 1.0 if has_met else min(ratio + RATIO_GROWTH * period, 1.0)
+            has_met = distance <= speed * period and _norm(error) <= angular_speed * period
+            ratios[i] = 1.0 if has_met else min(ratio + 0.1 * period, 1.0)
         for k in range(3):
             value[i, k] += period * rate[i, k]
-        _turn_by(value[i], rate[i], period)
+        _rotate(value[i], rate[i], period)
         age[i] += period
-        still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < REST_SUM and distance + _norm(error) < REST_SUM
+        still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < 1e-9 and distance + _norm(error) < 1e-9
         all_still = all_still and still[i]
     return all_still
 
@@ -310,7 +294,7 @@ def _halt_at(target, value, rate, limits, period, displacement):
     target[:] = value
     for k in range(3):
         target[k] += displacement[k]
-    _turn_by(target, displacement, 1.0)
+    _rotate(target, displacement, 1.0)
 
 
 _ROW = "float64[::1]"

@@ -20,12 +20,6 @@ error-state Kalman filter", arXiv:1711.02508, section 3.
 UNIT_TOLERANCE = 1e-2
 """Largest deviation of the square of an external quaternion's length from one, as in tf2; it is made one."""
 
-INEXACT = 1e-3
-"""The same from which on it is reported: more than the rounding of numbers of 32 bits, or of three digits."""
-
-ORTHONORMAL = 1e-6
-"""Largest deviation of R^T R of a rotation matrix R from the identity."""
-
 
 def rotation_from_rpy(rpy: Sequence[float] | np.ndarray) -> np.ndarray:
     """Compute the rotation matrix Rz(yaw) Ry(pitch) Rx(roll) of a URDF's `rpy` [rad], shape (3, 3)."""
@@ -83,7 +77,7 @@ def normalize(quaternions: np.ndarray) -> bool:
     if not deviation <= UNIT_TOLERANCE:
         raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
     quaternions /= norm
-    return deviation > INEXACT
+    return deviation > 1e-3  # more than the rounding of numbers of 32 bits, or of three digits
 
 
 class QuaternionConvention:
@@ -181,7 +175,7 @@ def require_rotation(matrix: np.ndarray, what: str) -> None:
         ConfigError: It is not; the error contains the reason, and calls it `what`.
     """
     error = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
-    if not error <= ORTHONORMAL:
+    if not error <= 1e-6:
         raise ConfigError(
             f"{what} is not a rotation: its columns are not orthonormal, R^T R is {error:.3g} off",
             expected="columns of length 1 that are orthogonal to each other",
@@ -209,11 +203,11 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
     return np.array(quaternion) / math.copysign(math.hypot(*quaternion), quaternion[3])
 
 
-def whole_turns(displacements: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Return the whole turns in displacements, shape (..., n) [rad]: without them, none is longer than half a turn.
+def whole_revolutions(displacements: np.ndarray, revolutions: np.ndarray) -> np.ndarray:
+    """Return whole revolutions in displacements, shape (..., n) [rad]: without them, none is longer than half of one.
 
     Args:
         displacements: Differences of positions, shape (..., n) [rad, m].
-        turns: The turn of each joint [rad]; 0: it has none.
+        revolutions: Angle after which each joint is where it was [rad]; 0: there is none.
     """
-    return np.asarray(turns * np.rint(displacements / np.where(turns > 0.0, turns, 1.0)))
+    return np.asarray(revolutions * np.rint(displacements / np.where(revolutions > 0.0, revolutions, 1.0)))

@@ -27,13 +27,10 @@ OWN_AXES = 4
 """The twist is in the axes of the sensor, not of the world."""
 
 WITH_ORIENTATION = 8
-"""An orientation is given, by which such a twist is turned."""
+"""An orientation is given, by which such a twist is rotated."""
 
-GO_ON = 16
+CONTINUOUS = 16
 """Angles continue without jumps by 2 pi."""
-
-FULL_TURN = 2.0 * math.pi
-"""[rad]."""
 
 
 class Carried:
@@ -64,7 +61,7 @@ class Carried:
         """Compute `rates`, and `base` where a pose is given; without a pose, `base` is used as it is.
 
         Args:
-            options: Sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, GO_ON.
+            options: Sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, CONTINUOUS.
         """
         _update(self._values, self._mount, self.world, self._chart, self.base, self.rates, options)
 
@@ -92,7 +89,7 @@ def _times(left, right):
     return out
 
 
-def _turned(matrix, vector):
+def _rotated(matrix, vector):
     """Multiply a matrix and a vector."""
     out = np.empty(3)
     for i in range(3):
@@ -124,7 +121,7 @@ def _matrix(quaternion):
 
 _transposed = part(_transposed)
 _times = part(_times)
-_turned = part(_turned)
+_rotated = part(_rotated)
 _matrix = part(_matrix)
 _angles = part(chart.angles_of)
 _rates = part(chart.rates_of)
@@ -139,28 +136,28 @@ def update(values, mount, world, origin, base, rates, options):
         sensor = _times(world, _matrix(values))
     if options & FROM_POSE:
         rotation = _times(sensor, _transposed(mount))
-        arm = _turned(rotation, mount[9:12])
-        base[:3] = _turned(to_chart, _turned(world, values[4:7]) + world[9:12] - arm - origin[9:12])
+        arm = _rotated(rotation, mount[9:12])
+        base[:3] = _rotated(to_chart, _rotated(world, values[4:7]) + world[9:12] - arm - origin[9:12])
+        revolution = 2.0 * math.pi
         angles = _angles(_times(to_chart, rotation))
         for place in range(3):
-            jump = round((base[3 + place] - angles[place]) / FULL_TURN) if options & GO_ON else 0.0
-            base[3 + place] = angles[place] + FULL_TURN * jump
+            jump = round((base[3 + place] - angles[place]) / revolution) if options & CONTINUOUS else 0.0
+            base[3 + place] = angles[place] + revolution * jump
     else:
         rotation = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
-        arm = _turned(rotation, mount[9:12])
+        arm = _rotated(rotation, mount[9:12])
     if options & FROM_TWIST:
         axes = world
         if options & OWN_AXES:
             axes = sensor if options & WITH_ORIENTATION else _times(rotation, mount)
-        angular = _turned(axes, values[10:13]) - _turned(rotation, mount[15:18])
-        linear = _turned(axes, values[7:10]) - _turned(rotation, mount[12:15])
+        angular = _rotated(axes, values[10:13]) - _rotated(rotation, mount[15:18])
+        linear = _rotated(axes, values[7:10]) - _rotated(rotation, mount[12:15])
         linear[0] -= angular[1] * arm[2] - angular[2] * arm[1]
         linear[1] -= angular[2] * arm[0] - angular[0] * arm[2]
         linear[2] -= angular[0] * arm[1] - angular[1] * arm[0]
-        rates[:3] = _turned(to_chart, linear)
-        wx, wy, wz = _turned(to_chart, angular)
+        rates[:3] = _rotated(to_chart, linear)
+        wx, wy, wz = _rotated(to_chart, angular)
         rates[3], rates[4], rates[5] = _rates(base[3], base[4], wx, wy, wz)
 
 
-_VECTORS = ", ".join(["float64[::1]"] * 6)
-_update = cached(f"void({_VECTORS}, int64)", update, sources=[Path(chart.__file__)])
+_update = cached(f"void({'float64[::1], ' * 6}int64)", update, sources=[Path(chart.__file__)])

@@ -4,9 +4,6 @@ from bisect import bisect_right
 
 import numpy as np
 
-PIECE_SAMPLES = 9
-"""Places of each piece, its ends included, where `extremes` looks."""
-
 
 class ViaPoints:
     """Polynomials through points, one for each pair of neighbours: quintic, cubic or linear, by what the points give.
@@ -98,10 +95,11 @@ class ViaPoints:
     def extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute the lowest and highest positions and the highest speeds of the motion, shape (n,) each.
 
-        They are those at `PIECE_SAMPLES` places of each piece, its ends included.
+        They are those at nine places of each piece, its ends included.
         """
-        t = np.linspace(0.0, 1.0, PIECE_SAMPLES)[:, None, None] * self._durations[None, :, None]
-        position = np.broadcast_to(self._coefficients[:, 5], (PIECE_SAMPLES, *self._coefficients[:, 5].shape)).copy()
+        samples = 9
+        t = np.linspace(0.0, 1.0, samples)[:, None, None] * self._durations[None, :, None]
+        position = np.broadcast_to(self._coefficients[:, 5], (samples, *self._coefficients[:, 5].shape)).copy()
         velocity = np.zeros_like(position)
         for power in (4, 3, 2, 1, 0):
             velocity = velocity * t + position

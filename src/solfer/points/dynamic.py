@@ -84,11 +84,11 @@ class DynamicPoint(Point, abc.ABC):
         self._offset._accumulate(other, sign, sense)
         return self
 
-    def _overwrite(self, other: Point, kept: float, share: float) -> None:
-        super()._overwrite(other, kept, share)
+    def _overwrite(self, other: Point, kept: float, factor: float) -> None:
+        super()._overwrite(other, kept, factor)
         offset = self.offset
         offset *= kept
-        offset += share * offset_of(other).value
+        offset += factor * offset_of(other).value
 
 
 class CompiledDynamicPoint(CompiledPoint, DynamicPoint):

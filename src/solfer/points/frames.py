@@ -17,6 +17,7 @@ from solfer.points.space import ORIENTATION, POSE, vector
 __all__ = ["GroundFrame", "LookAt", "RelativePoint", "WheelFrame"]
 
 UP = (0.0, 0.0, 1.0)
+"""Default of axles and normals."""
 
 
 class RelativePoint(CompiledPoint):

@@ -100,7 +100,7 @@ class OrientationOffset:
         self._link = link
         self._attachment = attachment
         self._numbers = numbers
-        self._turn(np.eye(3))
+        self._rotate(np.eye(3))
 
     def share(self, numbers: np.ndarray) -> None:
         """Read and write other numbers from now on, which another point has, too."""
@@ -123,11 +123,11 @@ class OrientationOffset:
             UnknownName: There is no such convention.
             SizeMismatch, NotFinite: It is not a quaternion.
         """
-        self._turn(self._rotation(quaternion, order, kind))
+        self._rotate(self._rotation(quaternion, order, kind))
 
     def set_world(self, quaternion: ArrayLike, order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
         """Turn the frame so that `quaternion` rotates from it to the world; as `set_fixed`."""
-        self._turn(self._kinematics.rotation(self._link).T @ self._rotation(quaternion, order, kind))
+        self._rotate(self._kinematics.rotation(self._link).T @ self._rotation(quaternion, order, kind))
 
     def set_reference(self, quaternion: ArrayLike, link: str, order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
         """Turn the frame so that `quaternion` rotates from it to another link; as `set_fixed`.
@@ -137,13 +137,13 @@ class OrientationOffset:
             SizeMismatch, NotFinite: It is not a quaternion.
         """
         rotation_to_world = self._kinematics.rotation(link) @ self._rotation(quaternion, order, kind)
-        self._turn(self._kinematics.rotation(self._link).T @ rotation_to_world)
+        self._rotate(self._kinematics.rotation(self._link).T @ rotation_to_world)
 
     def _rotation(self, quaternion: ArrayLike, order: str, kind: str) -> np.ndarray:
         values = finite(quaternion, self.size, f"orientation on link '{self._link}'")
         return rotation_from_quaternion(quaternion_convention(order, kind).read(values, np.empty(4)))
 
-    def _turn(self, rotation_to_link: np.ndarray) -> None:
+    def _rotate(self, rotation_to_link: np.ndarray) -> None:
         self._numbers[:] = quaternion_from_rotation(self._attachment.rotation @ rotation_to_link)
 
 

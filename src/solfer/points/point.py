@@ -226,8 +226,8 @@ class Point(abc.ABC):
             self._value += sign * finite(other, self.size, f"'{sense}' to {self}")
         return self
 
-    def _overwrite(self, other: "Point", kept: float, share: float) -> None:
-        """Set the Jacobian to `kept` times itself plus `share` times the other's; the next update clears it."""
+    def _overwrite(self, other: "Point", kept: float, factor: float) -> None:
+        """Set the Jacobian to `kept` times itself plus `factor` times the other's; the next update clears it."""
         if other.cols and other.cols != self.cols:
             raise PointError(
                 f"{other} has a Jacobian of {other.cols} columns, {self} one of {self.cols}",
@@ -235,7 +235,7 @@ class Point(abc.ABC):
             )
         self._jacobian *= kept
         if other.cols:
-            self._jacobian += share * other._jacobian
+            self._jacobian += factor * other._jacobian
         if not self._is_overwritten:
             self._is_overwritten = True
             self._layout.change()

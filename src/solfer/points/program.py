@@ -18,6 +18,7 @@ from solfer.points.compiled.registry import Kernel
 from solfer.points.point import Point
 
 NO_NUMBERS = np.zeros(0)
+"""Parameters, or an offset, of operations without."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,6 @@ class LinkMotion:
     offset: np.ndarray = field(default_factory=lambda: NO_NUMBERS)
 
 
-PROGRAM_STILLNESS = LinkMotion()
-"""For operations that compute no motion of a link."""
-
-
 class Instruction:
     """One operation of the kernel on a point.
 
@@ -48,7 +45,7 @@ class Instruction:
         operands: Points that are read, at most two.
         numbers: Parameters, float64.
         table: Parameters, int64 or records of `solfer.points.compiled.instruction`.
-        motion: Motion of the link of the point.
+        motion: Motion of the link of the point; None: none is computed.
         columns: DoFs that the operation runs over; None: those of the point.
 
     Attributes:
@@ -67,9 +64,10 @@ class Instruction:
         *,
         numbers: np.ndarray = NO_NUMBERS,
         table: np.ndarray = NO_NUMBERS,
-        motion: LinkMotion = PROGRAM_STILLNESS,
+        motion: LinkMotion | None = None,
         columns: np.ndarray | None = None,
     ):
+        motion = motion or LinkMotion()
         columns = point.written_columns() if columns is None else columns
         _require_fit(point, operands, columns)
         operand_arrays = [array for operand in operands for array in (operand.value, operand.jacobian)]

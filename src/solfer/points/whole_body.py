@@ -112,7 +112,7 @@ class CenterOfPressure(CompiledPoint):
     """Centre of pressure of contacts, in the plane through the world's origin across the normal [m].
 
     It is the mean of the contacts' positions, weighted with their normal forces; contacts that are lifted or pull do
-    not count. The moment of a contact that constrains one, such as a flat foot, moves its share. The Jacobian is the
+    not count. The moment of a contact that constrains one, such as a flat foot, moves it, too. The Jacobian is the
     true one for constant forces. Without a pressing contact, the value stays and the Jacobian is zero. `update` updates
     no contact: they are updated before it.
 

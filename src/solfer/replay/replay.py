@@ -8,7 +8,7 @@ import numpy as np
 
 from solfer.config import Configuration
 from solfer.errors import RecordingError, SolferError
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.pipes.joint.pipes import JointCommandPipe
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.plugin import Plugin
@@ -69,7 +69,7 @@ class Replay:
         sources = [each for each in log.sources if each.channel.name.startswith(f"{prefix}command/")]
         values = [np.zeros((len(rows.times), source.array.size)) for source in sources]
         turns = {
-            f"command/{pipe.name}/position": self.plugin.robot.turns[pipe.dofs]
+            f"command/{pipe.name}/position": self.plugin.robot.revolutions[pipe.dofs]
             for pipe, _ in self.plugin.outputs.controllers
             if isinstance(pipe, JointCommandPipe)
         }
@@ -151,7 +151,7 @@ class Replay:
         recorded = self.rows.channel(channel.name.partition("/")[2])
         if recorded is not None and set(channel.columns) <= set(recorded.columns):
             differences = numbers - self.rows.values(recorded, channel.columns)
-            numbers -= whole_turns(np.nan_to_num(differences), turns)
+            numbers -= whole_revolutions(np.nan_to_num(differences), turns)
 
     def _keep(self, row: int, sources: list[LogSource], values: list[np.ndarray]) -> None:
         for source, numbers in zip(sources, values, strict=True):

@@ -36,10 +36,7 @@ from solfer.robot.selection import commanded_dofs, select
 from solfer.robot.shipped import with_bundled_base
 from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
-BUILDER_TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
-"""How long the builder waits for a first message or a controller; after one did not answer, for each other [s]."""
-
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 
 def build(
@@ -79,12 +76,14 @@ def build(
 class _Builder:
     """Steps of `build`; mistakes that do not keep the next step from working are collected."""
 
+    _SHORT_TIMEOUT = 0.5  # for an answer after one was missing, or that nothing depends on [s]
+
     def __init__(self, configuration: Configuration, outside: Outside, goes_on: bool):
         self._configuration = configuration
         self._outside = outside
         self._goes_on = goes_on
         self.faults: list[SolferError] = []
-        self._patience = BUILDER_TIMEOUT
+        self._timeout = 10.0  # for the first message or the joints of a controller [s]
         self._waits = True
 
     def robot(self, beside: Robot | None) -> Robot:
@@ -141,7 +140,7 @@ class _Builder:
                 if self._used(name):
                     self.faults.append(error.at(record.where("urdf")))
                 else:
-                    _LOG.info("the map '%s', which no pipe uses, is left out: %s", name, error)
+                    logger.info("the map '%s', which no pipe uses, is left out: %s", name, error)
 
     def _add_model(self, robot: Robot, name: str, model: Description) -> None:
         where = self._configuration.mappings[name].where("urdf")
@@ -251,9 +250,9 @@ class _Builder:
     def _idle_joints(self, record: ControllerRecord, robot: Robot) -> tuple[str, ...]:
         """Return the controller's joints, or the Robot's if it does not answer: nothing is sent in mode `idle`."""
         try:
-            return self._controller_joints(record, SHORT_TIMEOUT)
+            return self._controller_joints(record, self._SHORT_TIMEOUT)
         except MiddlewareError as error:
-            _LOG.info("%s; the Robot's joints are used instead, since nothing is sent", error.line)
+            logger.info("%s; the Robot's joints are used instead, since nothing is sent", error.line)
             return _actuated(robot)
 
     def _calibration(self, pipe: PipeRecord) -> CalibrationRecord:
@@ -277,9 +276,9 @@ class _Builder:
     def _wait(self, query: Callable[[float], Any]) -> Any:
         """Call like `_try`, where an answer may be missing; `query` gets the time that it may wait [s]."""
         faults = len(self.faults)
-        answer = self._try(lambda: query(self._patience))
+        answer = self._try(lambda: query(self._timeout))
         if len(self.faults) > faults:
-            self._patience = SHORT_TIMEOUT
+            self._timeout = self._SHORT_TIMEOUT
         return answer
 
     def _try(self, call: Callable[[], Any], where: str = "") -> Any:

@@ -7,8 +7,6 @@ from solfer.model.actuators import ActuatorsRecord
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
 from solfer.robot.sources import is_robot_read, require_robot
 
-_WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
-
 
 def checked_files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:
     """Find the files of the robot; None if there are none, or if they are wrong."""
@@ -27,10 +25,11 @@ def checked_files(configuration: Configuration, problems: Problems, robot: Robot
         return None
     name = configuration.tree.get("robot", "name")
     close = nearest(str(name.value), robots_beside(configuration.file)) if name else ()
+    what = "the robot has no files here, so names of its groups, links and joints are not checked"
     if name is not None and close:
-        problems.warn(name.mark, f"{_WITHOUT_ROBOT}; did you mean {' or '.join(close)}?")
+        problems.warn(name.mark, f"{what}; did you mean {' or '.join(close)}?")
     else:
-        problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
+        problems.warn(urdf, f"{what}; a URDF and an SRDF make it possible")
     return None
 
 

@@ -4,8 +4,6 @@ from solfer.config import CalibrationRecord, ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.robot.robot import Robot
 
-HARDWARE = "joint of the hardware"
-
 
 def received_joints(
     record: FeedbackRecord, calibration: CalibrationRecord, robot: Robot, order: tuple[str, ...]
@@ -24,7 +22,7 @@ def received_joints(
     if missing and len(joints) < len(order):
         name = calibration.hardware(missing[0])
         raise UnknownName(
-            HARDWARE,
+            "joint of the hardware",
             name,
             order,
             where=calibration.joints[missing[0]].where("name"),

@@ -13,8 +13,11 @@ from solfer.model import Description, Semantics
 from solfer.robot.defaults import ACTUATED, ALL, MODEL_MAPS
 from solfer.robot.robot import Robot
 
-FEEDBACK_MAP, LOWER_LEVEL_MAP = "FEEDBACK", "LOWER_LEVEL"
-"""Names of the maps of the default state feedback, and of all lower-level controllers."""
+FEEDBACK_MAP = "FEEDBACK"
+"""Name of the map of the default state feedback."""
+
+LOWER_LEVEL_MAP = "LOWER_LEVEL"
+"""Name of the map of all lower-level controllers."""
 
 LOWER_LEVEL_MAPS = (LOWER_LEVEL_MAP, *PREDEFINED_MAPS)
 """Maps that stand for the one of a controller in a pipe to it."""
@@ -22,7 +25,8 @@ LOWER_LEVEL_MAPS = (LOWER_LEVEL_MAP, *PREDEFINED_MAPS)
 UNACTUATED = "unactuated"
 """Type of the DoFs of a floating base."""
 
-_SELECTIONS = ("all", "actuated", UNACTUATED, "body")  # values of `dofs.type` beside the names of maps
+DOF_TYPES = ("all", "actuated", UNACTUATED, "body")
+"""Types of DoFs beside the names of maps."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ def check_names(
     for record in records:
         check_tags(record, names, problems)
     _check_order(configuration.feedbacks, names, problems)
-    _check_rivals(configuration.feedbacks, problems)
+    _check_conflicts(configuration.feedbacks, problems)
     used = dict.fromkeys(record.calibration for record in records)
     check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
     if tags is not None:
@@ -140,7 +144,7 @@ def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problem
                     )
 
 
-def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> None:
+def _check_conflicts(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> None:
     """Note feedbacks of rigid bodies that measure the same of the base of one State: the later one would count alone.
 
     Each of them has an orientation in its positions and an angular velocity in its velocities.
@@ -152,13 +156,13 @@ def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> No
         for interface in ("position", "velocity"):
             if not getattr(record.interface, interface):
                 continue
-            rival = first.setdefault((record.function or "state", interface), record)
-            if rival is not record:
+            earlier = first.setdefault((record.function or "state", interface), record)
+            if earlier is not record:
                 mark = record.interface.place(interface)
                 problems.put(
                     mark,
                     ConfigError(
-                        f"the feedbacks '{rival.name}' ({rival.interface.where(interface)}) and '{record.name}' "
+                        f"the feedbacks '{earlier.name}' ({earlier.interface.where(interface)}) and '{record.name}' "
                         f"both set the '{interface}' of the floating base",
                         where=str(mark),
                         expected=f"one of them, or `{interface}: false` in the other",
@@ -185,7 +189,7 @@ def _check_dofs(dofs: DofsRecord, names: RobotNames, maps: Collection[str], prob
     if dofs.type == "body":
         _check(dofs, "name", "link", name=dofs.name or "", known=names.link, problems=problems)
     else:
-        _check(dofs, "type", "type of DoFs", name=dofs.type, known=(*_SELECTIONS, *maps), problems=problems)
+        _check(dofs, "type", "type of DoFs", name=dofs.type, known=(*DOF_TYPES, *maps), problems=problems)
 
 
 def _check(

@@ -12,12 +12,12 @@ from solfer.model.urdf.description import Description
 from solfer.model.urdf.unfit import unfit_parts
 from solfer.robot.shipped import RobotFiles
 
-WHOLE_TURN = 2.0 * math.pi + 1e-3
-"""Angle beyond which a value looks like degrees [rad]; URDFs round a whole turn."""
+LARGEST_ANGLE = 2.0 * math.pi + 1e-3
+"""Angle beyond which a value looks like degrees [rad]; URDFs round a revolution."""
 
 
 def check_plausibility(files: RobotFiles, records: Iterable[Record | None], problems: Problems) -> None:
-    """Warn of joints and links with which a robot cannot work, and of angles beyond a turn.
+    """Warn of joints and links with which a robot cannot work, and of angles beyond a revolution.
 
     Args:
         files: The robot's files.
@@ -53,8 +53,8 @@ def _of_limits(description: Description) -> Iterator[tuple[Mark, str]]:
         mark = Mark.read(joint.where)
         if mark is None or joint.lower is None or joint.upper is None or joint.type == "continuous":
             continue
-        if joint.type == "revolute" and max(-joint.lower, joint.upper) > WHOLE_TURN:
-            limit = joint.upper if joint.upper > WHOLE_TURN else joint.lower
+        if joint.type == "revolute" and max(-joint.lower, joint.upper) > LARGEST_ANGLE:
+            limit = joint.upper if joint.upper > LARGEST_ANGLE else joint.lower
             yield mark, f"joint '{joint.name}' has a limit that {_degrees(limit)}"
 
 
@@ -69,7 +69,7 @@ def _of_states(files: RobotFiles, description: Description) -> Iterator[tuple[Ma
             joint is not None
             and joint.type in ("revolute", "continuous")
             and value
-            and abs(float(value[0])) > WHOLE_TURN
+            and abs(float(value[0])) > LARGEST_ANGLE
         ):
             assert isinstance(element, PlacedElement)
             mark = Mark(str(files.srdf), element.line, element.column)
@@ -77,7 +77,7 @@ def _of_states(files: RobotFiles, description: Description) -> Iterator[tuple[Ma
 
 
 def _angles(record: Record) -> Iterator[tuple[Mark, float]]:
-    """Yield the places and values of angles beyond a turn that a file gives to a record."""
+    """Yield the places and values of angles beyond a revolution that a file gives to a record."""
     for field, info in type(record).model_fields.items():
         if field in record.model_fields_set:
             is_angle = "[rad]" in (info.description or "") or "[rad, m]" in (info.description or "")
@@ -90,7 +90,7 @@ def _inside(record: Record, path: tuple[Key, ...], value: Any, is_angle: bool) -
     elif isinstance(value, dict | tuple):
         for key, item in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _inside(record, (*path, key), item, is_angle=is_angle)
-    elif is_angle and isinstance(value, float) and abs(value) > WHOLE_TURN:
+    elif is_angle and isinstance(value, float) and abs(value) > LARGEST_ANGLE:
         mark = record.place(*path)
         if mark is not None:
             yield mark, value

@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from solfer.robot.contacts import Contacts
 
 
-_MOVED = {(True, True): ("position", "velocity"), (True, False): ("position",), (False, True): ("velocity",)}
-"""Interfaces that have changed, by whether the position and the velocity have."""
-
-
 class _Measured:
     """What was computed of the measured State, for a Robot and all its companions.
 
@@ -64,8 +60,8 @@ class _Measured:
 class Robot:
     """The robot as its components see it. DoFs have the order of `dofs` everywhere.
 
-    Several components of a process share what is measured, and what is computed of it: each has a `companion` of one
-    Robot, with a desired State of its own.
+    What is measured, and what is computed of it, several components of a process have in common: each has a `companion`
+    of one Robot, with a desired State of its own.
 
     Args:
         kinematics: Kinematics of the robot, and its description.
@@ -86,8 +82,8 @@ class Robot:
         command: Desired state.
         lower_limits: Lower limits of position, velocity, acceleration and torque; -inf where there is none.
         upper_limits: Upper limits; inf where there is none.
-        turns: Turn after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
-        added_turns: What measured positions have more than the robot's driver publishes, shape (n,) [rad]; live.
+        revolutions: Angle after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
+        added_revolutions: What measured positions have more than the robot's driver publishes, shape (n,) [rad]; live.
         maps: Bidirectional maps: `RBDL` (also called `MODEL`), `ACTUATED`, and those that a configuration adds.
         selectors: Unidirectional maps: `all` and every group of the SRDF.
         contact_records: Records of its contacts.
@@ -114,8 +110,8 @@ class Robot:
         kinematics.drive(self.actuators)
         self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
-        self.turns = kinematics.turns
-        self.added_turns = np.zeros(kinematics.size)
+        self.revolutions = kinematics.revolutions
+        self.added_revolutions = np.zeros(kinematics.size)
         self.actuated = actuated_dofs(kinematics, self.actuators)
         self.maps, self.selectors = (
             default_maps(kinematics, self.actuated),
@@ -286,7 +282,10 @@ class Robot:
         if not (moved or accelerated):
             return False
         self.kinematics.update(self._position, self._velocity)
-        self.state.touch(*_MOVED[moved, accelerated])
+        if moved:
+            self.state.touch("position")
+        if accelerated:
+            self.state.touch("velocity")
         measured.position = position
         measured.velocity = velocity
         measured.updates += 1

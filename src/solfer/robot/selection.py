@@ -4,11 +4,8 @@ import numpy as np
 
 from solfer.config.records.pipes import ControllerRecord, DofsRecord
 from solfer.errors import PipeError, SolferError, UnknownName
-from solfer.robot.names import LOWER_LEVEL_MAPS, UNACTUATED, controller_map
+from solfer.robot.names import DOF_TYPES, LOWER_LEVEL_MAPS, UNACTUATED, controller_map
 from solfer.robot.robot import Robot
-
-TYPES = ("all", "actuated", UNACTUATED, "body")
-"""Types of DoFs beside the names of maps."""
 
 
 def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
@@ -30,7 +27,7 @@ def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
     if dofs.type == "body":
         raise PipeError("type 'body' in joint space", where=dofs.where("type"), expected="space: OPERATIONAL")
     if dofs.type not in robot.maps:
-        raise UnknownName("type of DoFs", dofs.type, (*TYPES, *robot.maps), where=dofs.where("type"))
+        raise UnknownName("type of DoFs", dofs.type, (*DOF_TYPES, *robot.maps), where=dofs.where("type"))
     return np.intersect1d(chain, robot.maps[dofs.type].robot_indices)
 
 

@@ -32,7 +32,7 @@ class Solver(Protocol):
 class TaskController:
     """Joint velocities of a stack of tasks that changes while the robot moves.
 
-    At a change, the old and the new stack run side by side, and the share of the new one grows from 0 to 1 with
+    At a change, the old and the new stack run side by side, and the weight of the new one grows from 0 to 1 with
     u^3 (10 - 15 u + 6 u^2): velocities and accelerations stay continuous, and levels that both have in common are
     served all the time. It starts without tasks, at rest.
 
@@ -118,13 +118,13 @@ class TaskController:
         """Compute and return the joint velocities at the state of the last update of the Robot."""
         for stage in self._stages:
             stage.advance()
-        # stacks before one with the whole share do not count any more
+        # stacks before one with the whole weight do not count any more
         while any(stage.has_come for stage in self._stages[1:]):
             del self._stages[0]
         self.velocity[:] = self._stages[0].solver.update()
         for stage in self._stages[1:]:
             np.subtract(stage.solver.update(), self.velocity, out=self._difference)
-            self._difference *= stage.share
+            self._difference *= stage.weight
             self.velocity += self._difference
         return self.velocity
 
@@ -139,7 +139,7 @@ class TaskController:
 
 
 class _Stage:
-    """A solver with its share, which grows from 0 to 1."""
+    """A solver with its weight, which grows from 0 to 1."""
 
     def __init__(self, solver: Solver, step: float):
         self.solver = solver
@@ -148,17 +148,17 @@ class _Stage:
 
     @property
     def is_new(self) -> bool:
-        """Return whether it has no share yet."""
+        """Return whether it has no weight yet."""
         return self._progress == 0.0
 
     @property
     def has_come(self) -> bool:
-        """Return whether it has the whole share."""
+        """Return whether it has the whole weight."""
         return self._progress >= 1.0
 
     @property
-    def share(self) -> float:
-        """Compute its share, from 0 to 1."""
+    def weight(self) -> float:
+        """Compute its weight, from 0 to 1."""
         u = min(self._progress, 1.0)
         return u * u * u * (10.0 - u * (15.0 - 6.0 * u))
 

@@ -15,7 +15,7 @@ class Descent:
 
     Attributes:
         reached: Zeros, then the joint velocities after each level, shape (levels + 1, n); live.
-        slopes: What is left of the slope of each level's cost beside the levels before, as a share of its largest
+        slopes: What is left of the slope of each level's cost beside the levels before, as a ratio of its largest
             term, shape (levels,); empty without checks.
         basis: Orthonormal rows that span those of the levels but the last, with zeros for dependent ones, shape
             (rows, n).

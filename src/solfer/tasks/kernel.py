@@ -11,10 +11,10 @@ from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
 ROW_TOLERANCE = 1e-12
-"""Share of a row's length below which its remainder beside other rows counts as zero: rounding errors and no more."""
+"""Ratio of a row's length below which its remainder beside other rows counts as zero: rounding errors and no more."""
 
 CANCELLED = 0.5
-"""Share of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
+"""Ratio of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
 made its rounding errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9."""
 
 
@@ -76,8 +76,8 @@ def _clear(row, basis, start, end):
 
 
 @part
-def _share(row, whole):
-    """Compute the share of a row's length that is left."""
+def _ratio_left(row, whole):
+    """Compute the ratio of a row's length that is left."""
     rest = length = 0.0
     for k in range(len(row)):
         rest += row[k] * row[k]
@@ -96,7 +96,7 @@ def _project(jacobian, velocity, start, end, projected, basis, residual, out):
             projected[i, k] = jacobian[i, k]
         residual[i - start] = entry
         _clear(projected[i], basis, 0, start)
-        projected[i] *= _share(projected[i], jacobian[i]) > ROW_TOLERANCE
+        projected[i] *= _ratio_left(projected[i], jacobian[i]) > ROW_TOLERANCE
 
 
 @part
@@ -145,8 +145,8 @@ def _extend(jacobian, start, end, projected, basis, first):
     for i in range(start, end):
         basis[i] = projected[i]
         _clear(basis[i], basis, first, i)
-        share = _share(basis[i], jacobian[i])
-        basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > ROW_TOLERANCE else 0.0
+        ratio = _ratio_left(basis[i], jacobian[i])
+        basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if ratio > ROW_TOLERANCE else 0.0
 
 
 @part
@@ -172,7 +172,7 @@ def _complete(basis, start, free, work):
     total = _dimensions(basis, start)
     column = work[0]
     left = work[1]
-    shares = work[2]
+    factors = work[2]
     for k in range(cols):
         left[k] = 1.0
     for j in range(start):
@@ -193,11 +193,11 @@ def _complete(basis, start, free, work):
         _leave(column, free, free[best], count)
         if left[best] < CANCELLED:
             _remove(column, basis, 0, start)
-            shares[:count] = 0.0
+            factors[:count] = 0.0
             for k in range(cols):
                 for j in range(count):
-                    shares[j] += column[k] * free[k, j]
-            _leave(column, free, shares, count)
+                    factors[j] += column[k] * free[k, j]
+            _leave(column, free, factors, count)
         scale = 1.0 / math.sqrt(_square(column))
         for k in range(cols):
             free[k, count] = scale * column[k]
@@ -207,12 +207,12 @@ def _complete(basis, start, free, work):
 
 
 @part
-def _leave(column, free, shares, count):
-    """Subtract the first `count` columns F times their shares."""
+def _leave(column, free, factors, count):
+    """Subtract the first `count` columns F times their factors."""
     for k in range(len(column)):
         entry = 0.0
         for j in range(count):
-            entry += free[k, j] * shares[j]
+            entry += free[k, j] * factors[j]
         column[k] -= entry
 
 
@@ -240,10 +240,10 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
                 for j in range(count):
                     row[j] += entry * free[k, j]
         for j in range(count):
-            share = weight * row[j]
-            right[j] += share * left
+            factor = weight * row[j]
+            right[j] += factor * left
             for k in range(j + 1):
-                square[j, k] += share * row[k]
+                square[j, k] += factor * row[k]
     matrix = square[:count, :count]
     cholesky(matrix)
     forward(matrix, right)
@@ -257,7 +257,7 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
 
 @part
 def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out):
-    """Compute the slope of a level's cost beside the levels before, as a share of its largest term, if that is > 1."""
+    """Compute the slope of a level's cost beside the levels before, as a ratio of its largest term, if that is > 1."""
     cols = jacobian.shape[1]
     largest = 1.0
     step[:] = 0.0
@@ -284,7 +284,7 @@ def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out
 def _descend(jacobian, velocity, numbers, ends, projected, basis, square, work, reached, slopes):
     """Write the velocities of all levels into the rows of `reached` behind the first; see `solfer.tasks.hierarchy`.
 
-    `slopes` is what each row leaves of the slope of its level's cost, as a share of its largest term.
+    `slopes` is what each row leaves of the slope of its level's cost, as a ratio of its largest term.
     """
     residual = square[-1]
     step = work[0]
@@ -314,7 +314,7 @@ def _span(jacobian, start, end, basis):
     _extend(jacobian, start, end, jacobian, basis, 0)
 
 
-def _count_kept(steps, slopes, lower, upper, matrix, least, largest, tolerance):
+def _count_kept(steps, slopes, lower, upper, matrix, matrix_lower, matrix_upper, tolerance):
     """Count the first levels whose steps are the least of their costs and within all limits, but for a tolerance.
 
     Args:
@@ -323,8 +323,8 @@ def _count_kept(steps, slopes, lower, upper, matrix, least, largest, tolerance):
         lower: Bounds of velocities, shape (n,), or (0,) for none.
         upper: The other bounds.
         matrix: Inequalities, shape (rows, n).
-        least: Their lower limits, shape (rows,).
-        largest: Their upper ones.
+        matrix_lower: Their lower limits, shape (rows,).
+        matrix_upper: Their upper ones.
         tolerance: Largest violation, and slope.
     """
     for level in range(len(steps)):
@@ -341,7 +341,7 @@ def _count_kept(steps, slopes, lower, upper, matrix, least, largest, tolerance):
             value = 0.0
             for k in range(steps.shape[1]):
                 value += matrix[i, k] * steps[level, k]
-            if not least[i] - tolerance <= value <= largest[i] + tolerance:
+            if not matrix_lower[i] - tolerance <= value <= matrix_upper[i] + tolerance:
                 return level
     return len(steps)
 

@@ -16,12 +16,6 @@ from solfer.tasks.qp_level import Inequalities, QpLevel
 from solfer.tasks.stack import Levels, Stack
 from solfer.throttle import Throttle
 
-LEVEL_FLATNESS = 1e-9
-"""Largest violation of a limit, and slope of a level's cost at its least, as for `numerics.solvers.qp.QpSolver`."""
-
-LEVEL_RELAXATION = 1e4
-"""Weight of violations where the policy `relax` allows them, beside tasks of weight 1."""
-
 log = logging.getLogger(__name__)
 
 
@@ -113,7 +107,7 @@ class QpHierarchy:
         self._relaxed_level: QpLevel | None = None
         if self.policy is Policy.RELAX and self._inequalities.rows:
             yields = np.isinf(weights) & _named(self._inequalities.names, relax)
-            weights = np.where(yields, LEVEL_RELAXATION, weights)
+            weights = np.where(yields, 1e4, weights)  # beside tasks of weight 1
             self._relaxed_level = QpLevel(
                 self.stack, 0, bounds, inequalities=self._inequalities, weights=weights, basis=basis
             )
@@ -171,7 +165,7 @@ class QpHierarchy:
             inequalities.matrix,
             inequalities.lower,
             inequalities.upper,
-            LEVEL_FLATNESS,
+            1e-9,  # tolerance, as that of a `QpSolver`
         )
         for index in range(count):
             x = self._steps[index]

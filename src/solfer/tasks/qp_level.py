@@ -128,7 +128,7 @@ class QpLevel:
         size = self._size
         objective(self._jacobian, self._velocity, self._numbers, before, problem.hessian, problem.gradient)
         if self._bounds is not None:
-            problem.least[:size], problem.largest[:size] = self._bounds.lower, self._bounds.upper
+            problem.x_min[:size], problem.x_max[:size] = self._bounds.lower, self._bounds.upper
         if self._inequalities.rows:
             problem.lower[:], problem.upper[:] = self._inequalities.lower, self._inequalities.upper
         if self._is_first:
@@ -142,8 +142,8 @@ class QpLevel:
         problem = self._problem
         span(self._stack.jacobian, *self._spanned, self._basis)
         np.dot(problem.equality_matrix, before, out=problem.equality_vector)
-        np.minimum(problem.least, before, out=problem.least)
-        np.maximum(problem.largest, before, out=problem.largest)
+        np.minimum(problem.x_min, before, out=problem.x_min)
+        np.maximum(problem.x_max, before, out=problem.x_max)
         if self._inequalities.rows:
             np.dot(problem.inequality_matrix, before, out=self._reached)
             np.minimum(problem.lower, self._reached, out=problem.lower)

@@ -9,10 +9,7 @@ from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError
 from solfer.points import Constant, Point, minus
 from solfer.points.offset import chosen
 
-DAMPING = 1e-3
-"""Default of a task's damping, in the units of its Jacobian."""
-
-GAIN, VELOCITY, WEIGHT, DAMPING_COLUMN, CORRECTION, COLUMNS = range(6)
+GAIN, VELOCITY, WEIGHT, DAMPING, CORRECTION, COLUMNS = range(6)
 """Columns of the numbers of a row, as `solfer.tasks.kernel` reads them, and how many there are."""
 
 
@@ -61,7 +58,7 @@ class Task:
         reference: Point | ArrayLike | None = None,
         velocity: ArrayLike = 0.0,
         weight: ArrayLike = 1.0,
-        damping: ArrayLike = DAMPING,
+        damping: ArrayLike = 1e-3,
         correction: ArrayLike = np.inf,
         rows: Sequence[int] | None = None,
         dofs: Sequence[str | int] | None = None,
@@ -124,11 +121,11 @@ class Task:
     @property
     def damping(self) -> np.ndarray:
         """Damping, shape (rows,)."""
-        return self.numbers[:, DAMPING_COLUMN]
+        return self.numbers[:, DAMPING]
 
     @damping.setter
     def damping(self, values: ArrayLike) -> None:
-        self._set(DAMPING_COLUMN, "damping", values, above=0.0)
+        self._set(DAMPING, "damping", values, above=0.0)
 
     @property
     def correction(self) -> np.ndarray:

@@ -15,8 +15,8 @@ def active_normals(problem, x, tolerance=1e-8):
     columns = [*problem.equality_matrix, *-problem.equality_matrix]
     value = problem.inequality_matrix @ x
     rows = [*problem.inequality_matrix, *np.eye(len(x))]
-    values, lower = [*value, *x], [*problem.lower, *problem.least]
-    for row, entry, low, high in zip(rows, values, lower, [*problem.upper, *problem.largest], strict=True):
+    values, lower = [*value, *x], [*problem.lower, *problem.x_min]
+    for row, entry, low, high in zip(rows, values, lower, [*problem.upper, *problem.x_max], strict=True):
         if entry < low + tolerance:
             columns.append(-row)
         if entry > high - tolerance:

@@ -209,7 +209,7 @@ def test_it_moves_in_the_world_with_a_base_that_jumps(panda, make):
         run(each, 0.2)
     expected = np.array(other.references.targets["hand"].desired)
     move.move(expected[:3])
-    move.turn_orientation(expected[3:])
+    move.rotate_orientation(expected[3:])
     assert_allclose(component.references.targets["hand"].desired, expected, atol=1e-12)
 
 

@@ -210,7 +210,7 @@ def test_a_joint_beyond_its_range_may_rest(make, robot, side):
     component.update()
     problem, place = component.original.program.solver.problem, list(component.moved).index(joint)
     speed = robot.upper_limits.velocity[joint]
-    assert (problem.least[place], problem.largest[place]) == ((-speed, 0.0) if side > 0.0 else (0.0, speed))
+    assert (problem.x_min[place], problem.x_max[place]) == ((-speed, 0.0) if side > 0.0 else (0.0, speed))
 
 
 @pytest.mark.slow

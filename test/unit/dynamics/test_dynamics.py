@@ -178,10 +178,10 @@ def test_components_share_computed_elements():
     """Five components, one of which uses what it did not subscribe to: bias and inertia are computed once a cycle."""
     robot = quadruped()
     model = DynamicModel(robot)
-    wants = ({BIAS: 1}, {BIAS: 2, INERTIA: 1}, {}, {INERTIA: 1}, {INERTIA_INVERSE: 1})
+    requests = ({BIAS: 1}, {BIAS: 2, INERTIA: 1}, {}, {INERTIA: 1}, {INERTIA_INVERSE: 1})
     uses = ((BIAS,), (BIAS, BIAS, INERTIA), (INERTIA_INVERSE, BIAS), (INERTIA,), (INERTIA_INVERSE,))
-    for want in wants:
-        model.subscribe(want)
+    for request in requests:
+        model.subscribe(request)
     for cycle in range(1, 4):
         at_random(robot, cycle)
         for used in uses:  # the third of them uses what it did not subscribe

@@ -8,7 +8,7 @@ import pytest
 from support.unit.cart import DT, advance, bend, claim, make, turn
 
 from solfer.errors import CommandRefused, ConfigError, SolferError, UnknownName
-from solfer.lower_level.gains.ramp import CHANGE
+from solfer.lower_level.gains.ramp import COMMANDED_DURATION
 from solfer.lower_level.server.services import controller_services, lower_level_services
 from solfer.transport.lower_level import ClaimRequest, FileRequest, ReleaseRequest
 from solfer.transport.middleware import Flag, NoFields, SwitchRequest
@@ -165,7 +165,7 @@ def test_a_commanded_gain_does_not_jerk(lower_level):
         bend(lower_level, "/arm", stiffness=400.0)
         path.append(torque(lower_level, q))
     assert arm.stiffness[0] == 400.0
-    assert np.abs(np.diff(path)).max() < 1.1 * (400.0 - 200.0) * 0.1 * DT / CHANGE
+    assert np.abs(np.diff(path)).max() < 1.1 * (400.0 - 200.0) * 0.1 * DT / COMMANDED_DURATION
 
 
 def test_the_next_owner_finds_the_default_gains(lower_level):
@@ -184,8 +184,8 @@ def test_the_next_owner_finds_the_default_gains(lower_level):
 
 
 def test_gains_are_told(lower_level):
-    told = ask_arm(lower_level, "get_gains", NoFields())
-    assert (told.names, told.stiffness, told.damping) == (("shoulder",), (200.0,), (2.0,))
+    reply = ask_arm(lower_level, "get_gains", NoFields())
+    assert (reply.names, reply.stiffness, reply.damping) == (("shoulder",), (200.0,), (2.0,))
 
 
 def test_a_gain_commanded_during_a_ramp_stays():

@@ -129,17 +129,17 @@ def test_health_tells_owners_refusals_and_holding():
     assert node.last[1] is Health.ERROR and "smoke" in node.last[2] and node.last[3]["arm"] == "stopped"
 
 
-@pytest.mark.parametrize("lean", [-40.0, 0.0, 40.0])
+@pytest.mark.parametrize("tilt", [-40.0, 0.0, 40.0])
 @pytest.mark.parametrize("about", [3, 4])
 @pytest.mark.parametrize("turned", ["1.0 0.0 0.0", "0.0 1.0 0.0", "0.3 0.4 1.2"])
-def test_the_tilt_is_that_of_the_world(lean, about, turned):
+def test_the_tilt_is_that_of_the_world(tilt, about, turned):
     # the floating joint has an origin of its own, so that the chart's axes are not those of the world
     joint = '<parent link="world"/><child link="base"/>'
     urdf = URDF.replace(joint, f'<origin rpy="{turned}" xyz="0 0 0"/>{joint}')
     kinematics = Kinematics(Description.from_text(urdf))
     cart = build_lower_level(kinematics, RECORDS, GROUPS, GAINS, LowerLevelRecord(tilt=np.radians(30.0), tilt_time=0.0))
     q = np.zeros(8)
-    q[about], q[5] = np.radians(lean), 0.7
+    q[about], q[5] = np.radians(tilt), 0.7
     cart.start(q)
     kinematics.update(q, np.zeros(8))
     tilt = np.degrees(np.arccos(np.clip(kinematics.rotation("base")[2, 2], -1.0, 1.0)))

@@ -70,7 +70,7 @@ def test_a_short_or_small_tilt_is_ignored(cart):
 
 def test_an_upright_cart_needs_a_new_claim(cart):
     update(cart, 0.6, tilted(90.0))
-    update(cart, 0.6, tilted(50.0))  # it still leans
+    update(cart, 0.6, tilted(50.0))  # it is still tilted
     assert cart.safeguard.reason
     update(cart, 0.49, tilted(45.0))
     assert cart.safeguard.reason

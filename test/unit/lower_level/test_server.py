@@ -11,49 +11,49 @@ from solfer.transport.messages import REFUSALS, JointMessage
 
 
 class Stage:
-    """A cart whose lower level is on a bus, a node that hears its refusals, and one that commands its wheel."""
+    """A cart whose lower level is on a bus, a node that receives its refusals, and one that commands its wheel."""
 
     def __init__(self):
         self.bus, self.lower_level = Bus(), make()
         self.server = LowerLevelServer(self.lower_level, MemoryMiddleware(self.bus, "robot"), Inbox())
-        self._ear = MemoryMiddleware(self.bus, "ear").queue(REFUSALS_TOPIC, REFUSALS)
+        self._receiver = MemoryMiddleware(self.bus, "receiver").queue(REFUSALS_TOPIC, REFUSALS)
         self._driver = MemoryMiddleware(self.bus, "/driver").writer("wheel/command", "solfer/JointCommand")
 
     def drive(self, name="roll"):
         """Command the wheel, or a joint that does not exist."""
         self._driver.write(JointMessage((name,), velocity=np.array([1.0])))
 
-    def heard(self, later=0.1):
+    def receive(self, later=0.1):
         """Run a cycle, `later` [s] than the one before; return owners and claims of what was published."""
         self.bus.run_until(self.bus.time + later)
         self.server.receive_commands()
-        return [(message.owners, message.claims) for message in self._ear.drain()]
+        return [(message.owners, message.claims) for message in self._receiver.drain()]
 
 
 def test_a_new_beginning_ends_all_claims_once():
     stage = Stage()
     claim(stage.lower_level, "/driver", ("wheel",))
-    assert stage.heard() == []
+    assert stage.receive() == []
     stage.lower_level.start(np.zeros(8))
-    assert stage.heard() == [((ALL_OWNERS,), (True,))]
-    assert stage.heard() == []
+    assert stage.receive() == [((ALL_OWNERS,), (True,))]
+    assert stage.receive() == []
     stage.drive()
-    assert stage.heard() == [(("/driver",), (True,))]
+    assert stage.receive() == [(("/driver",), (True,))]
 
 
 def test_refusals_wait_for_their_turn():
-    stage, heard = Stage(), []
+    stage, counts = Stage(), []
     for wait in (0.1, 0.119, 0.121, 0.13, 0.142):  # [s] since the beginning
         stage.drive("rol")
         stage.bus.run_until(wait)
-        heard.append(len(stage.heard(0.0)))
-    assert heard == [1, 0, 1, 0, 1]
+        counts.append(len(stage.receive(0.0)))
+    assert counts == [1, 0, 1, 0, 1]
 
 
 def test_a_wrong_command_leaves_its_claim():
     stage = Stage()
     claim(stage.lower_level, "/driver", ("wheel",))
     stage.drive("rol")
-    assert stage.heard() == [(("/driver",), (False,))]
+    assert stage.receive() == [(("/driver",), (False,))]
     stage.drive()
-    assert stage.heard() == []
+    assert stage.receive() == []

@@ -98,17 +98,17 @@ def test_the_command_writes_a_file(centauro, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         ([str(CENTAURO), "--at", "torso2", "--keep", "upper"], "did you mean: torso_2?"),
         (["none.urdf", "--at", "torso_2", "--keep", "upper"], "none.urdf: the URDF cannot be read"),
         ([str(CENTAURO), "--at", "torso_2", "--keep", "upper", "-o", "/none/of/these"], "cannot be written"),
     ],
 )
-def test_the_command_complains_in_one_block(arguments, complaint, capsys):
+def test_the_command_fails_in_one_block(arguments, message, capsys):
     assert main(["cut", *arguments]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("error: ") and complaint in err and "Traceback" not in err
+    assert out == "" and err.startswith("error: ") and message in err and "Traceback" not in err
 
 
 @pytest.mark.parametrize("arguments", [[], ["cute"], ["cut", "x.urdf", "--at", "a", "--keep", "middle"]])

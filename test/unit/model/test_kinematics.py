@@ -204,11 +204,11 @@ def test_twins_have_states_of_their_own():
     twin = first.twin()
     twin.update(other, position)
     before = first.position("tip").copy(), first.velocity("tip")
-    for value, wanted in (
+    for value, correct in (
         (twin.position("tip"), expected.position("tip")),
         (twin.velocity("tip"), expected.velocity("tip")),
     ):
-        assert_allclose(value, wanted, atol=0.0)
+        assert_allclose(value, correct, atol=0.0)
     twin.inertia(other)
     assert_allclose(first.position("tip"), before[0], atol=0.0)
     assert_allclose(first.velocity("tip"), before[1], atol=0.0)

@@ -94,12 +94,12 @@ def test_steps_keep_no_memory():
     assert after - before < 512 and peak - before < 2048
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 1.0])
-def test_means_of_two_filters_are_stable_with_unit_gain(share):
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 0.7, 1.0])
+def test_means_of_two_filters_are_stable_with_unit_gain(ratio):
     """Poles within the unit circle, and the gain at zero frequency, as SciPy sees them."""
     slow, fast = LowPass(1, 2.0, 0.3, 200.0), LowPass(1, 80.0, 5.0, 200.0)
     mixed = LowPass(1, 2.0, 0.3, 200.0)
-    mixed.factors[:] = (1.0 - share) * slow.factors + share * fast.factors
+    mixed.factors[:] = (1.0 - ratio) * slow.factors + ratio * fast.factors
     numerator, denominator = mixed.factors[:3], (1.0, *mixed.factors[3:])
     assert np.abs(np.roots(denominator)).max() < 1.0
     assert np.sum(numerator) / np.sum(denominator) == pytest.approx(1.0, abs=1e-12)

@@ -27,9 +27,9 @@ def addresses(arrays):
 def test_gathered_numbers_stand_at_their_places(numbers):
     out = np.full((2, 4), 7.0)
     assert gather(numbers, ROWS, SOURCE, PLACES, out) == -1
-    wanted = np.full((2, 4), 7.0)
-    wanted[:, PLACES] = numbers[ROWS][:, SOURCE]
-    assert_array_equal(out, wanted)
+    expected = np.full((2, 4), 7.0)
+    expected[:, PLACES] = numbers[ROWS][:, SOURCE]
+    assert_array_equal(out, expected)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])

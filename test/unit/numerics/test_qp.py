@@ -47,9 +47,9 @@ def feasible(seed, curvature=1e-3, repeats=0):
         value - random.uniform(0, 1, inequalities),
         value + random.uniform(0, 1, inequalities),
     )
-    problem.least[:], problem.largest[:] = point - random.uniform(0, 1, size), point + random.uniform(0, 1, size)
+    problem.x_min[:], problem.x_max[:] = point - random.uniform(0, 1, size), point + random.uniform(0, 1, size)
     open_ends = random.random(size) < 0.3
-    problem.largest[open_ends] = np.inf
+    problem.x_max[open_ends] = np.inf
     return solver
 
 
@@ -62,7 +62,7 @@ def infeasible(seed):
     problem.equality_matrix[:] = random.normal(size=(2, 10))
     problem.inequality_matrix[:] = random.normal(size=(3, 10))
     problem.lower[:], problem.upper[:] = -1.0, 1.0
-    problem.least[:], problem.largest[:] = -0.5, 0.5
+    problem.x_min[:], problem.x_max[:] = -0.5, 0.5
     if seed % 3 == 0:
         problem.inequality_matrix[1] = -problem.inequality_matrix[0]
         problem.lower[:2], problem.upper[:2] = 0.1, 1.0
@@ -89,9 +89,7 @@ def broken_conditions(problem, solution):
         "inequalities": (
             (value >= problem.lower - within(problem.lower)) & (value <= problem.upper + within(problem.upper))
         ).all(),
-        "bounds": (
-            (x >= problem.least - within(problem.least)) & (x <= problem.largest + within(problem.largest))
-        ).all(),
+        "bounds": ((x >= problem.x_min - within(problem.x_min)) & (x <= problem.x_max + within(problem.x_max))).all(),
         "slope": imbalance(problem, x) < 1e-8 * largest,
     }
     return [name for name, holds in kept.items() if not holds]
@@ -147,7 +145,7 @@ def is_contradictory(problem):
         limits[known],
         problem.equality_matrix,
         problem.equality_vector,
-        np.column_stack((problem.least, problem.largest)),
+        np.column_stack((problem.x_min, problem.x_max)),
     )
     return program.status == 2
 
@@ -196,8 +194,8 @@ def test_equal_problems_have_equal_solutions():
         "inequality_matrix",
         "lower",
         "upper",
-        "least",
-        "largest",
+        "x_min",
+        "x_max",
     ],
 )
 def test_nan_is_found_at_once(array):
@@ -208,7 +206,7 @@ def test_nan_is_found_at_once(array):
     assert np.isnan(getattr(solution.problem, array).flat[0])
 
 
-@pytest.mark.parametrize(("low", "high"), [("lower", "upper"), ("least", "largest")])
+@pytest.mark.parametrize(("low", "high"), [("lower", "upper"), ("x_min", "x_max")])
 def test_contradicting_bounds_are_found_at_once(low, high):
     solver = feasible(3)
     problem = solver.problem
@@ -227,7 +225,7 @@ def test_equalities_that_repeat_each_other_are_no_contradiction():
     solver = feasible(7)
     problem = solver.problem
     twice = QpSolver(len(problem.gradient), 2 * len(problem.equality_vector), len(problem.lower))
-    for name in ("hessian", "gradient", "inequality_matrix", "lower", "upper", "least", "largest"):
+    for name in ("hessian", "gradient", "inequality_matrix", "lower", "upper", "x_min", "x_max"):
         setattr(twice.problem, name, getattr(problem, name))
     twice.problem.equality_matrix[:] = np.vstack((problem.equality_matrix, -2.0 * problem.equality_matrix))
     twice.problem.equality_vector[:] = np.concatenate((problem.equality_vector, -2.0 * problem.equality_vector))

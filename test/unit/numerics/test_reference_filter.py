@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, TAKEN, ReferenceFilter
+from solfer.numerics.reference_filter import NOT_A_ROTATION, NOT_FINITE, TAKEN, ReferenceFilter
 
 PERIOD = 0.005  # [s]
 LIMITS = (0.5, 2.0, 1.0, 4.0)
@@ -111,7 +111,7 @@ def test_it_halts_where_it_can(references):
 
 @pytest.mark.parametrize(
     ("numbers", "first", "outcome"),
-    [((np.nan, 0.0, 0.0), 0, NOT_FINITE), ((0.0,) * 4, 3, NOT_A_TURN), ((0.0,) * 6 + (2.0,), 0, NOT_A_TURN)],
+    [((np.nan, 0.0, 0.0), 0, NOT_FINITE), ((0.0,) * 4, 3, NOT_A_ROTATION), ((0.0,) * 6 + (2.0,), 0, NOT_A_ROTATION)],
 )
 def test_wrong_numbers_change_nothing(references, numbers, first, outcome):
     before = references.target.copy()

@@ -189,7 +189,7 @@ def test_velocities_that_are_not_measured_contradict_nothing(leaps, left_out):
 def test_where_the_robot_strikes_something_velocities_do_not_show_ways(struck, is_refused):
     """Joints that bounce between two messages: of a whole robot an impact, of a few joints wrong encoders."""
     limits = SimpleNamespace(position=np.ones(6), velocity=np.full(6, 10.0))
-    robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, turns=np.zeros(6))
+    robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, revolutions=np.zeros(6))
     leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)
     position, refused = np.zeros(6), []
     for cycle in range(200):
@@ -206,7 +206,7 @@ def test_where_the_robot_strikes_something_velocities_do_not_show_ways(struck, i
 
 def test_after_an_impact_joints_are_judged_again():
     limits = SimpleNamespace(position=np.ones(6), velocity=np.full(6, 10.0))
-    robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, turns=np.zeros(6))
+    robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, revolutions=np.zeros(6))
     leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)
     position, refused = np.zeros(6), []
     for cycle in range(400):

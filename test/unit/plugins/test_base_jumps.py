@@ -48,7 +48,7 @@ def test_a_jump_is_found_and_moves_what_is_beside_the_base(base, seed, caplog):
     )
     chart.from_rotation(before[:3] + draw.uniform(-5.0, 5.0, 3), rotation @ chart.to_rotation(before), position[:6])
     move = jumps.find(PERIOD)
-    assert move is not None and move.turn == pytest.approx(turn, abs=1e-9)
+    assert move is not None and move.yaw == pytest.approx(turn, abs=1e-9)
     move.move(place)
     np.testing.assert_allclose(place, position[:3] + chart.to_rotation(position[:6]) @ seen, atol=1e-9)
     assert "legs: the estimate of the base has jumped by" in caplog.text

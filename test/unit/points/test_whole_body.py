@@ -103,8 +103,8 @@ def test_a_task_keeps_the_angular_momentum(quadruped, make):
 def test_postures_have_the_order_of_their_dofs(robot_and_links):
     """Names and indices may be mixed, in any order: values and rows keep it, also after an assignment."""
     robot, _ = robot_and_links
-    wanted = [robot.dofs[4], 0, robot.dofs[2]]
-    posture, everything = Posture(robot, wanted), Posture(robot)
+    chosen = [robot.dofs[4], 0, robot.dofs[2]]
+    posture, everything = Posture(robot, chosen), Posture(robot)
     assert posture.dofs.tolist() == [4, 0, 2] and posture.columns.tolist() == [0, 2, 4]
     position, velocity = next(states(robot))
     put(robot, position, velocity)

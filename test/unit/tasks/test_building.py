@@ -94,9 +94,9 @@ def test_postures_follow_named_states(robot, build):
     text = "stack: {tasks: {arm: {point: posture, dofs: [left_arm], reference: home_upper}}, levels: [[arm]]}"
     stack = build(text)
     dofs, values = robot.named_state("home_upper")
-    wanted = dict(zip(dofs.tolist(), values, strict=True))
+    expected = dict(zip(dofs.tolist(), values, strict=True))
     point = stack.tasks["arm"].point
-    assert_allclose(stack.references["arm"].value, [wanted[dof] for dof in point.dofs.tolist()])
+    assert_allclose(stack.references["arm"].value, [expected[dof] for dof in point.dofs.tolist()])
 
 
 def test_points_of_a_component_have_names(robot, build):

@@ -1,4 +1,4 @@
-"""The points that a stack of tasks names are those that Python makes, and what cannot be one is told."""
+"""The points that a stack of tasks names are those that Python makes, and what cannot be one is reported."""
 
 from functools import cache
 from pathlib import Path
@@ -117,8 +117,8 @@ MADE = {
 def test_a_task_moves_what_it_names(robot, build, task, made):
     stack = build(task)
     value, jacobian = numbers(stack.tasks["task"].point)
-    wanted, rows = numbers(made(robot))
-    assert_allclose(value, wanted, atol=1e-12)
+    expected, rows = numbers(made(robot))
+    assert_allclose(value, expected, atol=1e-12)
     assert_allclose(jacobian, rows, atol=1e-12)
     assert type(stack.tasks["task"].point) is type(made(robot))
     assert stack.tasks["task"].selected.tolist() == ([5] if "steering" in task else list(range(len(rows))))

@@ -85,10 +85,10 @@ def test_null_spaces_square_the_damping(robot, build):
     solver = stack.solver(PERIOD)
     velocity = solver.update()
     jacobian, error = rows_of(stack)
-    wanted = np.array((0.1, 0.2, 0.3, 0.4, 0.5, 0.6)) * error
+    desired = np.array((0.1, 0.2, 0.3, 0.4, 0.5, 0.6)) * error
     inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + 0.04**2 * np.eye(6))
     assert isinstance(solver, Hierarchy)
-    assert_allclose(velocity, inverse @ wanted, atol=1e-9)
+    assert_allclose(velocity, inverse @ desired, atol=1e-9)
 
 
 @pytest.mark.slow

@@ -56,7 +56,7 @@ def test_without_limits_it_agrees_with_the_null_spaces(robot, damping):
 
 @pytest.mark.parametrize("scale", [1.0, 1e9])
 def test_levels_without_limits_need_no_qp(robot, scale):
-    """The slope that is left counts as a share of its largest term, also where some joints stand still."""
+    """The slope that is left counts as a ratio of its largest term, also where some joints stand still."""
     tasks = stack_of(robot, dofs=robot.actuated.tolist(), damping=1e-2)
     for task in tasks:
         task.velocity *= scale

@@ -15,7 +15,7 @@ from solfer.tasks import Hierarchy, QpHierarchy, Task, TaskController, joint_bou
 
 PERIOD, DURATION = 0.002, 0.1  # [s]
 STEEPEST = 1.875
-"""Largest slope of the share over the progress."""
+"""Largest slope of the weight over the progress."""
 
 
 @pytest.fixture

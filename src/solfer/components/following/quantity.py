@@ -87,7 +87,7 @@ class PoseNumbers:
         if self.quantity != "orientation":
             move.move(numbers[:3])
         if self.quantity != "position":
-            move.turn_orientation(numbers[-4:])
+            move.rotate_orientation(numbers[-4:])
 
     def add(self, reference: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         """Return a reference and numbers that are added to it; quaternions turn it in the same axes."""

@@ -13,7 +13,7 @@ from solfer.errors import UnknownName
 from solfer.interfaces.geometry import bare_frame
 from solfer.interfaces.port import Port
 from solfer.numerics.planar_move import PlanarMove
-from solfer.numerics.reference_filter import FURTHEST_TARGET, NOT_A_TURN, NOT_FINITE, ReferenceFilter
+from solfer.numerics.reference_filter import FURTHEST_TARGET, NOT_A_ROTATION, NOT_FINITE, ReferenceFilter
 from solfer.points import Constant, LookAt
 from solfer.references import ReferenceGenerator
 from solfer.tasks import Task
@@ -169,7 +169,7 @@ class TaskReference:
         outcome = self._filtered.aim(self.port.value, True)
         if outcome == NOT_FINITE:
             return f"a reference that is not finite, or beyond {FURTHEST_TARGET:g} m"
-        if outcome == NOT_A_TURN:
+        if outcome == NOT_A_ROTATION:
             return "a quaternion that has not the length 1"
         self._end_generated()
         return ""

@@ -150,8 +150,8 @@ class WholeBodyProblem:
             problem.inequality_matrix,
             problem.lower,
             problem.upper,
-            problem.least,
-            problem.largest,
+            problem.x_min,
+            problem.x_max,
         )
         self._outcome = INFEASIBLE
         if not is_sound:

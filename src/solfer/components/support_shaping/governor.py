@@ -115,7 +115,7 @@ class SupportGovernor:
         size = 2 * count
         problem.hessian[np.arange(size), np.arange(size)] = 1.0
         problem.inequality_matrix[:, size:] = np.eye(size)
-        problem.least[size:] = 0.0
+        problem.x_min[size:] = 0.0
         self._matrix = problem.inequality_matrix[:, :size]
         self._rows = LimitRows(self._matrix, self.limits)
         self.tune(gains, horizon, recovery)
@@ -172,8 +172,8 @@ class SupportGovernor:
         np.negative(self._desired, out=problem.gradient[:size])
         problem.lower[:] = demand
         largest = max(self.speed, float(np.abs(self._desired).max()))
-        problem.least[:size] = -largest
-        problem.largest[:size] = largest
+        problem.x_min[:size] = -largest
+        problem.x_max[:size] = largest
         solution = self._solver.solve()
         x = solution.x
         if not solution.is_solved:

@@ -122,7 +122,7 @@ class JointProgram:
         problem = self.solver.problem
         self.weigh((tags.margin_gain, tags.workspace_gain))
         problem.inequality_matrix[self._soft, size:] = -np.eye(2 * count)
-        problem.largest[size:] = 0.0
+        problem.x_max[size:] = 0.0
         self.infeasible = 0
         robot.dynamics.subscribe(INERTIA)
 
@@ -208,14 +208,14 @@ class JointProgram:
             lower = (robot.lower_limits.position - position)[moved] / self.wheels.period
             upper = (robot.upper_limits.position - position)[moved] / self.wheels.period
             if position is robot.state.position:
-                problem.least[:size] = lower
-                problem.largest[:size] = upper
+                problem.x_min[:size] = lower
+                problem.x_max[:size] = upper
             else:
-                np.maximum(problem.least[:size], lower, out=problem.least[:size])
-                np.minimum(problem.largest[:size], upper, out=problem.largest[:size])
+                np.maximum(problem.x_min[:size], lower, out=problem.x_min[:size])
+                np.minimum(problem.x_max[:size], upper, out=problem.x_max[:size])
         speed = robot.upper_limits.velocity[moved]
-        problem.least[:size] = np.minimum(np.maximum(problem.least[:size], -speed), 0.0)
-        problem.largest[:size] = np.maximum(np.minimum(problem.largest[:size], speed), 0.0)
+        problem.x_min[:size] = np.minimum(np.maximum(problem.x_min[:size], -speed), 0.0)
+        problem.x_max[:size] = np.maximum(np.minimum(problem.x_max[:size], speed), 0.0)
 
     def _write_torques(self, force: np.ndarray) -> None:
         robot = self._robot

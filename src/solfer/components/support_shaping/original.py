@@ -15,7 +15,7 @@ from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.dynamics import BIAS
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.robot import Robot
-from solfer.tasks.task import DAMPING_COLUMN
+from solfer.tasks.task import DAMPING
 
 
 class WorldVertices:
@@ -147,7 +147,7 @@ class OriginalShaping:
         error = tasks.rates.error
         find_soft(steering.measured, self._aims, ROUNDED_PI, ANGLE_ERRORS[STEERING], error[tasks.rows[STEERING]])
         np.multiply(tasks.gain, error, out=stack.velocity)
-        velocity = tasks.descent.update(stack.jacobian, stack.velocity, stack.numbers[:, DAMPING_COLUMN])
+        velocity = tasks.descent.update(stack.jacobian, stack.velocity, stack.numbers[:, DAMPING])
         self._joints.move(velocity, step)
 
     def _keep_jacobians(self) -> None:
@@ -163,7 +163,7 @@ class OriginalShaping:
         rows = tasks.rows
         np.multiply(tasks.gain, tasks.rates.error, out=stack.velocity)
         count = rows[BASE].stop
-        damping = stack.numbers[:count, DAMPING_COLUMN]
+        damping = stack.numbers[:count, DAMPING]
         before = self._first.update(stack.jacobian[:count], stack.velocity[:count], damping)
         self.program.wheels.update()
         self._sum_loads()

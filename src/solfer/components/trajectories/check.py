@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.interfaces.trajectories import JointTolerance, JointTrajectory, TrajectoryPoint
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.numerics.via_points import ViaPoints
 
 _SLACK = 1e-6
@@ -107,7 +107,7 @@ class TrajectoryCheck:
         left = times > elapsed
         if rows[0] is not None:
             first = rows[0][int(left.argmax())] if left.any() else rows[0][-1]
-            rows[0] += whole_turns(start - first, self._turns[places])
+            rows[0] += whole_revolutions(start - first, self._turns[places])
         if not left.any():
             last = rows[0]
             reached = last is not None and np.abs(last[-1] - measured).max() <= 1e-2  # [rad, m]

@@ -19,7 +19,7 @@ from solfer.interfaces.trajectories import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot
 
@@ -54,7 +54,7 @@ class _Deviation:
         self._state = robot.state
         self._dofs = dofs
         self.desired, self.speed, self.actual, self.turning = (np.zeros(len(dofs)) for _ in range(4))
-        self.revolution = robot.turns[dofs]
+        self.revolution = robot.revolutions[dofs]
         self._displacements = np.zeros((1, len(dofs)))
         self._away = self._error = self._displacements[0]
         self._slip = np.zeros(len(dofs))
@@ -145,7 +145,7 @@ class TrajectoryFollower:
             robot.lower_limits.position[joints],
             robot.upper_limits.position[joints],
             speed=robot.upper_limits.velocity[joints],
-            turns=robot.turns[joints],
+            turns=robot.revolutions[joints],
         )
         self.moving = False
         self.waiting: deque[_Course] = deque()
@@ -265,7 +265,7 @@ class TrajectoryFollower:
         desired = self._position[course.places]
         speed = self._velocity[course.places]
         away = desired - deviation.actual
-        away -= whole_turns(away, deviation.revolution)
+        away -= whole_revolutions(away, deviation.revolution)
         return FollowFeedback(
             course.names,
             _point(desired, speed, time),

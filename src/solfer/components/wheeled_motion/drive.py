@@ -80,7 +80,7 @@ class Drive:
         """Go on as seen from the base, whose estimate has jumped."""
         if self._state[IN_WORLD]:
             move.rotate(self._state[:2])
-        self._state[BEFORE] += move.turn
+        self._state[BEFORE] += move.yaw
 
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.

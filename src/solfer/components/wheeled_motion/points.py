@@ -201,7 +201,7 @@ class RollingOffsets(CompiledPoint):
 
     def displace(self, move: PlanarMove) -> None:
         """Move with the base, whose estimate has jumped."""
-        self.base[0] = move.turn_angle(self.heading)
+        self.base[0] = move.rotate_heading(self.heading)
         move.move(self.base[1:])
         self.states[:, 2] += move.rise
 

@@ -103,9 +103,9 @@ class References:
         """Move with the base, whose estimate has jumped."""
         move.move(self.position)
         move.rotate(self.velocity)
-        self.heading = move.turn_angle(self.heading)
+        self.heading = move.rotate_heading(self.heading)
         self.vertices[:, 2] += move.rise
-        move.turn_orientation(self.orientation)
+        move.rotate_orientation(self.orientation)
 
     def step(self, period: float) -> None:
         """Go on for a time [s], at the pace."""

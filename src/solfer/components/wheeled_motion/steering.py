@@ -74,8 +74,8 @@ class Steering:
     def displace(self, move: PlanarMove) -> None:
         """Remember the base where its estimate has jumped to."""
         move.move(self.before[:2])
-        self.before[2] += move.turn
-        self.angles += move.turn
+        self.before[2] += move.yaw
+        self.angles += move.yaw
 
     def start(self, place: np.ndarray, heading: float, angles: np.ndarray | None = None) -> None:
         """Begin at a place of the base [m] and its heading [rad], at rest.

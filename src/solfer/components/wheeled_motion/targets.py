@@ -164,7 +164,7 @@ class Targets:
     def displace(self, move: PlanarMove) -> None:
         """Move with the base, whose estimate has jumped; vertices are seen from it, but for their heights."""
         move.move(self._places[0])
-        self._places[1, 2] = move.turn_angle(self._places[1, 2])
+        self._places[1, 2] = move.rotate_heading(self._places[1, 2])
         self._places[2:, 2] += move.rise
 
     def update(self, references: References, ratio: float, passed: float) -> None:

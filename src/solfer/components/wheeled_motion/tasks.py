@@ -31,7 +31,7 @@ from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.stack import Stack
-from solfer.tasks.task import DAMPING_COLUMN
+from solfer.tasks.task import DAMPING
 
 
 class DrivingTasks:
@@ -72,7 +72,7 @@ class DrivingTasks:
         self._robot = robot
         self._wheels = wheels
         self._feeds_forward = not tags.is_original
-        self._damping = self.stack.numbers[:, DAMPING_COLUMN]
+        self._damping = self.stack.numbers[:, DAMPING]
         self.aims = np.zeros(len(wheels.links))
 
     @property

@@ -74,7 +74,7 @@ class DrivenWheels:
         """Move with the base, whose estimate has jumped."""
         self.offsets.displace(move)
         move.move(self.pose.value[:3])
-        move.turn_orientation(self.pose.value[3:])
+        move.rotate_orientation(self.pose.value[3:])
 
 
 def find_wheels(robot: Robot, tags: DrivingTags) -> tuple[ContactRecord, ...]:

@@ -12,8 +12,11 @@ from solfer.transport.lower_level import node_of
 from solfer.transport.messages import JOINT_FIELDS
 
 UNCLAIMED = -1
+"""Number of the owner of a free joint."""
+
 MODES = {field: row for row, field in enumerate(JOINT_FIELDS)}
-CLAIM_SHOWN_COUNT = 6  # joints in an error
+"""Row of each field of a command."""
+
 BARRED = 256
 """Most senders that are barred by name; beyond that every sender without a claim is barred."""
 
@@ -203,9 +206,8 @@ class Claims:
         names = {number: name for name, number in self._ids.items()}
         others = ", ".join(f"'{names[number]}'" for number in dict.fromkeys(present[taken].tolist()))
         joints = [self._joints[item.controller][index] for index in item.indices[taken.any(axis=0)]]
-        shown = ", ".join(joints[:CLAIM_SHOWN_COUNT]) + (
-            f" and {len(joints) - CLAIM_SHOWN_COUNT} more" if len(joints) > CLAIM_SHOWN_COUNT else ""
-        )
+        listed = 6  # joints that the error names
+        shown = ", ".join(joints[:listed]) + (f" and {len(joints) - listed} more" if len(joints) > listed else "")
         raise ClaimRefused(
             f"'{owner}' cannot command {shown} of controller '{item.controller}': {others} does",
             expected=f"joints that are free: {others} has to end or to send nothing for {self._lease:g} s",

@@ -7,8 +7,6 @@ from solfer.errors import ClaimRefused, CommandRefused, Suspended
 SENDERS = 64
 """Most senders that are counted by name."""
 
-OTHER_SENDERS = "others"
-
 
 class Refusals(Counter[str]):
     """Number of refused commands of each sender, in bounded memory."""
@@ -19,7 +17,7 @@ class Refusals(Counter[str]):
 
     def note(self, sender: str, error: CommandRefused) -> None:
         """Count a command of `sender` that was refused because of `error`."""
-        name = sender if sender in self or len(self) < SENDERS else OTHER_SENDERS
+        name = sender if sender in self or len(self) < SENDERS else "others"
         self[name] += 1
         self._news[name] = error
 

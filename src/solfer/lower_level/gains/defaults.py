@@ -6,27 +6,8 @@ from solfer.lower_level.laws.impedance import REGULARISATION
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 
-EFFORT_DEFLECTION = 0.05
-"""Deflection at which the spring reaches the whole effort [rad, m]; at half of the effort it is half of that."""
-
-WEIGHT_DEFLECTION = 0.01
-"""Deflection at which the spring carries the weight on the joint [rad, m]."""
-
-FRICTION_DEFLECTION = 0.02
-"""Deflection at which the spring overcomes the friction of the joint [rad, m]."""
-
-TOP_FREQUENCY = 100.0
-"""Largest natural frequency [rad/s]: 63 steps of 1 ms in a period."""
-
-FREE_TOP_FREQUENCY = 500.0
-"""Largest natural frequency of a joint while no other joint holds [rad/s]: the law predicts the spring's deflection at
-the end of a step from the speed at its beginning, and needs K DRIVE_PERIOD^2 well below m."""
-
 DRIVE_PERIOD = 0.001
 """Period of the drives [s]."""
-
-LARGEST_LOSS = 0.5
-"""Largest ratio of its speed that a free joint loses by damping in a step, DRIVE_PERIOD D / m."""
 
 
 def default_gains(
@@ -37,9 +18,9 @@ def default_gains(
     With the effort limit tau, the torque g of the weight that hangs on the joint, the dry friction f that the
     description gives it, and I from `moved_inertia`:
 
-        K = max(tau / EFFORT_DEFLECTION, |g| / WEIGHT_DEFLECTION), but at most I TOP_FREQUENCY^2,
-            then at least f / FRICTION_DEFLECTION, but at most m FREE_TOP_FREQUENCY^2
-        D = min(2 sqrt(K I), LARGEST_LOSS m / DRIVE_PERIOD),   m from `free_inertia`
+        K = max(tau / effort_deflection, |g| / weight_deflection), but at most I top_frequency^2,
+            then at least f / friction_deflection, but at most m free_top_frequency^2
+        D = min(2 sqrt(K I), largest_loss m / DRIVE_PERIOD),   m from `free_inertia`
 
     D is the critical damping of the inertia I on the spring K, as far as `ImplicitImpedance` follows a step of the
     torque within 1 % in 5 steps.
@@ -53,16 +34,24 @@ def default_gains(
     Returns:
         Stiffness [Nm/rad, N/m] and damping [Nms/rad, Ns/m], shape (len(dofs),) each.
     """
+    effort_deflection = 0.05  # [rad, m] at which the spring reaches the whole effort
+    weight_deflection = 0.01  # [rad, m] at which it carries the weight on the joint
+    friction_deflection = 0.02  # [rad, m] at which it overcomes the friction of the joint
+    top_frequency = 100.0  # largest natural frequency [rad/s]: 63 steps of 1 ms in a period
+    # Largest natural frequency while no other joint holds [rad/s]: the law predicts the spring's deflection at the end
+    # of a step from the speed at its beginning, and needs K DRIVE_PERIOD^2 well below m.
+    free_top_frequency = 500.0
+    largest_loss = 0.5  # largest ratio of its speed that a free joint loses by damping in a step, DRIVE_PERIOD D / m
     posture = neutral_posture(kinematics) if posture is None else posture
     inertia = moved_inertia(kinematics, dofs, posture)
     weight = np.abs(kinematics.bias(posture, np.zeros(kinematics.size))[dofs])
-    stiffness = np.maximum(kinematics.effort_limit[dofs] / EFFORT_DEFLECTION, weight / WEIGHT_DEFLECTION)
+    stiffness = np.maximum(kinematics.effort_limit[dofs] / effort_deflection, weight / weight_deflection)
     free = free_inertia(kinematics, posture)[dofs]
     joints = [kinematics.description.joints[kinematics.dofs[dof]] for dof in dofs]
     friction = np.array([joint.friction for joint in joints])
-    stiffness = np.maximum(np.minimum(stiffness, inertia * TOP_FREQUENCY**2), friction / FRICTION_DEFLECTION)
-    stiffness = np.minimum(stiffness, free * FREE_TOP_FREQUENCY**2)
-    return stiffness, np.minimum(2.0 * np.sqrt(stiffness * inertia), LARGEST_LOSS * free / DRIVE_PERIOD)
+    stiffness = np.maximum(np.minimum(stiffness, inertia * top_frequency**2), friction / friction_deflection)
+    stiffness = np.minimum(stiffness, free * free_top_frequency**2)
+    return stiffness, np.minimum(2.0 * np.sqrt(stiffness * inertia), largest_loss * free / DRIVE_PERIOD)
 
 
 def free_inertia(kinematics: Kinematics, posture: np.ndarray) -> np.ndarray:

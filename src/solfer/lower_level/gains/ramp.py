@@ -2,7 +2,7 @@
 
 import numpy as np
 
-CHANGE = 0.2
+COMMANDED_DURATION = 0.2
 """Time in which a commanded gain comes into force [s]."""
 
 Joints = np.ndarray | slice
@@ -18,7 +18,7 @@ class GainRamp:
 
     def __init__(self, gains: np.ndarray):
         self._gains, self._goal, self._left = gains, gains.copy(), np.zeros_like(gains)
-        self._share = np.zeros_like(gains)
+        self._ratio = np.zeros_like(gains)
         self._change = np.zeros_like(gains)
         self._done = np.zeros(len(gains), dtype=bool)
         self._active = False
@@ -32,10 +32,10 @@ class GainRamp:
             self._gains[joints] = goal
 
     def command(self, joints: np.ndarray, goal: np.ndarray) -> None:
-        """Start a ramp of the `joints` whose commanded `goal` is a new one; it takes CHANGE."""
+        """Start a ramp of the `joints` whose commanded `goal` is a new one; it takes COMMANDED_DURATION."""
         changed = self._goal[joints] != goal
         if changed.any():
-            self.begin(goal[changed], CHANGE, joints[changed])
+            self.begin(goal[changed], COMMANDED_DURATION, joints[changed])
 
     def stop(self, joints: Joints = ALL_JOINTS) -> None:
         """End the ramp of `joints` where it is."""
@@ -47,14 +47,14 @@ class GainRamp:
         """Let `dt` [s] pass."""
         if not self._active:
             return
-        share = self._share
+        ratio = self._ratio
         change = self._change
         left = self._left
-        share.fill(0.0)
-        np.divide(dt, left, out=share, where=np.greater(left, 0.0, out=self._done))
-        np.greater_equal(share, 1.0, out=self._done)
+        ratio.fill(0.0)
+        np.divide(dt, left, out=ratio, where=np.greater(left, 0.0, out=self._done))
+        np.greater_equal(ratio, 1.0, out=self._done)
         np.subtract(self._goal, self._gains, out=change)
-        np.multiply(change, share, out=change)
+        np.multiply(change, ratio, out=change)
         np.add(self._gains, change, out=self._gains)
         np.copyto(self._gains, self._goal, where=self._done)
         np.subtract(left, dt, out=left)

@@ -4,29 +4,8 @@ import numpy as np
 
 from solfer.lower_level.gains.ramp import ALL_JOINTS
 
-JUMP_DISTANCE = 0.01
-"""Distance from where its stream was heading at which a commanded position has jumped [rad, m]."""
-
 LONGEST_PAUSE = 0.1
 """Longest time between two commands of one stream [s]; a later one is expected where the stream would be by then."""
-
-SHORTEST_PERIOD = 0.005
-"""Time between commands below which JUMP_DISTANCE shrinks in proportion: an emptied queue is not a fast stream [s]."""
-
-STREAM_ACCELERATION = 50.0
-"""Largest change of a stream's estimated speed at a jump [rad/s2, m/s2]."""
-
-FADING_FREQUENCY = 10.0
-"""Frequency of the critically damped system in which a distance fades out [rad/s]: 1 % is left after 0.66 s."""
-
-FADING_SPEED_RATIO = 0.2
-"""Ratio of its speed limit that a joint uses, at most, to catch up."""
-
-TOTAL_SPEED_RATIO = 0.8
-"""Ratio of its speed limit that a stream and catching up use together, at most: links on springs swing beyond that."""
-
-CAUGHT_UP_BELOW = 1e-6
-"""Distance and speed below which a joint has caught up [rad, rad/s]."""
 
 
 class _Buffers:
@@ -44,11 +23,11 @@ class _Buffers:
 class CatchUp:
     """Distances between springs' targets and commanded positions, which fade out where those jump.
 
-    A stream of commands is followed as it is. A position that is further than JUMP_DISTANCE from where the newest two
+    A stream of commands is followed as it is. A position that is further than 0.01 rad or m from where the newest two
     commands were heading has jumped: the sender or the robot was stopped, or another sender begins elsewhere. Then the
-    distance o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FADING_FREQUENCY and |o'| of at
-    most FADING_SPEED_RATIO of the joint's speed limit, or of what the stream leaves of TOTAL_SPEED_RATIO of it. The
-    target stays continuous in position and speed, and never overshoots the command by it.
+    distance o between command and target fades out as o'' = -2 w o' - w^2 o, with w = 10 rad/s: 1 % is left after
+    0.66 s. |o'| is at most 0.2 times the joint's speed limit, or what the stream leaves of 0.8 times it: links on
+    springs swing beyond that. The target stays continuous in position and speed, and never overshoots the command.
 
     Args:
         speed_limit: Speed limit of each joint, shape (n,) [rad/s, m/s].
@@ -60,8 +39,8 @@ class CatchUp:
 
     def __init__(self, speed_limit: np.ndarray):
         size = len(speed_limit)
-        self._fastest = FADING_SPEED_RATIO * speed_limit
-        self._whole = TOTAL_SPEED_RATIO * speed_limit
+        self._fastest = 0.2 * speed_limit
+        self._whole = 0.8 * speed_limit
         self.distance = np.zeros(size)
         self._rate = np.zeros(size)
         self._last = np.zeros(size)
@@ -89,12 +68,15 @@ class CatchUp:
         """Let `dt` [s] pass; `position` is the last command, shape (n,)."""
         self._age += dt
         if self._any_news:
-            self._judge(position)
+            self._detect_jumps(position)
         if self.active:
             self._fade(dt)
 
-    def _judge(self, position: np.ndarray) -> None:
+    def _detect_jumps(self, position: np.ndarray) -> None:
         """Compare the command with where its stream was heading."""
+        jump_distance = 0.01  # [rad, m]
+        shortest_period = 0.005  # [s] below which that shrinks in proportion: an emptied queue is not a fast stream
+        largest_acceleration = 50.0  # of the stream's estimated speed at a jump [rad/s2, m/s2]
         buffers = self._buffers
         moved = buffers.moved
         extra = buffers.work
@@ -109,15 +91,15 @@ class CatchUp:
         np.maximum(extra, np.minimum(moved, 0.0, out=buffers.bound), out=extra)
         np.subtract(moved, extra, out=extra)
         np.multiply(
-            np.minimum(time, SHORTEST_PERIOD, out=buffers.change), JUMP_DISTANCE / SHORTEST_PERIOD, out=buffers.change
+            np.minimum(time, shortest_period, out=buffers.change), jump_distance / shortest_period, out=buffers.change
         )
         np.greater(np.abs(extra, out=buffers.bound), buffers.change, out=jumped)
         np.logical_and(jumped, news, out=jumped)
         if jumped.any():
             np.add(self.distance, extra, out=self.distance, where=jumped)
             self.active = True
-        # the stream's speed; at a jump its change is bounded by ACCELERATION
-        np.multiply(time, STREAM_ACCELERATION, out=buffers.change)
+        # the stream's speed; at a jump its change is bounded
+        np.multiply(time, largest_acceleration, out=buffers.change)
         np.copyto(buffers.change, np.inf, where=np.logical_not(jumped, out=jumped))
         np.divide(moved, time, out=moved, where=news)
         np.subtract(moved, self._speed, out=moved)
@@ -133,13 +115,15 @@ class CatchUp:
 
     def _fade(self, dt: float) -> None:
         """Fade for one step, implicit in the speed."""
+        frequency = 10.0  # w [rad/s]
+        caught_up = 1e-6  # distance and speed below which a joint has caught up [rad, rad/s]
         distance = self.distance
         rate = self._rate
         buffers = self._buffers
         work = buffers.work
-        np.multiply(distance, -FADING_FREQUENCY * FADING_FREQUENCY * dt, out=work)
+        np.multiply(distance, -frequency * frequency * dt, out=work)
         rate += work
-        rate /= 1.0 + 2.0 * FADING_FREQUENCY * dt
+        rate /= 1.0 + 2.0 * frequency * dt
         # the target moves at the speed of its stream, if that goes on, minus the rate of the distance
         speed = buffers.moved
         bound = buffers.bound
@@ -153,7 +137,7 @@ class CatchUp:
         np.multiply(rate, dt, out=work)
         distance += work
         np.abs(distance, out=work)
-        if work.max() < CAUGHT_UP_BELOW and np.abs(rate, out=work).max() < CAUGHT_UP_BELOW:
+        if work.max() < caught_up and np.abs(rate, out=work).max() < caught_up:
             distance.fill(0.0)
             rate.fill(0.0)
             self.active = False

@@ -8,12 +8,6 @@ from solfer.errors import CommandRefused, nearest
 from solfer.lower_level.laws.limits import JointLimits
 from solfer.transport.messages import JOINT_FIELDS, LARGEST_GAIN, JointMessage
 
-VALUE_TOLERANCE = 1e-9  # [rad, rad/s, Nm]; a value computed to lie on a limit is within it
-UNLIMITED_VALUE = 1e6
-"""Bound of values without a limit: far beyond every robot, and small enough that no product of two overflows."""
-
-VALUE_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "Nm", "stiffness": "Nm/rad", "damping": "Nms/rad"}
-
 
 class CommandCheck:
     """Checks commands for the joints of one controller.
@@ -32,10 +26,12 @@ class CommandCheck:
         self._names: tuple[str, ...] = ()
         self._indices = np.zeros(0, dtype=np.intp)
         zero = np.zeros(len(limits.joints))
+        # of values without a limit: far beyond every robot, and small enough that no product of two overflows
+        largest = 1e6
         self._bounds = {
-            "position": (np.maximum(limits.lower, -UNLIMITED_VALUE), np.minimum(limits.upper, UNLIMITED_VALUE)),
-            "velocity": (-np.minimum(limits.velocity, UNLIMITED_VALUE), np.minimum(limits.velocity, UNLIMITED_VALUE)),
-            "effort": (-np.minimum(limits.effort, UNLIMITED_VALUE), np.minimum(limits.effort, UNLIMITED_VALUE)),
+            "position": (np.maximum(limits.lower, -largest), np.minimum(limits.upper, largest)),
+            "velocity": (-np.minimum(limits.velocity, largest), np.minimum(limits.velocity, largest)),
+            "effort": (-np.minimum(limits.effort, largest), np.minimum(limits.effort, largest)),
             "stiffness": (zero, zero + LARGEST_GAIN),
             "damping": (zero, zero + LARGEST_GAIN),
         }
@@ -107,7 +103,8 @@ class CommandCheck:
         lower, upper = self._bounds[field]
         low = lower[indices]
         high = upper[indices]
-        inside = (numbers >= low - VALUE_TOLERANCE) & (numbers <= high + VALUE_TOLERANCE) & np.isfinite(numbers)
+        tolerance = 1e-9  # [rad, rad/s, Nm]: a value computed to lie on a limit is within it
+        inside = (numbers >= low - tolerance) & (numbers <= high + tolerance) & np.isfinite(numbers)
         if not inside.all():
             wrong = inside.argmin()
             self._refuse(field, names[wrong], float(numbers[wrong]), low=float(low[wrong]), high=float(high[wrong]))
@@ -115,8 +112,6 @@ class CommandCheck:
 
     def _refuse(self, field: str, joint: str, value: float, low: float, high: float) -> None:
         what = f"{field} {value:g} of joint '{joint}'"
-        if not np.isfinite(value):
-            raise CommandRefused(
-                f"{what} is not a finite number", expected=f"from {low:g} to {high:g} [{VALUE_UNITS[field]}]"
-            )
-        raise CommandRefused(f"{what} is beyond its limit", expected=f"from {low:g} to {high:g} [{VALUE_UNITS[field]}]")
+        fault = "is beyond its limit" if np.isfinite(value) else "is not a finite number"
+        units = {"position": "rad", "velocity": "rad/s", "effort": "Nm", "stiffness": "Nm/rad", "damping": "Nms/rad"}
+        raise CommandRefused(f"{what} {fault}", expected=f"from {low:g} to {high:g} [{units[field]}]")

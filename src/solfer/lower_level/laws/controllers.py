@@ -14,19 +14,14 @@ from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.lower_level.laws.command_check import CommandCheck
 from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.transport.messages import JOINT_FIELDS
 
-CONTROLLER_TIMEOUT = 0.5  # [s]
-RAMP = 0.5
+VELOCITY_TIMEOUT = 0.5
+"""Time after which a velocity that is not renewed becomes zero, without a record [s]."""
+
+RAMP_DURATION = 0.5
 """Time in which loaded gains, and feed-forward torque when it is switched, come into force [s]."""
-
-STRETCH_MARGIN = 0.05
-"""Distance beyond the largest stretch of its spring at which a joint cannot be [rad, m]: a link hangs on its actuator's
-spring, 0.004 rad at CENTAURO's largest torques, and is measured 10 ms ago while it moves at 4 rad/s."""
-
-FURTHEST = 0.5
-"""Largest distance of a target from where its joint is when it is held there [rad, m]."""
 
 
 class LowerLevelController(abc.ABC):
@@ -48,7 +43,7 @@ class LowerLevelController(abc.ABC):
     TYPE: ClassVar[str]
     FIELDS: ClassVar[tuple[str, ...]]
 
-    def __init__(self, name: str, limits: JointLimits, timeout: float = CONTROLLER_TIMEOUT):
+    def __init__(self, name: str, limits: JointLimits, timeout: float = VELOCITY_TIMEOUT):
         self.name = name
         self.limits = limits
         self.joints = limits.joints
@@ -119,12 +114,12 @@ class ImpedanceController(LowerLevelController):
         damping: Default damping, shape (len(joints),) [Nms/rad].
 
     Attributes:
-        position: Accepted position, of joints without ends on the turn nearest to the one before; it does not expire
-            [rad].
+        position: Accepted position, of joints without ends in the revolution nearest to the one before; it does not
+            expire [rad].
         target: Position of the springs: follows `position` by `CatchUp`, at most at the velocity limit of each joint
             [rad].
         effort: Commanded feed-forward torque [Nm].
-        feed_forward: Whether it is applied; a change takes RAMP.
+        feed_forward: Whether it is applied; a change takes RAMP_DURATION.
         applied_effort: Feed-forward torque that is applied [Nm].
         stiffness: Stiffness of the springs [Nm/rad].
         damping: Damping relative to `velocity` [Nms/rad].
@@ -143,22 +138,22 @@ class ImpedanceController(LowerLevelController):
         limits: JointLimits,
         stiffness: ArrayLike,
         damping: ArrayLike,
-        timeout: float = CONTROLLER_TIMEOUT,
+        timeout: float = VELOCITY_TIMEOUT,
     ):
         super().__init__(name, limits, timeout)
         size = len(self.joints)
         self._default = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
         self.stiffness, self.damping = (gain.copy() for gain in self._default.values())
         self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
-        self._turns = np.where(np.isinf(limits.upper), math.tau, 0.0)
+        self._revolutions = np.where(np.isinf(limits.upper), math.tau, 0.0)
         self.feed_forward = True
-        self._share = 1.0
+        self._feed_forward_ratio = 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
         self._leftover = GainRamp(self.effort)
         self._catch_up = CatchUp(limits.velocity)
 
     def load_gains(self, stiffness: ArrayLike, damping: ArrayLike) -> None:
-        """Set other default gains, and ramp to them within RAMP.
+        """Set other default gains, and ramp to them within RAMP_DURATION.
 
         Raises:
             SizeMismatch: The gains are not one for each joint.
@@ -167,15 +162,17 @@ class ImpedanceController(LowerLevelController):
         loaded = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
         self._default = loaded
         for field, ramp in self._ramps.items():
-            ramp.begin(loaded[field], RAMP)
+            ramp.begin(loaded[field], RAMP_DURATION)
 
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
         """See `LowerLevelController.apply`; a commanded gain comes into force by a ramp."""
         super().apply(indices, given)
         if "position" in given:
             position = given["position"]
-            # joints without ends may be counted on another turn
-            self.position[indices] = position + whole_turns(self.position[indices] - position, self._turns[indices])
+            # joints without ends may be counted in another revolution
+            self.position[indices] = position + whole_revolutions(
+                self.position[indices] - position, self._revolutions[indices]
+            )
             self._catch_up.renew(indices)
         if "effort" in given:
             self.effort[indices] = given["effort"]
@@ -185,18 +182,18 @@ class ImpedanceController(LowerLevelController):
                 ramp.command(indices, given[field])
 
     def restore(self, field: str, joints: np.ndarray) -> None:
-        """Ramp a gain of joints, indices, back to the default within RAMP, or a feed-forward torque to zero."""
+        """Ramp a gain of joints, indices, back to the default within RAMP_DURATION, or a feed-forward torque to 0."""
         if field == "effort":
-            self._leftover.begin(np.zeros(len(joints)), RAMP, joints)
+            self._leftover.begin(np.zeros(len(joints)), RAMP_DURATION, joints)
         else:
-            self._ramps[field].begin(self._default[field][joints], RAMP, joints)
+            self._ramps[field].begin(self._default[field][joints], RAMP_DURATION, joints)
 
     def hold(self, position: np.ndarray, free: Mapping[str, np.ndarray]) -> list[str]:
         """See `LowerLevelController.hold`: default gains, and targets with which their springs pull as before.
 
         Feed-forward torques stay: with a spring of stiffness k they are the same as a target that is tau / k further,
         and an owner that carries the joint again begins with them. A spring whose target another owner commands returns
-        to the default within RAMP. A position on which default gains are at work is still approached.
+        to the default within RAMP_DURATION. A position on which default gains are at work is still approached.
         """
         super().hold(position, free)
         usual = self._default["stiffness"]
@@ -204,7 +201,8 @@ class ImpedanceController(LowerLevelController):
         kept = np.intersect1d(changed, free["position"])
         pull = self.stiffness[kept] * (self.target[kept] - position[kept])
         away = np.divide(pull, usual[kept], out=np.zeros_like(pull), where=usual[kept] > 0.0)
-        target = position[kept] + np.clip(away, -FURTHEST, FURTHEST)
+        furthest = 0.5  # distance of a target from its joint [rad, m]
+        target = position[kept] + np.clip(away, -furthest, furthest)
         np.clip(target, self.limits.lower[kept], self.limits.upper[kept], out=target)
         self.position[kept] = self.target[kept] = target
         self._catch_up.start(self.position, kept)
@@ -224,20 +222,23 @@ class ImpedanceController(LowerLevelController):
         if "position" not in given:
             return super().away(indices, given)
         steps = given["position"] - self.target[indices]
-        distances = np.abs(steps - whole_turns(steps, self._turns[indices]))
+        distances = np.abs(steps - whole_revolutions(steps, self._revolutions[indices]))
         furthest = int(np.argmax(distances))
         return self.joints[indices[furthest]], float(distances[furthest])
 
     def check_measured(self, indices: np.ndarray, measured: Mapping[str, float]) -> None:
         """See `LowerLevelController.check_measured`; a motor at its largest torque stretches a spring by tau / k."""
+        # A link hangs on its actuator's spring, 0.004 rad at CENTAURO's largest torques, and was measured 10 ms ago
+        # while it moves at 4 rad/s.
+        margin = 0.05  # [rad, m]
         for index in indices[self.stiffness[indices] > 0.0]:
             joint = self.joints[index]
             held = self.target[index]
             limits = self.limits
             away = measured.get(joint, held) - held
-            away -= float(whole_turns(away, self._turns[index]))
+            away -= float(whole_revolutions(away, self._revolutions[index]))
             stretch = (limits.effort[index] + abs(self.applied_effort[index])) / self.stiffness[index]
-            if abs(away) > STRETCH_MARGIN + stretch:
+            if abs(away) > margin + stretch:
                 raise Suspended(
                     f"joint '{joint}' is measured at {measured[joint]:.3f}, and controller '{self.name}' holds it at "
                     f"{held:.3f} by a spring that its motor stretches by {stretch:.3f} at most",
@@ -261,9 +262,10 @@ class ImpedanceController(LowerLevelController):
             ramp.advance(dt)
         self._leftover.advance(dt)
         goal = 1.0 if self.feed_forward else 0.0
-        if self._share != goal:
-            self._share += float(np.clip(goal - self._share, -dt / RAMP, dt / RAMP))
-        np.multiply(self.effort, self._share, out=self.applied_effort)
+        if self._feed_forward_ratio != goal:
+            largest = dt / RAMP_DURATION
+            self._feed_forward_ratio += float(np.clip(goal - self._feed_forward_ratio, -largest, largest))
+        np.multiply(self.effort, self._feed_forward_ratio, out=self.applied_effort)
         self._catch_up.advance(dt, self.position)
         change = self._change
         step = self.limits.velocity * dt

@@ -10,7 +10,7 @@ from solfer.lower_level.gains.defaults import DRIVE_PERIOD
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController, VelocityController
 from solfer.lower_level.laws.impedance import ImplicitImpedance
 from solfer.lower_level.laws.springs import Springs, springs_of
-from solfer.lower_level.laws.two_mass import HOLDING, TwoMassImpedance
+from solfer.lower_level.laws.two_mass import TwoMassImpedance
 from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
@@ -54,7 +54,7 @@ class Drives:
         swinging = held[springs.two_mass[held]] if springs else held[:0]
         self.torque_dofs, self.speed_dofs = np.concatenate((moved, swinging)), np.setdiff1d(held, swinging)
         self._law = _law(kinematics, self.torque_dofs, springs, posture=posture)
-        self._law.damping[swinging] = HOLDING
+        self._law.damping[swinging] = 1e7  # [Nms/rad], with which a motor holds its speed
         self.torque = self._law.torque
         self.speed = np.zeros(len(self.speed_dofs))
         self._copies = [
@@ -84,20 +84,20 @@ class Drives:
         self.torque[:] = 0.0
         self.speed[:] = 0.0
 
-    def update(self, q: np.ndarray, v: np.ndarray, dt: float, share: float) -> None:
+    def update(self, q: np.ndarray, v: np.ndarray, dt: float, factor: float) -> None:
         """Compute `torque` and `speed` for one step.
 
         Args:
             q: Position at the begin of the step, shape (model size,).
             v: Velocity at the begin of the step, shape (model size,).
             dt: Duration of the step [s].
-            share: Factor of springs and feed-forward torques, from 0 to 1.
+            factor: Factor of springs and feed-forward torques, from 0 to 1.
         """
         for target, source, dofs in self._copies:
             target[dofs] = source
-        if share != 1.0:
-            self._law.stiffness *= share
-            self._law.effort *= share
+        if factor != 1.0:
+            self._law.stiffness *= factor
+            self._law.effort *= factor
         np.take(self._law.velocity, self.speed_dofs, out=self.speed)
         self._law.update(q, v, dt)
 

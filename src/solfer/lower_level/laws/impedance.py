@@ -5,7 +5,9 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-REGULARISATION = 1e-9  # of the largest diagonal entry; keeps M positive definite where the base's chart is singular
+REGULARISATION = 1e-9
+"""Ratio of the largest diagonal entry of M that is added to all, so that M is positive definite where the base's chart
+is singular."""
 
 
 class Dynamics(Protocol):
@@ -61,7 +63,7 @@ class ImplicitImpedance:
 
         size = dynamics.size
         self._kernel = kernel
-        table = self._table = np.zeros((kernel.LAW_ROWS, size))
+        table = self._table = np.zeros((kernel.ROWS, size))
         table[kernel.UPPER] = effort_limit
         table[kernel.FASTEST] = velocity_limit
         self.position, self.velocity, self.effort = (

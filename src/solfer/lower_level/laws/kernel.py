@@ -9,11 +9,10 @@ POSITION, VELOCITY, EFFORT, STIFFNESS, DAMPING, TORQUE, UPPER, FASTEST, FORCE, L
 # only of the law with two masses
 MOTOR_POSITION, MOTOR_VELOCITY, DRIVE, SPRING, DAMPER, FRICTION, COUPLING, SLOW, COMPLIANCE = range(13, 22)
 TENSION, PULLED, TAKEN, LINKS, MOTORS, FREE, INERT = range(22, 29)
-LAW_ROWS = 29
+ROWS = 29
 """Numbers for each DoF: rows of the table of a law."""
 
 _TABLE = "float64[:, ::1]"
-_ANY_MATRIX = "float64[:, :]"
 _NUMBERS = "float64[::1]"
 _FLAGS = "boolean[::1]"
 
@@ -71,9 +70,9 @@ def _soften(table, elastic, dt):
     """Write the law's force, and what it loses for a unit of acceleration: dt D, with two masses dt (D + dt K)."""
     for k in range(table.shape[1]):
         spring = table[STIFFNESS, k] * dt if elastic[k] else 0.0
-        share = table[COMPLIANCE, k] * table[STIFFNESS, k] + 1.0
-        table[TAKEN, k] = (spring + table[DAMPING, k]) * dt / share
-        table[PULLED, k] = table[FORCE, k] / share
+        softening = table[COMPLIANCE, k] * table[STIFFNESS, k] + 1.0
+        table[TAKEN, k] = (spring + table[DAMPING, k]) * dt / softening
+        table[PULLED, k] = table[FORCE, k] / softening
 
 
 def _balance(table, elastic):
@@ -81,11 +80,11 @@ def _balance(table, elastic):
     for k in range(table.shape[1]):
         free = table[PULLED, k] - table[FRICTION, k] * table[MOTOR_VELOCITY, k] - table[TENSION, k]
         inert = table[SLOW, k] + table[TAKEN, k]
-        share = table[COUPLING, k] / (inert + table[COUPLING, k]) if elastic[k] else 1.0
+        ratio = table[COUPLING, k] / (inert + table[COUPLING, k]) if elastic[k] else 1.0
         table[FREE, k] = free
         table[INERT, k] = inert
-        table[FORCE, k] = share * free + table[TENSION, k]
-        table[LOSS, k] = share * inert
+        table[FORCE, k] = ratio * free + table[TENSION, k]
+        table[LOSS, k] = ratio * inert
 
 
 def _move(table, elastic, acceleration):
@@ -130,7 +129,7 @@ def _release(table, elastic, dt):
 
 
 pull = cached(f"void({_TABLE}, {_NUMBERS}, {_NUMBERS}, float64)", _pull)
-feel = cached(f"void({_TABLE}, {_ANY_MATRIX}, {_NUMBERS}, float64)", _feel, fastmath=REORDERED)
+feel = cached(f"void({_TABLE}, float64[:, :], {_NUMBERS}, float64)", _feel, fastmath=REORDERED)
 damp = cached(f"void({_TABLE}, {_NUMBERS})", _damp)
 limit = cached(f"void({_TABLE}, {_NUMBERS})", _limit)
 stretch = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS}, {_NUMBERS})", _stretch)

@@ -9,12 +9,6 @@ from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 
-RESOLVED = 0.6
-"""Largest (w dt)^2 of a joint with two masses: the damping of its free oscillation is then right within 5 %."""
-
-TOGETHER = 2.0
-"""Largest (w dt)^2 of the fastest oscillation of all such joints together; beyond 2.4 they may diverge."""
-
 
 @dataclass(frozen=True)
 class Springs:
@@ -81,7 +75,9 @@ def mobility_of(inertia: np.ndarray, rotor: np.ndarray, chosen: np.ndarray) -> n
 def resolved(inertia: np.ndarray, stiffness: np.ndarray, rotor: np.ndarray, dt: float) -> np.ndarray:
     """Find the springs whose free oscillations w a step resolves, (w dt)^2 = dt^2 K (1 / B + M^-1).
 
-    Alone each has to stay below RESOLVED, and all of them below TOGETHER; if not, the fastest is left out.
+    Alone (w dt)^2 of each is at most 0.6: the damping of its free oscillation is then right within 5 %. The fastest
+    oscillation of all of them together has at most 2.0, since beyond 2.4 they may diverge; if not, the fastest spring
+    is left out.
 
     Args:
         inertia: Inertia M of the links, shape (size, size).
@@ -96,8 +92,8 @@ def resolved(inertia: np.ndarray, stiffness: np.ndarray, rotor: np.ndarray, dt: 
     root = dt * np.sqrt(stiffness[chosen])
     modes = root[:, None] * mobility_of(inertia, rotor, chosen) * root
     alone = modes.diagonal()
-    kept = alone <= RESOLVED
-    while kept.any() and np.linalg.eigvalsh(modes[np.ix_(kept, kept)])[-1] > TOGETHER:
+    kept = alone <= 0.6
+    while kept.any() and np.linalg.eigvalsh(modes[np.ix_(kept, kept)])[-1] > 2.0:
         kept &= alone < alone[kept].max()
     chosen[chosen] = kept
     return chosen

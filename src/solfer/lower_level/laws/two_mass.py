@@ -5,12 +5,6 @@ import numpy as np
 from solfer.lower_level.laws.impedance import Dynamics, ImplicitImpedance
 from solfer.lower_level.laws.springs import Springs, mobility_of
 
-ACCURATE = 1.0 / 12.0
-"""Share beta of the springs' acceleration with which periods are right to the fourth order of the step."""
-
-HOLDING = 1e7
-"""Damping with which a motor holds its speed; beside it nothing counts [Nms/rad]."""
-
 
 class TwoMassImpedance(ImplicitImpedance):
     r"""Torques of springs between motors and joints; the impedance law acts on the motors.
@@ -117,7 +111,8 @@ class TwoMassImpedance(ImplicitImpedance):
         alone = mobility_of(inertia, self.springs.rotor, elastic).diagonal()
         damped = dt * damper * alone
         gamma = np.maximum(0.5, 1.0 - np.divide(1.0, damped, out=np.full(len(damped), np.inf), where=damped > 0.0))
-        return ACCURATE * dt**2 * spring + gamma * dt * damper
+        beta = 1.0 / 12.0  # periods are right to the fourth order of the step
+        return beta * dt**2 * spring + gamma * dt * damper
 
     def _solve(self, inertia: np.ndarray) -> bool:
         """Write accelerations and torques of the drives, for the law p - l alpha of force p and loss l.

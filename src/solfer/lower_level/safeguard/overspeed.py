@@ -4,9 +4,6 @@ import numpy as np
 
 from solfer.model.kinematics import Kinematics
 
-OVERSPEED_CALM_TIME = 0.1
-"""Time for which all joints have to be within their limits before the robot may be commanded again [s]."""
-
 
 class Overspeed:
     """Detects a joint that has moved beyond a multiple of its speed limit for too long.
@@ -89,8 +86,8 @@ class Overspeed:
         return True
 
     def _settle(self, dt: float, stay: bool) -> None:
-        """Clear `reason` when all joints have been within their limits for a while."""
+        """Clear `reason` when all joints have been within their limits for 0.1 s."""
         np.greater(self._speed, self._limit, out=self._beyond)
         self._calm = 0.0 if self._beyond.any() else self._calm + dt
-        if self._calm > OVERSPEED_CALM_TIME and not stay:
+        if self._calm > 0.1 and not stay:
             self.restart()

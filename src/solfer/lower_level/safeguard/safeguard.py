@@ -11,9 +11,6 @@ from solfer.model.kinematics import Kinematics
 
 logger = logging.getLogger(__name__)
 
-UPRIGHT = "a robot that stands upright: lift it, or put it into another state"
-SLOW_MOMENT = "a moment in which all joints are within their speed limits"
-
 
 class Safeguard:
     """Checks tilt and speeds in each step; while one of them is out of bounds, no command is accepted.
@@ -35,7 +32,9 @@ class Safeguard:
     @property
     def expected(self) -> str:
         """Description of the state that ends the hold, for errors."""
-        return UPRIGHT if self._tilt.reason else SLOW_MOMENT
+        if self._tilt.reason:
+            return "a robot that stands upright: lift it, or put it into another state"
+        return "a moment in which all joints are within their speed limits"
 
     def restart(self, q: np.ndarray) -> None:
         """Forget the past: the robot begins again at q, shape (model size,)."""

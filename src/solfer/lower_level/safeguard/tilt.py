@@ -6,9 +6,6 @@ import numpy as np
 
 from solfer.model.kinematics import Kinematics
 
-RIGHTED = 0.8
-"""Share of the largest tilt below which a robot that has fallen stands upright again."""
-
 
 class Tilt:
     """Detects a base that has been tilted too far for too long.
@@ -33,7 +30,7 @@ class Tilt:
         self._enabled = kinematics.base is not None and largest > 0.0
         self._vertical = kinematics.base.rotation[2].tolist() if self._enabled else []
         self._fallen = math.cos(largest)
-        self._righted = math.cos(RIGHTED * largest)
+        self._righted = math.cos(0.8 * largest)  # below this tilt a robot that has fallen stands upright again
 
     @property
     def changes(self) -> bool:

@@ -7,9 +7,6 @@ from solfer.lower_level.lower_level import LowerLevel
 
 logger = logging.getLogger(__name__)
 
-MISSED_CYCLES = 20
-"""Heartbeats that a process may miss in a row."""
-
 
 class HeartbeatSource(Protocol):
     """A process with a heartbeat in each of its cycles.
@@ -33,12 +30,15 @@ class HeartbeatMonitor:
     Args:
         lower_level: The lower level that the process commands.
         process: The process.
-        cycles: Heartbeats that the process may miss, counted in the time of the lower level.
+        cycles: Heartbeats that the process may miss in a row, counted in the time of the lower level.
 
     Attributes:
         lost: Whether the heartbeat is missing at present.
         losses: How often it went missing.
     """
+
+    MISSED_CYCLES = 20
+    """Default of `cycles`."""
 
     def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = MISSED_CYCLES):
         self._lower_level = lower_level

@@ -19,9 +19,6 @@ from solfer.transport.lower_level import ALL_OWNERS, LOWER_LEVEL, REFUSALS_TOPIC
 from solfer.transport.messages import JOINT_FIELDS, REFUSALS, RefusalMessage
 from solfer.transport.middleware import Middleware
 
-REFUSALS_PERIOD = 0.02
-"""Shortest time between two messages of refused commands [s]."""
-
 
 class LowerLevelServer:
     """Receives the commands of the topics `<controller>/command`, and binds the services of a lower level.
@@ -110,7 +107,7 @@ class LowerLevelServer:
             self._writer.write(
                 RefusalMessage((ALL_OWNERS,), (True,), ("the robot was put into another state",), stamp=now)
             )
-        if now - self._published < REFUSALS_PERIOD:
+        if now - self._published < 0.02:  # [s]
             return
         news = self._lower_level.refusals.news()
         if not news:
@@ -127,22 +124,27 @@ class LowerLevelServer:
 
 
 LENGTH_BYTES = 4
-NUMBER_BYTES = 8  # bytes of a length and of a number in a message
-HEADER_BYTES = 1024  # bytes for everything but joints, such as the name of a frame
-NAMES_BYTES = 4096  # bytes for the names of an owner, of controllers, or of a file
-AMPLE = 2  # names of the hardware may be longer than those of the model
+"""Bytes of a length in a message."""
+
+NUMBER_BYTES = 8
+"""Bytes of a number in a message."""
+
+AMPLE = 2
+"""Factor for room to spare: names of the hardware may be longer than those of the model."""
 
 
 def largest_command(controller: LowerLevelController) -> int:
     """Compute the bytes of a command for all joints of a controller, with room to spare."""
     fields = len(JOINT_FIELDS) * (LENGTH_BYTES + NUMBER_BYTES * len(controller.joints))
-    return AMPLE * (_bytes(controller.joints) + fields) + HEADER_BYTES
+    header = 1024  # bytes of everything but joints, such as the name of a frame
+    return AMPLE * (_bytes(controller.joints) + fields) + header
 
 
 def largest_request(lower_level: LowerLevel) -> int:
     """Compute the bytes of a request that names all joints, with room to spare."""
     joints = [controller.joints for controller in lower_level.controllers.values()]
-    return AMPLE * sum(_bytes(names) + NUMBER_BYTES * len(names) for names in joints) + NAMES_BYTES
+    others = 4096  # bytes of the names of an owner, of controllers, or of a file
+    return AMPLE * sum(_bytes(names) + NUMBER_BYTES * len(names) for names in joints) + others
 
 
 def _bytes(names: Iterable[str]) -> int:

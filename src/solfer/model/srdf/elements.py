@@ -8,20 +8,6 @@ from xml.etree.ElementTree import Element
 from solfer.errors import ModelError, SolferError, UnknownName
 from solfer.model.urdf.description import Description
 
-ELEMENTS = (
-    "group",
-    "group_state",
-    "end_effector",
-    "virtual_joint",
-    "passive_joint",
-    "joint_property",
-    "disable_collisions",
-    "enable_collisions",
-    "disable_default_collisions",
-    "link_sphere_approximation",
-)
-"""Elements of a robot in the grammar of SRDF."""
-
 Models = Sequence[Description]
 """The robot itself, then other models of it: names that only these have are left out."""
 
@@ -117,9 +103,21 @@ def _pairs(robot: Element, tag: str, links: set[str]) -> set[frozenset[str]]:
 
 def note_unknown_elements(robot: Element, where: str, findings: Findings) -> None:
     """Note elements of a robot that no SRDF has."""
+    known = (
+        "group",
+        "group_state",
+        "end_effector",
+        "virtual_joint",
+        "passive_joint",
+        "joint_property",
+        "disable_collisions",
+        "enable_collisions",
+        "disable_default_collisions",
+        "link_sphere_approximation",
+    )
     for element in robot:
-        if element.tag not in ELEMENTS:
-            findings.unknown("element", element.tag, ELEMENTS, f"{where}: robot")
+        if element.tag not in known:
+            findings.unknown("element", element.tag, known, f"{where}: robot")
 
 
 def _read_value(joint: Element, models: Models, values: dict[str, float], place: str, findings: Findings) -> None:

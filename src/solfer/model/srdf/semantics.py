@@ -17,8 +17,6 @@ from solfer.model.srdf.elements import (
 from solfer.model.urdf.description import Description
 
 __all__ = ["Group", "Semantics"]
-LEFT_OUT_SHOWN_COUNT = 8
-"""Number of things that were left out which a warning lists."""
 
 logger = logging.getLogger(__name__)
 
@@ -98,8 +96,9 @@ def _warn(left_out: Sequence[SolferError], where: str) -> None:
     """Log what was left out, in one message."""
     if not left_out:
         return
-    items = [f"{fault.where.removeprefix(where + ': ')}: {_short(fault)}" for fault in left_out[:LEFT_OUT_SHOWN_COUNT]]
-    more = f"; and {len(left_out) - LEFT_OUT_SHOWN_COUNT} more" if len(left_out) > LEFT_OUT_SHOWN_COUNT else ""
+    listed = 8
+    items = [f"{fault.where.removeprefix(where + ': ')}: {_short(fault)}" for fault in left_out[:listed]]
+    more = f"; and {len(left_out) - listed} more" if len(left_out) > listed else ""
     logger.warning("%s: left out: %s%s", where, "; ".join(items), more)
 
 

@@ -7,8 +7,6 @@ from solfer.errors import ModelError
 from solfer.model.documents import parse
 from solfer.model.urdf.description import Description
 
-PARTS = ("upper", "lower")
-
 
 def cut(description: Description, link: str, keep: str) -> str:
     """Write the URDF of one part of a robot that is cut at the joint that carries `link`.
@@ -27,8 +25,8 @@ def cut(description: Description, link: str, keep: str) -> str:
         UnknownName: There is no such link.
         ModelError: The link is the root of the robot, or `keep` is neither "upper" nor "lower".
     """
-    if keep not in PARTS:
-        raise ModelError(f"no part is called '{keep}'", expected=" or ".join(PARTS))
+    if keep not in ("upper", "lower"):
+        raise ModelError(f"no part is called '{keep}'", expected="upper or lower")
     joint = description.link(link).parent
     if joint is None:
         raise ModelError(

@@ -9,8 +9,10 @@ from solfer.errors import ModelError, SolferError, UnknownName
 from solfer.model.documents import PlacedElement
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
+"""Types of joints of one DoF."""
+
 JOINT_TYPES = (*MOVING_TYPES, "fixed", "floating")
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""Types of joints that are supported."""
 
 Numbers = tuple[float, ...]
 logger = logging.getLogger(__name__)
@@ -210,7 +212,7 @@ def read_link(reader: ElementReader) -> LinkInfo:
         element.get("name"),
         mass,
         inside.numbers(origin, "xyz", (0.0,) * 3),
-        inertia=tuple(inside.numbers(tensor, entry, None)[0] for entry in _INERTIA),
+        inertia=tuple(inside.numbers(tensor, entry, None)[0] for entry in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
         inertia_rpy=inside.numbers(origin, "rpy", (0.0,) * 3),
         visuals=visuals,
         collisions=collisions,

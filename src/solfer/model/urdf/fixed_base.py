@@ -4,21 +4,22 @@ import logging
 
 from solfer.model.urdf.description import Description
 
-WORLD = "world"
-"""Name of the link that stands for the ground by convention: what is fixed to it is fixed on purpose."""
-
 logger = logging.getLogger(__name__)
 
 
 def warn_of_fixed_base(description: Description, floating_base: bool | None) -> None:
-    """Log that the base is held, unless `floating_base` decides it, or a floating joint or the link `world` does."""
-    if floating_base is None and description.floating is None and description.root != WORLD and _has_mass(description):
+    """Log that the base is held, unless `floating_base` decides it, or a floating joint or the link `world` does.
+
+    By convention that link is the ground: what is fixed to it is fixed on purpose.
+    """
+    ground = "world"
+    if floating_base is None and description.floating is None and description.root != ground and _has_mass(description):
         logger.warning(
             "%s: the base, link '%s', is fixed: the URDF has neither a floating joint nor a link '%s'; "
             "`floating_base: true` lets it float, `floating_base: false` says that it is meant so",
             description.where,
             description.root,
-            WORLD,
+            ground,
         )
 
 

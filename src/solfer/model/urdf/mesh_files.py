@@ -9,9 +9,7 @@ from solfer.config.yaml.files import is_file, located
 from solfer.errors import MissingDependency, ModelError, UnknownName
 
 PACKAGE_SCHEME = "package://"
-
-_XML_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
-_METER = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']([^\"']*)[\"']")
+"""Beginning of what lies in a ROS package."""
 
 
 def find_mesh(urdf: str | Path, name: str) -> Path | None:
@@ -35,7 +33,8 @@ def unit_of(path: Path) -> float:
     """
     if path.suffix.lower() != ".dae":
         return 1.0
-    found = _METER.search(_XML_COMMENT.sub(b"", path.read_bytes().partition(b"</asset>")[0]))
+    head = re.sub(rb"<!--.*?-->", b"", path.read_bytes().partition(b"</asset>")[0], flags=re.DOTALL)
+    found = re.search(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']([^\"']*)[\"']", head)
     if found is None:
         return 1.0
     text = found[1].decode(errors="replace")

@@ -10,9 +10,6 @@ from solfer.model.urdf.description import Description
 BASE_DOFS = ("x", "y", "z", "rx", "ry", "rz")
 """Names of the six DoFs of a floating base, in their order."""
 
-_JOINT_AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
-_UNLIMITED = "1e12"
-
 
 def scalar_joints(description: Description, floating_base: bool | None = None) -> str:
     """Write the URDF with one number a DoF, without shapes.
@@ -34,7 +31,7 @@ def scalar_joints(description: Description, floating_base: bool | None = None) -
             link.remove(shape)
     for joint in robot.findall("joint"):
         for mimic in joint.findall("mimic"):
-            joint.remove(mimic)  # the followers' share is folded into that of the leader
+            joint.remove(mimic)  # what the followers move is folded into what the leader does
         if joint.get("type") == "continuous":
             _make_revolute(joint)
     floating = description.floating
@@ -60,6 +57,7 @@ def _add_base(robot: Element, description: Description, parent: str, child: str,
             where=description.where,
             expected=f"other names than {', '.join(BASE_DOFS)}",
         )
+    axes = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
     for name in BASE_DOFS:
         joint = SubElement(robot, "joint", name=name, type="revolute" if name.startswith("r") else "prismatic")
         SubElement(joint, "parent", link=parent)
@@ -69,7 +67,7 @@ def _add_base(robot: Element, description: Description, parent: str, child: str,
             parent = _free_name(f"base_{name}", description)
             SubElement(robot, "link", name=parent)
         SubElement(joint, "child", link=parent)
-        SubElement(joint, "axis", xyz=_JOINT_AXES[name[-1]])
+        SubElement(joint, "axis", xyz=axes[name[-1]])
         _set_unlimited(joint)
         if origin is not None:
             joint.append(origin)
@@ -85,7 +83,7 @@ def _make_revolute(joint: Element) -> None:
 
 def _set_unlimited(joint: Element) -> None:
     """Add wide limits that the parser requires; the true limits are the Description's."""
-    SubElement(joint, "limit", lower=f"-{_UNLIMITED}", upper=_UNLIMITED, velocity=_UNLIMITED, effort=_UNLIMITED)
+    SubElement(joint, "limit", lower="-1e12", upper="1e12", velocity="1e12", effort="1e12")
 
 
 def _free_name(name: str, description: Description) -> str:

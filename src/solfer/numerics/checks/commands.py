@@ -2,22 +2,11 @@
 
 from solfer.numerics.compilation import cached
 
-LARGEST_DISTANCE = 1.0
-"""Distance from its command at which a joint does not follow it [rad, m]: wheels that steer on the ground were half a
-radian behind where a busy loop left cycles out."""
-
-LONGEST_TIME = 0.5
-"""For how long it may be so far away [s]."""
-
-LARGEST_LAG = 0.5
-"""How far a joint may lag behind its commanded velocity before it does not follow [rad, m]."""
-
-FOLLOWING_RATIO = 0.2
-"""Ratio of the commanded velocity at which it does not lag."""
-
 
 def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
-    """Return the first joint that has been far from its command for long; -1: there is none.
+    """Return the first joint that has been 1 rad or m from its command for 0.5 s; -1: there is none.
+
+    Wheels that steer on the ground were half a radian behind where a busy loop left cycles out.
 
     Args:
         desired: Commanded positions.
@@ -29,9 +18,9 @@ def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
         passed: Time since the cycle before [s].
     """
     for k in places:
-        is_away = abs(desired[k] - measured[dofs[k]]) > LARGEST_DISTANCE and stiffness[k] > 0.0
+        is_away = abs(desired[k] - measured[dofs[k]]) > 1.0 and stiffness[k] > 0.0
         record[0, k] = record[0, k] + passed if is_away else 0.0
-        if record[0, k] > LONGEST_TIME:
+        if record[0, k] > 0.5:
             return k
     return -1
 
@@ -39,8 +28,8 @@ def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
 def _find_stuck(desired, measured, dofs, places, record, passed):
     """Return the first joint that does not turn as it is commanded; -1: there is none.
 
-    A joint lags by all of its command where it turns below `FOLLOWING_RATIO` of it, and catches up where it turns
-    faster: a cumulative sum, so that nothing counts that a joint did before it was jammed.
+    A joint lags by all of its command where it turns below 0.2 times it, and catches up where it turns faster, until it
+    is stuck at 0.5 rad or m: a cumulative sum, so that nothing counts that a joint did before it was jammed.
 
     Args:
         desired: Commanded velocities.
@@ -50,14 +39,15 @@ def _find_stuck(desired, measured, dofs, places, record, passed):
         record: Lag of each joint, and its way in the direction of its commands while it lagged.
         passed: Time since the cycle before [s].
     """
+    ratio = 0.2
     for k in places:
         speed = abs(desired[k])
         velocity = measured[dofs[k]] if desired[k] >= 0.0 else -measured[dofs[k]]
-        is_slow = velocity < FOLLOWING_RATIO * speed
-        lag = record[0, k] + passed * (speed if is_slow else -velocity / FOLLOWING_RATIO)
+        is_slow = velocity < ratio * speed
+        lag = record[0, k] + passed * (speed if is_slow else -velocity / ratio)
         record[0, k] = max(lag, 0.0)
         record[1, k] = record[1, k] + passed * velocity if lag > 0.0 else 0.0
-        if lag > LARGEST_LAG:
+        if lag > 0.5:
             return k
     return -1
 

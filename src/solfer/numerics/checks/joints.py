@@ -5,12 +5,6 @@ import math
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.kernels import wrapped
 
-PLACE_MARGIN = 0.1
-"""Margin of the place of a joint [rad, m]."""
-
-SPEED_MARGIN = 5.0
-"""Margin of its speed [rad/s, m/s]."""
-
 LONGEST_INTERVAL = 1.0
 """Longest time between two stamps that counts [s]: another clock may be anywhere."""
 
@@ -20,35 +14,9 @@ WINDOW = 1.0
 GAP = 0.1
 """Longest time between messages that are summed [s]."""
 
-KNOWN_INTERVAL = 0.025
-"""Time between two messages from which on the velocities at both do not show the way between them [s]."""
-
-STRAY_DISTANCE = 0.08
-"""Way of a joint that contradicts its velocities [rad, m]."""
-
-STRAY_RATIO = 0.2
-"""The same, as a ratio of its way by the velocities: they may be filtered."""
-
 STEP = 0.02
 """Way between two messages that contradicts the velocities [rad, m]: encoders have steps of a few mrad, and velocities
 that are filtered for 20 ms lag behind accelerations of 100 rad/s2."""
-
-STAMP_ERROR = 0.005
-"""Time by which stamps may be wrong [s]."""
-
-HIDDEN_ACCELERATION = 400.0
-"""Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a link which swings at 30 Hz and
-8 rad/s."""
-
-RETURN_DISTANCE = 0.02
-"""Distance from where a joint was accepted last at which it is right again [rad, m]: less than a contradiction. A joint
-without ends may be anywhere."""
-
-RETURN_TIME = 0.5
-"""Time for which it has to move by its velocities until then [s]."""
-
-SHAKING_TIME = 0.5
-"""Time after the robot has struck something for which velocities do not show the ways of joints [s]."""
 
 # rows of what is remembered of each joint
 PLACE = 0
@@ -91,6 +59,7 @@ AGREED = 12
 """Sum of the differences since then."""
 
 ROWS = 13
+"""Number of rows."""
 
 
 @part
@@ -108,29 +77,29 @@ def _is_struck(velocity, part, before, stamp):
 
 @part
 def _is_right_again(before, k, step, allowed, stamp, is_near):
-    """Whether a joint that contradicted its velocities has moved by them for long, and was near its place meanwhile."""
+    """Whether a joint that contradicted its velocities has moved by them for 0.5 s, near its place."""
     before[AGREED, k] += step
     if not is_near or abs(step) > allowed or abs(before[AGREED, k]) > STEP:
         before[AGREES_SINCE, k] = stamp
         before[AGREED, k] = 0.0
-    return stamp - before[AGREES_SINCE, k] > RETURN_TIME
+    return stamp - before[AGREES_SINCE, k] > 0.5
 
 
 @part
-def _forgive(before, k):
+def _reset_stray(before, k):
     """Forget how far a joint has strayed."""
     before[STRAYED, k] = before[ALLOWED, k] = before[LIMIT, k] = 0.0
 
 
-def _find_leap(position, velocity, part, before, fastest, turns, endless, arrival, stamp):
+def _find_leap(position, velocity, part, before, fastest, revolutions, endless, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
     joint may have moved faster or slower than both by as much.
 
     With the position q, the velocity v and the time T between two messages, a step strays by
-    q - q' - T (v + v') / 2. The sum of such steps, S <- S / (1 + T / WINDOW) + s, may be STRAY_DISTANCE and the sum of
-    T (STRAY_RATIO max(|v|, |v'|) + |v - v'|).
+    q - q' - T (v + v') / 2. The sum of such steps, S <- S / (1 + T / WINDOW) + s, may be 0.08 rad or m and the sum of
+    T (0.2 max(|v|, |v'|) + |v - v'|): velocities may be filtered.
 
     Args:
         position: Measured positions.
@@ -138,7 +107,7 @@ def _find_leap(position, velocity, part, before, fastest, turns, endless, arriva
         part: Indices of the joints that were measured.
         before: What is remembered of each joint, shape (ROWS, n).
         fastest: Largest speed of each joint; infinity: none is known.
-        turns: What positions may jump by; 0: nothing.
+        revolutions: What positions may jump by; 0: nothing.
         endless: Whether each joint has no ends.
         arrival: Arrival of the measurement.
         stamp: Its stamp.
@@ -147,44 +116,49 @@ def _find_leap(position, velocity, part, before, fastest, turns, endless, arriva
         Index of the joint; plus the number of joints where it is too fast, plus twice that where it does not move by
         its velocities. -1: there is none.
     """
+    stray_distance = 0.08  # [rad, m]
+    stamp_error = 0.005  # [s]
+    shaking_time = 0.5  # [s] after the robot has struck something, for which velocities do not show the ways
     wrong = -1
     if len(velocity) and _is_struck(velocity, part, before, stamp):
         for k in part:
-            before[SHAKEN_UNTIL, k] = stamp + SHAKING_TIME
+            before[SHAKEN_UNTIL, k] = stamp + shaking_time
     for k in part:
-        away = wrapped(position[k] - before[PLACE, k], turns[k])
+        away = wrapped(position[k] - before[PLACE, k], revolutions[k])
         elapsed = max(arrival - before[ARRIVAL, k], min(stamp - before[STAMP, k], LONGEST_INTERVAL))
-        if wrong < 0 and abs(away) > PLACE_MARGIN + 2.0 * fastest[k] * elapsed:
+        if wrong < 0 and abs(away) > 0.1 + 2.0 * fastest[k] * elapsed:
             wrong = k
         if len(velocity) and fastest[k] < math.inf:
             fast = velocity[k]
             slow = before[LAST_VELOCITY, k]
             passed = stamp - before[LAST_STAMP, k]
-            if wrong < 0 and abs(fast) > SPEED_MARGIN + 3.0 * fastest[k]:
+            if wrong < 0 and abs(fast) > 5.0 + 3.0 * fastest[k]:
                 wrong = k + len(position)
             is_frozen = fast == slow and fast != 0.0 and position[k] == before[LAST_POSITION, k]
-            step = wrapped(position[k] - before[LAST_POSITION, k], turns[k]) - 0.5 * passed * (fast + slow)
-            is_shaken = before[SHAKEN_UNTIL, k] - SHAKING_TIME <= stamp < before[SHAKEN_UNTIL, k]
+            step = wrapped(position[k] - before[LAST_POSITION, k], revolutions[k]) - 0.5 * passed * (fast + slow)
+            is_shaken = before[SHAKEN_UNTIL, k] - shaking_time <= stamp < before[SHAKEN_UNTIL, k]
             was_frozen = before[FROZEN_TIME, k] > GAP and not is_frozen
             if is_shaken or passed >= GAP or passed < -LONGEST_INTERVAL or was_frozen:
-                _forgive(before, k)
+                _reset_stray(before, k)
             elif passed > 0.0 and before[LIMIT, k] > 0.0:  # all counts until they agree, and nothing excuses it
                 before[STRAYED, k] += step
-                allowed = STEP + STAMP_ERROR * max(abs(fast), abs(slow))
-                is_near = endless[k] or abs(away) < RETURN_DISTANCE
+                allowed = STEP + stamp_error * max(abs(fast), abs(slow))
+                is_near = endless[k] or abs(away) < 0.02  # less than a contradiction
                 if abs(before[STRAYED, k]) <= before[LIMIT, k]:
                     before[LIMIT, k] = 0.0
                 elif _is_right_again(before, k, step, allowed, stamp, is_near):
-                    _forgive(before, k)
-            elif 0.0 < passed < KNOWN_INTERVAL and (fast != 0.0 or slow != 0.0 or before[ALLOWED, k] > 0.0):
+                    _reset_stray(before, k)
+            # velocities at two messages that are further apart do not show the way between them
+            elif 0.0 < passed < 0.025 and (fast != 0.0 or slow != 0.0 or before[ALLOWED, k] > 0.0):
                 keep = WINDOW / (WINDOW + passed)
                 speed = max(abs(fast), abs(slow))
-                allowed = passed * (STRAY_RATIO * speed + abs(fast - slow))
+                allowed = passed * (0.2 * speed + abs(fast - slow))
                 before[STRAYED, k] = keep * before[STRAYED, k] + step
                 before[ALLOWED, k] = keep * before[ALLOWED, k] + allowed
-                if abs(before[STRAYED, k]) > STRAY_DISTANCE + before[ALLOWED, k]:
-                    before[LIMIT, k] = STRAY_DISTANCE + before[ALLOWED, k]
-                allowed += STEP + STAMP_ERROR * speed + HIDDEN_ACCELERATION * passed * passed
+                if abs(before[STRAYED, k]) > stray_distance + before[ALLOWED, k]:
+                    before[LIMIT, k] = stray_distance + before[ALLOWED, k]
+                # velocities do not show a quarter of the acceleration of a link that swings at 30 Hz and 8 rad/s
+                allowed += STEP + stamp_error * speed + 400.0 * passed * passed
                 if abs(step) > allowed:
                     before[STRAYED, k] = step
                     before[LIMIT, k] = allowed

@@ -8,49 +8,11 @@ from solfer.numerics.compilation import cached, part
 TILT_MARGIN = 0.1
 """Margin of a link's tilt [rad]."""
 
-TILT_SPEED = 6.0
-"""How fast a link can tilt [rad/s]."""
-
-TILT_TIME = 0.1
-"""Longest time for which that counts [s]."""
-
-JUMP = 0.05
-"""Turn between two messages, beside that by FASTEST_TURN, beyond which an orientation was corrected [rad]."""
-
-FASTEST_TURN = 10.0
-"""Turn rate beyond which an orientation has to turn as fast: else it is a spike [rad/s]."""
-
-SPIKE_RATIO = 0.5
-"""Ratio of the turn by such a rate by which the orientation turns otherwise."""
-
-TURN_DIFFERENCE = 0.08
-"""Difference of two turns that contradict each other [rad]."""
-
-TURN_RATIO = 0.3
-"""The same, as a ratio of both."""
-
-LARGEST_SKEW = 0.1
-"""Angle between the vertical and a mean specific force that contradict each other [rad]."""
-
 FORCE_WINDOW = 1.5
-"""Time constant of that mean [s], in which a velocity may change by 1.5 m/s."""
-
-WITNESS_TIME = 0.5
-"""Time for which the specific force has to agree with a tilt that leapt [s]."""
+"""Time constant of the mean specific force [s], in which a velocity may change by 1.5 m/s."""
 
 GRAVITY = 9.81
 """Specific force at rest [m/s^2]."""
-
-FORCE_MARGIN = 1.0
-"""How far a specific force may be from that [m/s^2]: beyond it is not gravity that is measured, as in a fall."""
-
-STEADY_RATE = 0.5
-"""How fast its sensor may turn, likewise [rad/s]."""
-
-WEAKEST_FORCE = 6.8
-STRONGEST_FORCE = 15.8
-"""Sizes of the mean specific force beyond which it is in other units, or without gravity [m/s^2]: a push that topples a
-robot within a second makes it 13."""
 
 # what is remembered
 NEWEST = 0
@@ -62,17 +24,17 @@ ARRIVAL = 4
 STAMP = 5
 """Its stamp."""
 
-TURNED = 6
-"""Sum of turns by the orientation, 3 numbers."""
+ROTATION = 6
+"""Sum of rotations by the orientation, 3 numbers."""
 
 RATES = 9
-"""Sum of turns by the rates, 3 numbers."""
+"""Sum of rotations by the rates, 3 numbers."""
 
 FORCE = 12
 """Sum of the specific force in the world's axes, 3 numbers."""
 
 IS_APART = 15
-"""Whether the turns contradicted each other."""
+"""Whether the rotations contradicted each other."""
 
 FROZEN_TIME = 16
 """For how long the orientation was frozen."""
@@ -90,6 +52,7 @@ FORCE_SIZE = 23
 """Mean size of the specific force."""
 
 NUMBERS = 24
+"""How many numbers these are."""
 
 
 @part
@@ -116,8 +79,8 @@ def _find_tilt_leap(x, y, z, w, arrival, stamp, before):
         return
     elapsed = max(arrival - before[ARRIVAL], min(stamp - before[STAMP], LONGEST_INTERVAL))
     tilt = _tilt_between(x, y, z, w, before, NEWEST)
-    if tilt > TILT_MARGIN + TILT_SPEED * min(elapsed, TILT_TIME):
-        before[TURNED:FROZEN_TIME] = 0.0
+    if tilt > TILT_MARGIN + 6.0 * min(elapsed, 0.1):  # [rad/s], [s]: how fast a link can tilt, and for how long
+        before[ROTATION:FROZEN_TIME] = 0.0
         before[LEAPT] = max(before[LEAPT], _tilt_between(x, y, z, w, before, ACCEPTED))
         before[WITNESSED] = 0.0
 
@@ -129,7 +92,7 @@ def _add_force(x, y, z, w, force, passed, before):
     fy = force[1]
     fz = force[2]
     size = math.sqrt(fx * fx + fy * fy + fz * fz)
-    if abs(size - GRAVITY) < FORCE_MARGIN:
+    if abs(size - GRAVITY) < 1.0:  # beyond it is not gravity that is measured, as in a fall
         # R f = f + 2 w (a x f) + 2 a x (a x f), where a is the axis of the quaternion
         px = y * fz - z * fy
         py = z * fx - x * fz
@@ -147,20 +110,22 @@ def _add_force(x, y, z, w, force, passed, before):
 @part
 def _find_skew(x, y, z, w, before):
     """Return a leap of the tilt, or an angle between the vertical and the specific force, that is too large."""
+    largest = 0.1  # angle between the vertical and the mean specific force [rad]
     askew = math.atan2(math.sqrt(before[FORCE] ** 2 + before[FORCE + 1] ** 2), before[FORCE + 2])
     if before[LEAPT] > 0.0:
-        is_witnessed = before[WITNESSED] > WITNESS_TIME and askew < LARGEST_SKEW
+        is_witnessed = before[WITNESSED] > 0.5 and askew < largest
         if not is_witnessed and _tilt_between(x, y, z, w, before, ACCEPTED) > TILT_MARGIN:
             return 1, before[LEAPT]
         before[LEAPT] = 0.0
         before[FORCE + 2] += FORCE_WINDOW * GRAVITY
         return 0, 0.0
-    return (3, askew) if askew > LARGEST_SKEW else (0, 0.0)
+    return (3, askew) if askew > largest else (0, 0.0)
 
 
 @part
-def _compare_turns(values, u, v, s, c, own_axes, passed, rate, before):
-    """Compare the turn since the quaternion before, in the axes of the link or of the world, with the rates."""
+def _compare_rotations(values, u, v, s, c, own_axes, passed, rate, before):
+    """Compare the rotation since the quaternion before, in the axes of the link or of the world, with the rates."""
+    fastest = 10.0  # rate beyond which the orientation has to rotate as fast: else it is a spike [rad/s]
     x = values[0]
     y = values[1]
     z = values[2]
@@ -173,26 +138,26 @@ def _compare_turns(values, u, v, s, c, own_axes, passed, rate, before):
     dx = tx - passed * values[10]
     dy = ty - passed * values[11]
     dz = tz - passed * values[12]
-    if rate > FASTEST_TURN and math.sqrt(dx * dx + dy * dy + dz * dz) > SPIKE_RATIO * passed * rate:
+    if rate > fastest and math.sqrt(dx * dx + dy * dy + dz * dz) > 0.5 * passed * rate:
         return 4, rate
-    if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMP + FASTEST_TURN * passed:
+    if math.sqrt(tx * tx + ty * ty + tz * tz) > 0.05 + fastest * passed:  # the orientation was corrected
         return 0, 0.0
     keep = 1.0 if before[IS_APART] else WINDOW / (WINDOW + passed)  # what contradicted stays until it agrees again
-    turned = rates = apart = 0.0
-    for axis, turn in enumerate((tx, ty, tz)):
-        before[TURNED + axis] = keep * before[TURNED + axis] + turn
+    rotated = rates = apart = 0.0
+    for axis, angle in enumerate((tx, ty, tz)):
+        before[ROTATION + axis] = keep * before[ROTATION + axis] + angle
         before[RATES + axis] = keep * before[RATES + axis] + passed * values[10 + axis]
-        turned += before[TURNED + axis] ** 2
+        rotated += before[ROTATION + axis] ** 2
         rates += before[RATES + axis] ** 2
-        apart += (before[TURNED + axis] - before[RATES + axis]) ** 2
-    contradicts = math.sqrt(apart) > TURN_DIFFERENCE + TURN_RATIO * (math.sqrt(turned) + math.sqrt(rates))
+        apart += (before[ROTATION + axis] - before[RATES + axis]) ** 2
+    contradicts = math.sqrt(apart) > 0.08 + 0.3 * (math.sqrt(rotated) + math.sqrt(rates))
     before[IS_APART] = 1.0 if contradicts else 0.0
-    return (2, math.sqrt(turned)) if contradicts else (0, 0.0)
+    return (2, math.sqrt(rotated)) if contradicts else (0, 0.0)
 
 
 @part
 def _find_fault(values, own_axes, force, arrival, stamp, before):
-    """Check an orientation as `_check_turn` does; remember it, whether it counts or not."""
+    """Check an orientation as `_check_rotation` does; remember it, whether it counts or not."""
     x = values[0]
     y = values[1]
     z = values[2]
@@ -212,24 +177,26 @@ def _find_fault(values, own_axes, force, arrival, stamp, before):
     before[STAMP] = stamp
     is_frozen = x == u and y == v and z == s and w == c
     if passed >= GAP or passed < -LONGEST_INTERVAL or (before[FROZEN_TIME] > GAP and not is_frozen):
-        before[TURNED:FORCE] = 0.0
+        before[ROTATION:FORCE] = 0.0
         before[IS_APART] = 0.0
     before[FROZEN_TIME] = before[FROZEN_TIME] + passed if is_frozen else 0.0
     is_next = not is_first and 0.0 < passed < GAP
     rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
-    if is_next and rate < STEADY_RATE:
+    if is_next and rate < 0.5:  # [rad/s]: a sensor that rotates faster does not measure gravity alone
         _add_force(x, y, z, w, force, passed, before)
     fault, size = _find_skew(x, y, z, w, before)
     if fault or not is_next or rate == 0.0:  # many senders leave rates zero
         return fault, size
-    fault, size = _compare_turns(values, u, v, s, c, own_axes, passed, rate, before)
-    if fault == 0 and not WEAKEST_FORCE < before[FORCE_SIZE] < STRONGEST_FORCE:
+    fault, size = _compare_rotations(values, u, v, s, c, own_axes, passed, rate, before)
+    # Beyond these bounds [m/s^2] it is in other units, or without gravity: a push that topples a robot within a second
+    # makes it 13.
+    if fault == 0 and not 6.8 < before[FORCE_SIZE] < 15.8:
         return 5, before[FORCE_SIZE]
     return fault, size
 
 
-def _check_turn(values, own_axes, force, arrival, stamp, before):
-    """Check whether a link can have turned like this since the measurement before.
+def _check_rotation(values, own_axes, force, arrival, stamp, before):
+    """Check whether a link can have rotated like this since the measurement before.
 
     Args:
         values: Quaternion (x, y, z, w), position, linear and angular velocity.
@@ -240,9 +207,9 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
         before: What is remembered, shape (NUMBERS,).
 
     Returns:
-        1 and an angle: the tilt has leapt by it. 2: it turns by this angle, and otherwise by its rates. 3: the specific
-        force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow. 0: none.
-        5: the mean specific force is so large [m/s^2], which refutes nothing.
+        1 and an angle: the tilt has leapt by it. 2: it rotates by this angle, and otherwise by its rates. 3: the
+        specific force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow.
+        0: none. 5: the mean specific force is so large [m/s^2], which refutes nothing.
     """
     fault, size = _find_fault(values, own_axes, force, arrival, stamp, before)
     if fault == 0 or fault == 5:
@@ -250,7 +217,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     return fault, size
 
 
-check_turn = cached(
+check_rotation = cached(
     "Tuple((int64, float64))(float64[::1], boolean, float64[::1], float64, float64, float64[::1])",
-    _check_turn,
+    _check_rotation,
 )

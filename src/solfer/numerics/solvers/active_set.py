@@ -3,7 +3,7 @@
 It begins at the least cost without any constraint and adds one violated constraint after the other: it needs no point
 to start from, ends after finitely many exact steps, and detects contradictions reliably. Source: D. Goldfarb,
 A. Idnani, "A numerically stable dual method for solving strictly convex quadratic programs", Mathematical Programming
-27, 1983, whose names are used: H = L L^T, rows of `turned` are the columns of L^-T Q, N are the normals of the active
+27, 1983, whose names are used: H = L L^T, rows of `rotated` are the columns of L^-T Q, N are the normals of the active
 constraints, and R is the upper factor of L^-1 N = Q R.
 """
 
@@ -31,21 +31,12 @@ SOLVED, INFEASIBLE, GAVE_UP, INACCURATE, NOT_FINITE = range(5)
 """Outcomes of a problem."""
 
 DEPENDENT = 1e-9
-"""Share of a normal outside the span of the active ones below which it counts as dependent on them."""
-
-ACTIVE_SET_FLATNESS = 1e-13
-"""Share of the largest entry of H below which a pivot of its decomposition counts as zero."""
-
-ACTIVE_SET_PRECISION, PASSES = 1e-3, 3
-"""Share of the tolerance at which x is not refined any more, and the most times that it is."""
-
-SHIFT, ACTIVE_SET_ROUNDS = 1e-9, 4
-"""Share of the largest entry of H that is added to its diagonal where H is almost singular, and how often at most."""
+"""Ratio of a normal outside the span of the active ones below which it counts as dependent on them."""
 
 
 @part
-def _factorise(hessian, gradient, shift, factor, turned, x):
-    """Write L, the columns of L^-T as rows of `turned`, and the minimum without constraints; False if H is flat.
+def _factorise(hessian, gradient, shift, factor, rotated, x):
+    """Write L, the columns of L^-T as rows of `rotated`, and the minimum without constraints; False if H is flat.
 
     `shift` is added to the diagonal of H.
     """
@@ -56,44 +47,44 @@ def _factorise(hessian, gradient, shift, factor, turned, x):
         for j in range(i):
             factor[i, j] = hessian[i, j]
         factor[i, i] = hessian[i, i] + shift
-    if not cholesky(factor, ACTIVE_SET_FLATNESS * largest):
+    if not cholesky(factor, 1e-13 * largest):
         return False
     # these are the rows of L^-1
     for i in range(size):
-        turned[i] = 0.0
-        turned[i, i] = 1.0
+        rotated[i] = 0.0
+        rotated[i, i] = 1.0
         for k in range(i):
             for m in range(k + 1):
-                turned[i, m] -= factor[i, k] * turned[k, m]
+                rotated[i, m] -= factor[i, k] * rotated[k, m]
         for m in range(i + 1):
-            turned[i, m] /= factor[i, i]
+            rotated[i, m] /= factor[i, i]
     x[:] = 0.0
     for i in range(size):
         entry = 0.0
         for m in range(i + 1):
-            entry += turned[i, m] * gradient[m]
+            entry += rotated[i, m] * gradient[m]
         for m in range(i + 1):
-            x[m] -= entry * turned[i, m]
+            x[m] -= entry * rotated[i, m]
     return True
 
 
 @part
-def _directions(normal, turned, factor, active, d, z, r):
-    """Write d = turned normal, the step z of x, and the step -r of the multipliers; return the share of d in z."""
+def _directions(normal, rotated, factor, active, d, z, r):
+    """Write d = rotated normal, the step z of x, and the step -r of the multipliers; return the ratio of z in d."""
     size = len(normal)
     z[:] = 0.0
     inside = outside = 0.0
     for i in range(size):
         entry = 0.0
         for k in range(size):
-            entry += turned[i, k] * normal[k]
+            entry += rotated[i, k] * normal[k]
         d[i] = entry
         if i < active:
             inside += entry * entry
         else:
             outside += entry * entry
             for k in range(size):
-                z[k] += entry * turned[i, k]
+                z[k] += entry * rotated[i, k]
     for i in range(active - 1, -1, -1):
         entry = d[i]
         for k in range(i + 1, active):
@@ -103,22 +94,22 @@ def _directions(normal, turned, factor, active, d, z, r):
 
 
 @part
-def _rotate(turned, i, j, cosine, sine):
+def _rotate(rotated, i, j, cosine, sine):
     """Rotate two rows into each other."""
-    for k in range(turned.shape[1]):
-        first = turned[i, k]
-        second = turned[j, k]
-        turned[i, k] = cosine * first + sine * second
-        turned[j, k] = cosine * second - sine * first
+    for k in range(rotated.shape[1]):
+        first = rotated[i, k]
+        second = rotated[j, k]
+        rotated[i, k] = cosine * first + sine * second
+        rotated[j, k] = cosine * second - sine * first
 
 
 @part
-def _add(turned, factor, active, d):
+def _add(rotated, factor, active, d):
     """Make d the last column of R, by rotations that leave zeros behind its first `active` + 1 numbers."""
     for j in range(len(d) - 1, active, -1):
         length = math.hypot(d[j - 1], d[j])
         if length > 0.0:
-            _rotate(turned, j - 1, j, d[j - 1] / length, d[j] / length)
+            _rotate(rotated, j - 1, j, d[j - 1] / length, d[j] / length)
             d[j - 1] = length
             d[j] = 0.0
     for i in range(active + 1):
@@ -126,7 +117,7 @@ def _add(turned, factor, active, d):
 
 
 @part
-def _drop(turned, factor, active, which, names, multipliers):
+def _drop(rotated, factor, active, which, names, multipliers):
     """Remove column `which` of R, and its entries in the lists."""
     for j in range(which, active - 1):
         names[j], multipliers[j] = names[j + 1], multipliers[j + 1]
@@ -137,7 +128,7 @@ def _drop(turned, factor, active, which, names, multipliers):
         if length > 0.0:
             cosine = factor[j, j] / length
             sine = factor[j + 1, j] / length
-            _rotate(turned, j, j + 1, cosine, sine)
+            _rotate(rotated, j, j + 1, cosine, sine)
             for k in range(j, active - 1):
                 first = factor[j, k]
                 second = factor[j + 1, k]
@@ -147,7 +138,7 @@ def _drop(turned, factor, active, which, names, multipliers):
 @part
 def _most_violated(limits, tolerance, x, normal, is_active):
     """Find the constraint that x violates most: its name (-1 for none) and by how much; write its normal."""
-    _, _, matrix, lower, upper, least, largest = limits
+    _, _, matrix, lower, upper, x_min, x_max = limits
     rows, size = matrix.shape
     name = -1
     worst = 0.0
@@ -160,8 +151,8 @@ def _most_violated(limits, tolerance, x, normal, is_active):
                 value += matrix[i, k] * x[k]
         else:
             value = x[i - rows]
-            low = least[i - rows]
-            high = largest[i - rows]
+            low = x_min[i - rows]
+            high = x_max[i - rows]
         if low - value > worst and not is_active[2 * i] and low - value > tolerance * max(1.0, abs(low)):
             name = 2 * i
             worst = low - value
@@ -175,7 +166,7 @@ def _most_violated(limits, tolerance, x, normal, is_active):
 
 
 @part
-def _equalities(limits, tolerance, turned, factor, x, vectors, names):
+def _equalities(limits, tolerance, rotated, factor, x, vectors, names):
     """Make all equalities active that do not depend on others; return their number, -1 for a contradiction."""
     normal = vectors[0]
     d = vectors[1]
@@ -187,14 +178,14 @@ def _equalities(limits, tolerance, turned, factor, x, vectors, names):
     for i in range(len(limits[1])):
         normal[:] = 0.0
         add_normal(-1 - i, 1.0, limits, normal)
-        if _directions(normal, turned, factor, active, d, z, r) < DEPENDENT:
+        if _directions(normal, rotated, factor, active, d, z, r) < DEPENDENT:
             if is_proof(-1 - i, names, active, r, limits, x, slope, tolerance):
                 return -1
             continue
         step = (limits[1][i] - normal_times(-1 - i, limits, x)) / np.dot(z, normal)
         for k in range(len(x)):
             x[k] += step * z[k]
-        _add(turned, factor, active, d)
+        _add(rotated, factor, active, d)
         names[active] = -1 - i
         multipliers[active] = 0.0
         active += 1
@@ -226,7 +217,7 @@ def _negative(names, multipliers, active, scale, tolerance):
 
 
 @part
-def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active, x):
+def _attempt(cost, limits, tolerance, rotated, factor, vectors, names, is_active, x):
     """Write x, the least of 1/2 x^T (H + shift) x + g^T x; return outcome, steps, and the largest residual."""
     normal = vectors[0]
     d = vectors[1]
@@ -236,10 +227,12 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
     slope = vectors[5]
     hessian, gradient, shift = cost
     residual = np.inf
+    precise = 1e-3 * tolerance  # residual at which x is not refined any more
+    passes = 3  # times that it is refined, at most
     is_active[:] = 0
-    if not _factorise(hessian, gradient, shift, factor, turned, x):
+    if not _factorise(hessian, gradient, shift, factor, rotated, x):
         return GAVE_UP, 0, residual
-    active = _equalities(limits, tolerance, turned, factor, x, vectors, names)
+    active = _equalities(limits, tolerance, rotated, factor, x, vectors, names)
     if active < 0:
         return INFEASIBLE, 0, residual
     steps = 0
@@ -250,15 +243,15 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
             residual, scale = refine(
                 cost,
                 limits,
-                turned,
+                rotated,
                 factor,
                 active,
                 names,
                 multipliers,
                 x,
                 vectors,
-                ACTIVE_SET_PRECISION * tolerance,
-                PASSES,
+                precise,
+                passes,
             )
             which = _negative(names, multipliers, active, scale, tolerance)
             if which < 0 and _most_violated(limits, tolerance, x, normal, is_active)[0] < 0:
@@ -267,26 +260,26 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
             steps += 1
             if which >= 0:
                 is_active[names[which]] = 0
-                _drop(turned, factor, active, which, names, multipliers)
+                _drop(rotated, factor, active, which, names, multipliers)
                 active -= 1
                 refine(
                     cost,
                     limits,
-                    turned,
+                    rotated,
                     factor,
                     active,
                     names,
                     multipliers,
                     x,
                     vectors,
-                    ACTIVE_SET_PRECISION * tolerance,
-                    PASSES,
+                    precise,
+                    passes,
                 )
             continue
         multiplier = 0.0
         while steps < most:
             steps += 1
-            is_dependent = _directions(normal, turned, factor, active, d, z, r) < DEPENDENT
+            is_dependent = _directions(normal, rotated, factor, active, d, z, r) < DEPENDENT
             blocking, longest = _blocking(names, multipliers, r, active)
             full = np.inf if is_dependent else violation / np.dot(z, normal)
             step = min(longest, full)
@@ -301,22 +294,20 @@ def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active,
                     x[k] += step * z[k]
                 violation *= 1.0 - step / full
             if step == full:
-                _add(turned, factor, active, d)
+                _add(rotated, factor, active, d)
                 names[active] = name
                 multipliers[active] = multiplier
                 is_active[name] = 1
                 active += 1
                 break
             is_active[names[blocking]] = 0
-            _drop(turned, factor, active, blocking, names, multipliers)
+            _drop(rotated, factor, active, blocking, names, multipliers)
             active -= 1
     return GAVE_UP, steps, residual
 
 
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
-_PROBLEM = f"{_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}"
-_ACTIVE_SET_TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
 
 
 def solve(
@@ -327,10 +318,10 @@ def solve(
     matrix,
     lower,
     upper,
-    least,
-    largest,
+    x_min,
+    x_max,
     tolerance,
-    turned,
+    rotated,
     factor,
     vectors,
     names,
@@ -343,29 +334,29 @@ def solve(
     additional term shift |x - before|^2 / 2, which end at the same solution. Source: R. T. Rockafellar, "Monotone
     operators and the proximal point algorithm", SIAM Journal on Control and Optimization 14(5), 1976.
     """
-    limits = (equality_matrix, equality_vector, matrix, lower, upper, least, largest)
+    limits = (equality_matrix, equality_vector, matrix, lower, upper, x_min, x_max)
     if not is_sound(hessian, gradient, limits):
         return NOT_FINITE, 0, np.inf
-    if is_contradictory(lower, upper) or is_contradictory(least, largest):
+    if is_contradictory(lower, upper) or is_contradictory(x_min, x_max):
         return INFEASIBLE, 0, np.inf
     work = vectors[:6]
     moved = vectors[6]
     before = vectors[7]
     outcome, steps, residual = _attempt(
-        (hessian, gradient, 0.0), limits, tolerance, turned, factor, work, names, is_active, x
+        (hessian, gradient, 0.0), limits, tolerance, rotated, factor, work, names, is_active, x
     )
     if outcome != INACCURATE:
         return outcome, steps, residual
     entry = 0.0
     for i in range(len(x)):
         entry = max(entry, hessian[i, i])
-    shift = SHIFT * entry
+    shift = 1e-9 * entry
     before[:] = 0.0
-    for _ in range(ACTIVE_SET_ROUNDS):
+    for _ in range(4):
         for i in range(len(x)):
             moved[i] = gradient[i] - shift * before[i]
         outcome, more, residual = _attempt(
-            (hessian, moved, shift), limits, tolerance, turned, factor, work, names, is_active, x
+            (hessian, moved, shift), limits, tolerance, rotated, factor, work, names, is_active, x
         )
         steps += more
         if outcome != SOLVED:
@@ -383,7 +374,11 @@ def solve(
 
 
 _compiled = cached(
-    f"Tuple((int64, int64, float64))({_ACTIVE_SET_TYPES})", solve, REORDERED, sources=[DENSE, Path(residuals.__file__)]
+    f"Tuple((int64, int64, float64))({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, "
+    f"{_VECTOR}, {_VECTOR}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR})",
+    solve,
+    REORDERED,
+    sources=[DENSE, Path(residuals.__file__)],
 )
 
 
@@ -398,7 +393,7 @@ class ActiveSet:
 
     def __init__(self, size: int, inequalities: int, tolerance: float):
         self._tolerance = tolerance
-        self._turned = np.zeros((size, size))
+        self._rotated = np.zeros((size, size))
         self._factor = np.zeros((size, size))
         self._vectors = np.zeros((8, size))
         self._names = np.zeros(size, dtype=np.int64)
@@ -419,10 +414,10 @@ class ActiveSet:
                 problem.inequality_matrix,
                 problem.lower,
                 problem.upper,
-                problem.least,
-                problem.largest,
+                problem.x_min,
+                problem.x_max,
                 self._tolerance,
-                self._turned,
+                self._rotated,
                 self._factor,
                 self._vectors,
                 self._names,

@@ -8,12 +8,6 @@ import numpy as np
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.velocity_bounds import VelocityBounds
 
-SLIDING = 1e-3
-"""What rates of rigid levels may be off because joints are at their bounds [m/s]."""
-
-VIOLATION_SMALLEST_SIZE = 1e-9
-"""How far a velocity may be beyond its bound [rad/s, m/s]."""
-
 
 @part
 def _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers):
@@ -36,20 +30,20 @@ def _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers):
 
 
 @part
-def _subtract(solved, row, start, end, shares):
-    """Subtract the rows from `start` to `end`, times their shares, from another one."""
+def _subtract(solved, row, start, end, factors):
+    """Subtract the rows from `start` to `end`, times their factors, from another one."""
     width = solved.shape[1]
     k = start
     while k + 3 < end:
-        p = shares[k]
-        q = shares[k + 1]
-        r = shares[k + 2]
-        s = shares[k + 3]
+        p = factors[k]
+        q = factors[k + 1]
+        r = factors[k + 2]
+        s = factors[k + 3]
         for a in range(width):
             solved[row, a] -= p * solved[k, a] + q * solved[k + 1, a] + r * solved[k + 2, a] + s * solved[k + 3, a]
         k += 4
     while k < end:
-        p = shares[k]
+        p = factors[k]
         for a in range(width):
             solved[row, a] -= p * solved[k, a]
         k += 1
@@ -93,7 +87,7 @@ def _decompose(rows, used, damping, solved, factor):
 
 
 @part
-def _advance(rows, used, rates, solved, factor, shares, out):
+def _advance(rows, used, rates, solved, factor, weights, out):
     """Write the sum of all steps J'^T (L L^T)^-1 (r - J dq) = S^T L^-1 (r - J dq)."""
     width = rows.shape[1]
     for a in range(width):
@@ -106,10 +100,10 @@ def _advance(rows, used, rates, solved, factor, shares, out):
             for a in range(width):
                 entry -= rows[i, a] * out[a]
             for k in range(start, i):
-                entry -= factor[i, k] * shares[k]
-            shares[i] = entry / factor[i, i]
+                entry -= factor[i, k] * weights[k]
+            weights[i] = entry / factor[i, i]
         for i in range(start, end):
-            entry = shares[i]
+            entry = weights[i]
             for a in range(width):
                 out[a] += entry * solved[i, a]
 
@@ -146,13 +140,13 @@ def _shorten(columns, lower, upper, found):
 
 @part
 def _slides(rows, rates, count, found, is_free):
-    """Whether the first rows, whose rates are zero but for what is held, are off."""
+    """Whether the first rows, whose rates are zero but for what is held, are off by more than 1e-3 m/s."""
     for i in range(count):
         entry = -rates[i]
         for a in range(rows.shape[1]):
             if is_free[a]:
                 entry += rows[i, a] * found[a]
-        if abs(entry) > SLIDING:
+        if abs(entry) > 1e-3:
             return True
     return False
 
@@ -161,7 +155,7 @@ def _slides(rows, rates, count, found, is_free):
 def _farthest(columns, lower, upper, is_free, found, scale):
     """Find the place of the velocity that is farthest beyond its bounds; -1: there is none."""
     place = -1
-    farthest = VIOLATION_SMALLEST_SIZE
+    farthest = 1e-9  # [rad/s, m/s]
     for a in range(len(columns)):
         if is_free[a]:
             value = scale * found[a]
@@ -202,9 +196,9 @@ def _descend(
     factor = factor[:size]
     rates = numbers[0]
     squares = numbers[1]
-    shares = numbers[2]
+    weights = numbers[2]
     _decompose(rows, used, squares, solved, factor)
-    _advance(rows, used, rates, solved, factor, shares, found)
+    _advance(rows, used, rates, solved, factor, weights, found)
     for k in range(len(out)):
         out[k] = 0.0
     count = 0
@@ -231,7 +225,7 @@ def _descend(
                 rows[i, place] = 0.0
             count += 1
             _decompose(rows, used, squares, solved, factor)
-            _advance(rows, used, rates, solved, factor, shares, found)
+            _advance(rows, used, rates, solved, factor, weights, found)
             for a in range(width):
                 if not is_free[a]:
                     found[a] = held[a]
@@ -287,7 +281,7 @@ class DampedDescent:
 
         J' = J P,  X = J'^T (J' J'^T + D^2)^-1,  dq <- dq + X (r - J dq),  P <- P - X J'.
 
-    The damping acts on P, too: a level with a large one leaves a share of its rows to those after it, and one that is
+    The damping acts on P, too: a level with a large one leaves a part of its rows to those after it, and one that is
     nearly singular disturbs those before it a little. Source: S. Chiaverini, "Singularity-robust task-priority
     redundancy resolution for real-time kinematic control of robot manipulators", IEEE Transactions on Robotics and
     Automation 13(3), 1997.

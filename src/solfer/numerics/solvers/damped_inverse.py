@@ -79,5 +79,6 @@ def _solve_into(matrix, vector, work, out):
             out[k] += y[i] * matrix[i, k]
 
 
-_TYPES = "void(float64[:, ::1], float64[::1], float64[:, ::1], float64[::1])"
-_solve = cached(_TYPES, _solve_into, REORDERED, sources=[DENSE])
+_solve = cached(
+    "void(float64[:, ::1], float64[::1], float64[:, ::1], float64[::1])", _solve_into, REORDERED, sources=[DENSE]
+)

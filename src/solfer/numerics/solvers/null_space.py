@@ -6,7 +6,7 @@ from scipy.linalg import lapack
 from solfer.errors import SizeMismatch
 
 RANK_TOLERANCE = 1e-9
-"""Diagonal entries of R below this share of the largest one count as zero."""
+"""Diagonal entries of R below this ratio to the largest one count as zero."""
 
 
 class NullSpace:
@@ -63,14 +63,14 @@ class NullSpace:
         """A, shape (n - r, n); live until the next `update`."""
         if not self._basis_is_current:
             np.copyto(self._basis, self._identity)
-            self._turn(self._basis, "N")
+            self._multiply(self._basis, "N")
             self._basis_is_current = True
         return self._rows[self.rank :]
 
     def project(self, vector: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write A `vector` into the first n - r numbers of `out`, and return these; both have n numbers."""
         self._column[:, 0] = vector
-        self._turn(self._column, "T")
+        self._multiply(self._column, "T")
         result = out[: self.size - self.rank]
         result[:] = self._column[self.rank :, 0]
         return result
@@ -78,16 +78,16 @@ class NullSpace:
     def project_columns(self, matrix: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write A `matrix` into the last n - r rows of `out`, and return these; both are (n, n), `out` by columns."""
         np.copyto(out, matrix)
-        self._turn(out, "T")
+        self._multiply(out, "T")
         return out[self.rank :]
 
     def project_both(self, matrix: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write A `matrix` A^T into the last n - r rows and columns of `out`; both are (n, n), `out` by columns."""
         self.project_columns(matrix, out)
-        self._turn(out, "N", "R")
+        self._multiply(out, "N", "R")
         return out[self.rank :, self.rank :]
 
-    def _turn(self, matrix: np.ndarray, transposed: str, side: str = "L") -> None:
+    def _multiply(self, matrix: np.ndarray, transposed: str, side: str = "L") -> None:
         """Multiply `matrix` by Q or Q^T from one side, in place."""
         if self.rank:
             lapack.dormqr(side, transposed, self._reflectors, self._scales, matrix, self._work, overwrite_c=1)

@@ -17,8 +17,8 @@ class Problem:
         inequality_matrix: C, shape (i, n).
         lower: l, shape (i,); -inf where there is none.
         upper: u, shape (i,); inf where there is none.
-        least: x_min, shape (n,); -inf where there is none.
-        largest: x_max, shape (n,); inf where there is none.
+        x_min: Lower bounds of x, shape (n,); -inf where there is none.
+        x_max: Upper bounds of x, shape (n,); inf where there is none.
     """
 
     hessian: np.ndarray
@@ -28,8 +28,8 @@ class Problem:
     inequality_matrix: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    least: np.ndarray
-    largest: np.ndarray
+    x_min: np.ndarray
+    x_max: np.ndarray
 
     @classmethod
     def empty(cls, size: int, equalities: int = 0, inequalities: int = 0) -> "Problem":
@@ -42,8 +42,8 @@ class Problem:
             inequality_matrix=np.zeros((inequalities, size)),
             lower=np.full(inequalities, -np.inf),
             upper=np.full(inequalities, np.inf),
-            least=np.full(size, -np.inf),
-            largest=np.full(size, np.inf),
+            x_min=np.full(size, -np.inf),
+            x_max=np.full(size, np.inf),
         )
 
     def copy(self) -> "Problem":
@@ -60,6 +60,6 @@ class Problem:
             self.inequality_matrix.shape,
             self.lower.shape,
             self.upper.shape,
-            self.least.shape,
-            self.largest.shape,
+            self.x_min.shape,
+            self.x_max.shape,
         )

@@ -7,9 +7,6 @@ from scipy.linalg import lapack
 
 from solfer.errors import NotFinite
 
-EIGENVALUE_TOLERANCE = 1e-11
-"""Eigenvalues below this share of the largest one count as zero."""
-
 
 class SymmetricPseudoInverse:
     """Moore-Penrose inverse of a symmetric matrix without negative eigenvalues, by its eigenvectors.
@@ -20,7 +17,7 @@ class SymmetricPseudoInverse:
     Attributes:
         matrix: Input of `update`, written before each call, shape (k, k); its memory is used.
         value: The pseudo-inverse, shape (k, k); zero before the first `update`.
-        rank: Number of eigenvalues that are not zero.
+        rank: Number of eigenvalues that are not zero: above 1e-11 times the largest one.
     """
 
     def __init__(self, size: int):
@@ -39,7 +36,7 @@ class SymmetricPseudoInverse:
         values, vectors, failed = lapack.dsyev(self.matrix.T, overwrite_a=1)
         if failed or not math.isfinite(values[-1]):
             raise NotFinite("a symmetric matrix has no finite eigenvalues", expected="finite numbers")
-        np.greater(values, EIGENVALUE_TOLERANCE * max(values[-1], 0.0), out=self._counts)
+        np.greater(values, 1e-11 * max(values[-1], 0.0), out=self._counts)
         self.rank = int(np.count_nonzero(self._counts))
         self._inverses[:] = 0.0
         np.divide(1.0, values, out=self._inverses, where=self._counts)

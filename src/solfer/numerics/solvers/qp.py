@@ -3,6 +3,7 @@
 import enum
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,9 +36,9 @@ class Solution:
         x: The solution, or the point where the solver gave up; shape (n,), a new array.
         iterations: Steps of the solver.
         problem: The problem: the solver's own, or a copy of it if it was not solved; None where it is not written down.
-        residual: The largest of what x leaves of the conditions of an optimum: violations of constraints, as shares of
+        residual: The largest of what x leaves of the conditions of an optimum: violations of constraints, as ratios of
             their sides where these are larger than 1, and the slope H x + g beside the constraints' normals, as a
-            share of its largest term; inf where the solver did not get there.
+            ratio of its largest term; inf where the solver did not get there.
     """
 
     status: QpStatus
@@ -68,6 +69,14 @@ class QpSolver:
         problem: The problem; its arrays are written, or replaced by others of the same shape, before `solve`.
     """
 
+    _STATUS: ClassVar = {
+        SOLVED: QpStatus.SOLVED,
+        INFEASIBLE: QpStatus.INFEASIBLE,
+        GAVE_UP: QpStatus.NOT_CONVERGED,
+        INACCURATE: QpStatus.INACCURATE,
+        NOT_FINITE: QpStatus.NOT_FINITE,
+    }
+
     def __init__(self, size: int, equalities: int = 0, inequalities: int = 0, tolerance: float = 1e-9):
         self.problem = Problem.empty(size, equalities, inequalities)
         self._shapes = self.problem.shapes()
@@ -84,16 +93,7 @@ class QpSolver:
             raise SizeMismatch(f"a problem of the shapes {problem.shapes()}, expected {self._shapes}")
         x = np.zeros(len(problem.gradient))
         outcome, steps, residual = self._method.solve(problem, x)
-        status = _STATUS[outcome]
+        status = self._STATUS[outcome]
         return Solution(
             status, x, steps, problem=problem if status is QpStatus.SOLVED else problem.copy(), residual=residual
         )
-
-
-_STATUS = {
-    SOLVED: QpStatus.SOLVED,
-    INFEASIBLE: QpStatus.INFEASIBLE,
-    GAVE_UP: QpStatus.NOT_CONVERGED,
-    INACCURATE: QpStatus.INACCURATE,
-    NOT_FINITE: QpStatus.NOT_FINITE,
-}

@@ -31,7 +31,7 @@ def _are_limits(lower, upper):
 @part
 def is_sound(hessian, gradient, limits):
     """Return whether cost and matrices are finite, and no limit is a NaN."""
-    equality_matrix, equality_vector, matrix, lower, upper, least, largest = limits
+    equality_matrix, equality_vector, matrix, lower, upper, x_min, x_max = limits
     return (
         _is_finite(hessian.ravel())
         and _is_finite(gradient)
@@ -39,7 +39,7 @@ def is_sound(hessian, gradient, limits):
         and _is_finite(equality_vector)
         and _is_finite(matrix.ravel())
         and _are_limits(lower, upper)
-        and _are_limits(least, largest)
+        and _are_limits(x_min, x_max)
     )
 
 
@@ -102,7 +102,7 @@ def side(name, limits):
 
 @part
 def lack(name, limits, x):
-    """Compute by how much x violates a constraint, as a share of its side where that is larger than 1."""
+    """Compute by how much x violates a constraint, as a ratio of its side where that is larger than 1."""
     sides = side(name, limits)
     return (sides - normal_times(name, limits, x)) / max(1.0, abs(sides))
 
@@ -127,9 +127,9 @@ def is_proof(name, names, active, r, limits, x, rest, tolerance):
     gap = side(name, limits)
     scale = max(1.0, abs(gap))
     for j in range(active):
-        share = r[j] * side(names[j], limits)
-        gap -= share
-        scale = max(scale, abs(share))
+        term = r[j] * side(names[j], limits)
+        gap -= term
+        scale = max(scale, abs(term))
         add_normal(names[j], -r[j], limits, rest)
     left = 0.0
     largest = 1.0
@@ -140,8 +140,8 @@ def is_proof(name, names, active, r, limits, x, rest, tolerance):
 
 
 @part
-def _balance(cost, limits, turned, factor, active, names, multipliers, x, slope, d):
-    """Write slope H x + g, d = turned slope, and the multipliers; return the share of the slope that they leave."""
+def _balance(cost, limits, rotated, factor, active, names, multipliers, x, slope, d):
+    """Write slope H x + g, d = rotated slope, and the multipliers; return the ratio of the slope that they leave."""
     hessian, gradient, shift = cost
     size = len(x)
     largest = 0.0
@@ -158,7 +158,7 @@ def _balance(cost, limits, turned, factor, active, names, multipliers, x, slope,
     for i in range(size):
         d[i] = 0.0
         for k in range(size):
-            d[i] += turned[i, k] * slope[k]
+            d[i] += rotated[i, k] * slope[k]
     for i in range(active - 1, -1, -1):
         entry = d[i]
         for k in range(i + 1, active):
@@ -175,20 +175,20 @@ def _balance(cost, limits, turned, factor, active, names, multipliers, x, slope,
 
 
 @part
-def refine(cost, limits, turned, factor, active, names, multipliers, x, vectors, enough, passes):
+def refine(cost, limits, rotated, factor, active, names, multipliers, x, vectors, enough, passes):
     """Compute x and the multipliers again from the active constraints, by Newton steps with the decomposition.
 
-    With N = J^-T (R; 0) and J^T H J = 1, where the rows of `turned` are the columns of J = (J1 J2), a step is
+    With N = J^-T (R; 0) and J^T H J = 1, where the rows of `rotated` are the columns of J = (J1 J2), a step is
     J1 R^-T (side - N^T x) - J2 J2^T (H x + g).
 
     Returns:
-        The largest of the shares that are left of slope and active constraints, and the scale of the slope.
+        The largest of the ratios that are left of slope and active constraints, and the scale of the slope.
     """
     slope = vectors[5]
     d = vectors[1]
     lacks = vectors[3]
     for index in range(passes + 1):
-        worst, scale = _balance(cost, limits, turned, factor, active, names, multipliers, x, slope, d)
+        worst, scale = _balance(cost, limits, rotated, factor, active, names, multipliers, x, slope, d)
         for j in range(active):
             worst = max(worst, abs(lack(names[j], limits, x)))
         if worst <= enough or index == passes:
@@ -200,11 +200,11 @@ def refine(cost, limits, turned, factor, active, names, multipliers, x, vectors,
             lacks[j] = entry / factor[j, j]
         for i in range(active):
             for k in range(len(x)):
-                x[k] += lacks[i] * turned[i, k]
+                x[k] += lacks[i] * rotated[i, k]
         for i in range(active, len(x)):
             entry = 0.0
             for k in range(len(x)):
-                entry += turned[i, k] * slope[k]
+                entry += rotated[i, k] * slope[k]
             for k in range(len(x)):
-                x[k] -= entry * turned[i, k]
+                x[k] -= entry * rotated[i, k]
     return worst, scale

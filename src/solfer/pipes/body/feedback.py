@@ -74,7 +74,14 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         used = slice(0 if sensor.located else 3, 6)
         super().__init__(name, reader, state, fields=fields, dofs=BASE_INDICES[used], reception=reception)
         # imported here: its compiler takes a while to load
-        from solfer.numerics.twist_transport import FROM_POSE, FROM_TWIST, GO_ON, OWN_AXES, WITH_ORIENTATION, Carried
+        from solfer.numerics.twist_transport import (
+            CONTINUOUS,
+            FROM_POSE,
+            FROM_TWIST,
+            OWN_AXES,
+            WITH_ORIENTATION,
+            Carried,
+        )
 
         mount = sensor.mount
         reading = sensor.reading
@@ -83,7 +90,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         self._reading = reading
         self._carried = Carried(chart, reading.values, mount.numbers)
         self._own_axes = OWN_AXES
-        self._go_on = GO_ON
+        self._go_on = CONTINUOUS
         self._alignment = Alignment(self._carried.world) if sensor.calibrated else None
         self._measures_pose = "position" in fields
         self._known = state.position[:6]

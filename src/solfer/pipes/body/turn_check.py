@@ -7,7 +7,7 @@ import numpy as np
 from solfer.errors import Contradiction
 
 LEAPS, CONTRADICTS, TURN_SKEW, SPIKES, UNSCALED = 1, 2, 3, 4, 5
-"""Results of the compiled check, see `solfer.numerics.checks.orientations.check_turn`."""
+"""Results of the compiled check, see `solfer.numerics.checks.orientations.check_rotation`."""
 
 UNMEASURED = np.zeros(3)
 """Specific force of a link without an accelerometer [m/s^2]."""
@@ -30,7 +30,7 @@ class TurnCheck:
         # imported here: its compiler takes a while to load
         from solfer.numerics.checks import orientations
 
-        self._check = orientations.check_turn
+        self._check = orientations.check_rotation
         self._before = np.zeros(orientations.NUMBERS)
         self._times = self._before[orientations.ARRIVAL : orientations.STAMP + 1]
         self.forget()

@@ -51,7 +51,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
 
 def _turns(record: FeedbackRecord, context: PipeContext, dofs: np.ndarray) -> JointTurns | None:
     """Make what counts the turns of a pipe's continuous joints; None: it has none of them."""
-    if not context.robot.turns[dofs].any():
+    if not context.robot.revolutions[dofs].any():
         return None
     return JointTurns(context.robot, dofs, record.function or "state", is_calibrated=record.calibration is not None)
 
@@ -87,7 +87,7 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         fields=fields,
         receiver=JointReceiver(
             _calibration(record, context, mapping),
-            (context.robot.turns, context.robot.added_turns),
+            (context.robot.revolutions, context.robot.added_revolutions),
             record.leads_to,
             standing=standing,
             component=context.component,

@@ -32,7 +32,7 @@ class JointLeaps:
         self._find = joints.find_leap
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
-        self._limits = self._fastest, robot.turns[dofs], np.isinf(robot.upper_limits.position[dofs])
+        self._limits = self._fastest, robot.revolutions[dofs], np.isinf(robot.upper_limits.position[dofs])
         self._before = np.zeros((joints.ROWS, len(dofs)))
         self._place = self._before[joints.PLACE]
         self._arrival = self._before[joints.ARRIVAL]

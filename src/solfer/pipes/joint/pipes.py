@@ -226,7 +226,7 @@ class JointReceiver:
     Attributes:
         calibration: That of the receiving hardware, in the map's order; None: it has the model's names, signs and
             zeros.
-        turns: `turns` and `added_turns` of the Robot; None: the receiver counts turns as the State does.
+        turns: `revolutions` and `added_revolutions` of the Robot; None: the receiver counts turns as the State does.
         controller: Name of the controller of the lower level; empty: that of the pipe's name.
         standing: Stiffness and damping that its joints have without a command, by field, shape (n,) each; those that
             the pipe carries, of a lower level that publishes them.

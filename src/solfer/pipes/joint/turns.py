@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.robot import Robot
 
 
@@ -11,7 +11,7 @@ class JointTurns:
 
     None of them moves by more than half a turn from one message to the next. The first position counts as it comes. A
     driver whose positions have been more than a turn apart counts on: nothing more is added. What topics carry is in
-    the count of the robot's driver, `Robot.added_turns` is what the measured State has more.
+    the count of the robot's driver, `Robot.added_revolutions` is what the measured State has more.
 
     Args:
         robot: The Robot.
@@ -23,27 +23,27 @@ class JointTurns:
 
     def __init__(self, robot: Robot, dofs: np.ndarray, function: str, is_calibrated: bool = False):
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import keep_turns, unwrap
+        from solfer.numerics.kernels import keep_revolutions, unwrap
 
         self._unwrap = unwrap
-        self._keep = keep_turns
-        self._turns = robot.turns[dofs]
+        self._keep = keep_revolutions
+        self._revolutions = robot.revolutions[dofs]
         self._dofs = dofs
         self._function = function
-        self._of_robot = robot.added_turns
+        self._of_robot = robot.added_revolutions
         self._before = np.repeat([[np.nan], [np.inf], [-np.inf]], len(dofs), axis=1)  # see the kernel
         self._added = np.zeros(len(dofs))
         self._begin = robot.state.position if function == "motor" else np.zeros(robot.size)
-        self._aligned = (self._turns == 0.0) | (function != "motor" and not is_calibrated)
+        self._aligned = (self._revolutions == 0.0) | (function != "motor" and not is_calibrated)
 
     def unwrap(self, position: np.ndarray, part: np.ndarray) -> None:
         """Add turns to the positions of a message, shape (k,) [rad, m], of which it has a `part`."""
         if self._function == "reference":
             np.take(self._of_robot, self._dofs, out=self._added, mode="clip")
-        self._unwrap(position, part, self._before, self._turns, self._added)
+        self._unwrap(position, part, self._before, self._revolutions, self._added)
         if not self._aligned.all():
             new = self._to_align(part)
-            shift = whole_turns(self._begin[self._dofs[new]] - position[new], self._turns[new])
+            shift = whole_revolutions(self._begin[self._dofs[new]] - position[new], self._revolutions[new])
             position[new] += shift
             self._added[new] += shift
 

@@ -10,7 +10,7 @@ from numba import carray, njit
 from solfer.points.compiled.instruction import (
     ANGULAR,
     LINEAR,
-    VECTOR_SMALLEST_SIZE,
+    SMALLEST_LENGTH,
     acceleration_of,
     columns_of,
     floats,
@@ -21,7 +21,7 @@ from solfer.points.compiled.instruction import (
     velocity_of,
 )
 from solfer.points.compiled.registry import kernel
-from solfer.points.compiled.rigid import placed, turned
+from solfer.points.compiled.rigid import placed, rotated
 
 
 @kernel
@@ -103,7 +103,7 @@ def _touching(of_material, numbers, placement, drift, spin, linear, angular):
     product rule.
     """
     center = placed(placement, numbers[0], numbers[1], numbers[2])
-    axis = turned(placement, numbers[3], numbers[4], numbers[5])
+    axis = rotated(placement, numbers[3], numbers[4], numbers[5])
     normal = (numbers[6], numbers[7], numbers[8])
     ring = numbers[9]
     tube = numbers[10]
@@ -115,7 +115,7 @@ def _touching(of_material, numbers, placement, drift, spin, linear, angular):
     down = _plus(normal, -along, axis)
     length = math.sqrt(_dot(down, down))
     # a wheel that lies flat touches the ground with its whole ring: its centre stands for it
-    scale = 1.0 / length if length > VECTOR_SMALLEST_SIZE else 0.0
+    scale = 1.0 / length if length > SMALLEST_LENGTH else 0.0
     down = _scaled(scale, down)
     down_1 = _scaled(-scale, _plus(_scaled(along_1, axis), along, axis_1))
     rate = _dot(down, down_1)

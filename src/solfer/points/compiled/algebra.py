@@ -5,7 +5,7 @@ import math
 from numba import carray, njit
 
 from solfer.points.compiled.instruction import (
-    VECTOR_SMALLEST_SIZE,
+    SMALLEST_LENGTH,
     columns_of,
     floats,
     followers,
@@ -67,7 +67,7 @@ def orientation_difference(a, b, out):
     sine = math.sqrt(x * x + y * y + z * z)
     sign = -1.0 if w < 0.0 else 1.0
     # 2 asin(s) / s tends to 2; the next term is s^2 / 3
-    factor = sign * (2.0 * math.atan2(sine, sign * w) / sine if sine > VECTOR_SMALLEST_SIZE else 2.0)
+    factor = sign * (2.0 * math.atan2(sine, sign * w) / sine if sine > SMALLEST_LENGTH else 2.0)
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
 
 
@@ -77,11 +77,11 @@ def orientation_minus(row, program, with_jacobian):
     value = value_of(row)
     orientation_difference(carray(floats(row.first), (4,)), carray(floats(row.second), (4,)), value)
     if with_jacobian:
-        _turn_difference(row, program, 0, value)
+        _write_difference_jacobian(row, program, 0, value)
 
 
 @njit
-def _turn_difference(row, program, skipped, d):
+def _write_difference_jacobian(row, program, skipped, d):
     """Write the Jacobian of a difference d of orientations into the three rows behind `skipped` ones: L Ja - L' Jb.
 
     L = I - [d] / 2 + s [d]^2 is the inverse of the left Jacobian of SO(3); that of the right one is its transpose L'.
@@ -93,12 +93,12 @@ def _turn_difference(row, program, skipped, d):
     for index in range(skipped, skipped + 3):
         for k in columns:
             jacobian[index * dofs + k] = 0.0
-    _add_turned(row.first_jacobian, 1.0, skipped * dofs, dofs, d, columns, jacobian)
-    _add_turned(row.second_jacobian, -1.0, skipped * dofs, dofs, d, columns, jacobian)
+    _add_rotated(row.first_jacobian, 1.0, skipped * dofs, dofs, d, columns, jacobian)
+    _add_rotated(row.second_jacobian, -1.0, skipped * dofs, dofs, d, columns, jacobian)
 
 
 @njit
-def _add_turned(address, sign, first, dofs, d, columns, jacobian):
+def _add_rotated(address, sign, first, dofs, d, columns, jacobian):
     """Add L J, or with the other sign -L' J, where the three rows of J begin at the entry `first` of an operand's."""
     if address == 0:
         return
@@ -129,7 +129,7 @@ def pose_minus(row, program, with_jacobian):
     orientation_difference(a[3:], b[3:], value[3:])
     if with_jacobian:
         _add_jacobians(row, program, 3, -1.0)
-        _turn_difference(row, program, 3, value[3:])
+        _write_difference_jacobian(row, program, 3, value[3:])
 
 
 @kernel
@@ -147,7 +147,7 @@ def norm(row, program, with_jacobian):
     dofs = program.dofs
     columns = columns_of(row)
     jacobian = jacobian_of(row, program)
-    scale = 1.0 / value[0] if value[0] > VECTOR_SMALLEST_SIZE else 0.0
+    scale = 1.0 / value[0] if value[0] > SMALLEST_LENGTH else 0.0
     for k in columns:
         jacobian[k] = 0.0
     if row.first_jacobian == 0:
@@ -174,8 +174,8 @@ def fold(row, program, with_jacobian):
         follower = table[index]
         for line in range(row.rows):
             first = line * dofs
-            share = ratios[index] * jacobian[first + follower.dof]
-            jacobian[first + follower.leader] = share + (jacobian[first + follower.leader] if follower.adds else 0.0)
+            moved = ratios[index] * jacobian[first + follower.dof]
+            jacobian[first + follower.leader] = moved + (jacobian[first + follower.leader] if follower.adds else 0.0)
             jacobian[first + follower.dof] = 0.0
 
 

@@ -3,7 +3,6 @@
 from numba import carray, njit
 
 from solfer.points.compiled.instruction import (
-    SMALLEST_FORCE,
     columns_of,
     contacts,
     floats,
@@ -20,7 +19,7 @@ from solfer.points.compiled.rigid import placed
 
 @kernel
 def center_of_mass(row, program, with_jacobian):
-    """Compute the centre of mass; a joint moves it by its subtree's share of the mass, at the subtree's centre of mass.
+    """Compute the centre of mass; a joint moves it by its subtree's part of the mass, at the subtree's centre of mass.
 
     Parameters: parents of the joints; masses, levers (3), masses and moments (3) of subtrees.
     """
@@ -42,7 +41,7 @@ def center_of_mass(row, program, with_jacobian):
         moments[3 * body] = masses[body] * x
         moments[3 * body + 1] = masses[body] * y
         moments[3 * body + 2] = masses[body] * z
-    share = 1.0 / subtrees[0]
+    scale = 1.0 / subtrees[0]
     for body in range(bodies - 1, 0, -1):
         mx = moments[3 * body]
         my = moments[3 * body + 1]
@@ -55,11 +54,11 @@ def center_of_mass(row, program, with_jacobian):
             column = joints[body - 1]
             mass = subtrees[body]
             k = body - 1
-            jacobian[k] = share * (mass * column[0] + column[4] * mz - column[5] * my)
-            jacobian[dofs + k] = share * (mass * column[1] + column[5] * mx - column[3] * mz)
-            jacobian[2 * dofs + k] = share * (mass * column[2] + column[3] * my - column[4] * mx)
+            jacobian[k] = scale * (mass * column[0] + column[4] * mz - column[5] * my)
+            jacobian[dofs + k] = scale * (mass * column[1] + column[5] * mx - column[3] * mz)
+            jacobian[2 * dofs + k] = scale * (mass * column[2] + column[3] * my - column[4] * mx)
     for i in range(3):
-        value[i] = share * moments[i]
+        value[i] = scale * moments[i]
 
 
 @kernel
@@ -82,7 +81,7 @@ def center_of_pressure(row, program, with_jacobian):
         for index in range(3):
             for k in columns:
                 jacobian[index * dofs + k] = 0.0
-    if pressed < SMALLEST_FORCE:
+    if pressed < 1e-6:  # [N]
         return
     value[:] = 0.0
     for one in range(row.table_rows):

@@ -5,7 +5,7 @@ import math
 from numba import carray, njit
 
 from solfer.points.compiled.instruction import (
-    VECTOR_SMALLEST_SIZE,
+    SMALLEST_LENGTH,
     columns_of,
     floats,
     jacobian_of,
@@ -76,12 +76,12 @@ def relative(row, program, with_jacobian):
         dz = a[2] - b[2]
         value[0], value[1], value[2] = _into(r, dx, dy, dz)
     if angular:
-        _turn_back(a[size - 4 :], b[3:], value[size - 4 :])
+        _rotate_back(a[size - 4 :], b[3:], value[size - 4 :])
     if not with_jacobian:
         return
     dofs = program.dofs
     jacobian = jacobian_of(row, program)
-    turning = 3 if linear else 0
+    rotating = 3 if linear else 0
     for k in columns_of(row):
         wx, wy, wz = _column(row.second_jacobian, 3, k, dofs)
         if linear:
@@ -92,16 +92,16 @@ def relative(row, program, with_jacobian):
             jacobian[dofs + k] = y
             jacobian[2 * dofs + k] = z
         if angular:
-            ax, ay, az = _column(row.first_jacobian, turning, k, dofs)
+            ax, ay, az = _column(row.first_jacobian, rotating, k, dofs)
             x, y, z = _into(r, ax - wx, ay - wy, az - wz)
-            first = turning * dofs + k
+            first = rotating * dofs + k
             jacobian[first] = x
             jacobian[first + dofs] = y
             jacobian[first + 2 * dofs] = z
 
 
 @njit
-def _turn_back(a, b, out):
+def _rotate_back(a, b, out):
     """Write the quaternion a as seen from b, w >= 0."""
     w = b[3] * a[3] + b[0] * a[0] + b[1] * a[1] + b[2] * a[2]
     sign = -1.0 if w < 0.0 else 1.0
@@ -136,7 +136,7 @@ def level(row, program, with_jacobian):
     tz = uz - along * nz
     square = tx * tx + ty * ty + tz * tz
     # an axis along the normal has no heading: the frame keeps its last one
-    if square > VECTOR_SMALLEST_SIZE**2:
+    if square > SMALLEST_LENGTH**2:
         scale = 1.0 / math.sqrt(square)
         fx = tx * scale
         fy = ty * scale
@@ -150,14 +150,14 @@ def level(row, program, with_jacobian):
         return
     dofs = program.dofs
     jacobian = jacobian_of(row, program)
-    lean = along / square if square > VECTOR_SMALLEST_SIZE**2 else 0.0
+    tilt = along / square if square > SMALLEST_LENGTH**2 else 0.0
     for k in columns_of(row):
         x, y, z = _column(row.first_jacobian, 0, k, dofs)
         drop = falls * (x * nx + y * ny + z * nz)
         jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = x - drop * nx, y - drop * ny, z - drop * nz
         x, y, z = _column(row.first_jacobian, 3, k, dofs)
-        turn = x * nx + y * ny + z * nz - lean * (x * tx + y * ty + z * tz)
-        jacobian[3 * dofs + k], jacobian[4 * dofs + k], jacobian[5 * dofs + k] = turn * nx, turn * ny, turn * nz
+        yaw = x * nx + y * ny + z * nz - tilt * (x * tx + y * ty + z * tz)
+        jacobian[3 * dofs + k], jacobian[4 * dofs + k], jacobian[5 * dofs + k] = yaw * nx, yaw * ny, yaw * nz
 
 
 @njit
@@ -181,7 +181,7 @@ def sight(row, program, with_jacobian):
     dz = b[2] - a[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     # a target at the origin is in no direction
-    scale = 1.0 / length if length > VECTOR_SMALLEST_SIZE else 0.0
+    scale = 1.0 / length if length > SMALLEST_LENGTH else 0.0
     dx = dx * scale
     dy = dy * scale
     dz = dz * scale

@@ -55,14 +55,14 @@ FOLLOWER = np.dtype([("dof", np.int64), ("leader", np.int64), ("adds", np.int64)
 PRESSING = np.dtype([(name, np.int64) for name in ("value", "jacobian", "wrench", "flags", "holds_moment")])
 """A contact in the table of a centre of pressure: addresses, and whether it constrains a moment."""
 
-LINEAR, ANGULAR = 1, 2
-"""Parts of a link's motion."""
+LINEAR = 1
+"""Linear part of a link's motion."""
 
-VECTOR_SMALLEST_SIZE = 1e-9
+ANGULAR = 2
+"""Angular part of a link's motion."""
+
+SMALLEST_LENGTH = 1e-9
 """Length below which a vector has no direction."""
-
-SMALLEST_FORCE = 1e-6
-"""Sum of normal forces below which there is no centre of pressure [N]."""
 
 
 programs = pointer_to(from_dtype(PROGRAM))

@@ -16,9 +16,9 @@ from solfer.points.compiled.algebra import orientation_difference
 from solfer.points.compiled.instruction import instructions, integers, jacobian_of, programs
 from solfer.points.compiled.registry import KERNELS, Kernel
 
-KERNEL_FILES = sorted(Path(__file__).parent.glob("*.py"))
+FILES = sorted(Path(__file__).parent.glob("*.py"))
 
-for _file in KERNEL_FILES:
+for _file in FILES:
     if _file != Path(__file__):
         import_module(f"{__package__}.{_file.stem}")
 
@@ -55,5 +55,5 @@ def _difference(a, b, out):
     orientation_difference(a, b, out)
 
 
-run = cached("void(int64, boolean)", _run, sources=KERNEL_FILES)
-difference = cached("void(float64[::1], float64[::1], float64[::1])", _difference, sources=KERNEL_FILES)
+run = cached("void(int64, boolean)", _run, sources=FILES)
+difference = cached("void(float64[::1], float64[::1], float64[::1])", _difference, sources=FILES)

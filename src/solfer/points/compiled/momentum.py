@@ -12,7 +12,7 @@ from solfer.points.compiled.instruction import (
     velocity_of,
 )
 from solfer.points.compiled.registry import kernel
-from solfer.points.compiled.rigid import linear, placed, turned
+from solfer.points.compiled.rigid import linear, placed, rotated
 
 
 @kernel
@@ -42,7 +42,9 @@ def angular_momentum(row, program, with_jacobian):
         x = moments[first] - gx
         y = moments[first + 1] - gy
         z = moments[first + 2] - gz
-        _turn_inertia(placements[body], numbers[4 * bodies + 9 * body : 4 * bodies + 9 * body + 9], inertias, 6 * body)
+        _rotate_inertia(
+            placements[body], numbers[4 * bodies + 9 * body : 4 * bodies + 9 * body + 9], inertias, 6 * body
+        )
         _shift_inertia(mass, x, y, z, inertias, 6 * body)
         moments[first], moments[first + 1], moments[first + 2] = mass * x, mass * y, mass * z
     value[:] = 0.0
@@ -91,17 +93,17 @@ def _center(placements, masses, levers, centers):
         gx = gx + mass * x
         gy = gy + mass * y
         gz = gz + mass * z
-    share = 1.0 / total if total > 0.0 else 0.0
-    return share * gx, share * gy, share * gz
+    scale = 1.0 / total if total > 0.0 else 0.0
+    return scale * gx, scale * gy, scale * gz
 
 
 @njit
-def _turn_inertia(placement, inertia, out, first):
+def _rotate_inertia(placement, inertia, out, first):
     """Write R I R^T, where the columns of R are placement[0:3], [3:6], [6:9]."""
     for index in range(6):
         out[first + index] = 0.0
     for j in range(3):
-        x, y, z = turned(placement, inertia[j], inertia[3 + j], inertia[6 + j])
+        x, y, z = rotated(placement, inertia[j], inertia[3 + j], inertia[6 + j])
         rx = placement[3 * j]
         ry = placement[3 * j + 1]
         rz = placement[3 * j + 2]

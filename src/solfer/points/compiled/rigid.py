@@ -19,7 +19,7 @@ from solfer.points.compiled.registry import kernel
 
 
 @njit
-def turned(placement, x, y, z):
+def rotated(placement, x, y, z):
     """Rotate a vector of a joint's frame into world axes; a placement is the rotation by columns, then the shift."""
     return (
         placement[0] * x + placement[3] * y + placement[6] * z,
@@ -31,7 +31,7 @@ def turned(placement, x, y, z):
 @njit
 def placed(placement, x, y, z):
     """Transform a point of a joint's frame into the world."""
-    x, y, z = turned(placement, x, y, z)
+    x, y, z = rotated(placement, x, y, z)
     return x + placement[9], y + placement[10], z + placement[11]
 
 

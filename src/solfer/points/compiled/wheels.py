@@ -6,7 +6,7 @@ from numba import carray, njit
 
 from solfer.numerics.pointers import booleans
 from solfer.points.compiled.instruction import (
-    VECTOR_SMALLEST_SIZE,
+    SMALLEST_LENGTH,
     columns_of,
     floats,
     integers,
@@ -17,7 +17,7 @@ from solfer.points.compiled.instruction import (
     value_of,
 )
 from solfer.points.compiled.registry import kernel
-from solfer.points.compiled.rigid import linear, placed, turned
+from solfer.points.compiled.rigid import linear, placed, rotated
 
 
 @kernel
@@ -42,7 +42,7 @@ def _update(row, program, of_material, with_jacobian):
     numbers = numbers_of(row, 11)
     placement = placements_of(program)[row.joint]
     cx, cy, cz = placed(placement, numbers[0], numbers[1], numbers[2])
-    ax, ay, az = turned(placement, numbers[3], numbers[4], numbers[5])
+    ax, ay, az = rotated(placement, numbers[3], numbers[4], numbers[5])
     nx = numbers[6]
     ny = numbers[7]
     nz = numbers[8]
@@ -54,7 +54,7 @@ def _update(row, program, of_material, with_jacobian):
     dz = nz - along * az
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     # a wheel that lies flat touches the ground with its whole ring: its centre stands for it
-    scale = 1.0 / length if length > VECTOR_SMALLEST_SIZE else 0.0
+    scale = 1.0 / length if length > SMALLEST_LENGTH else 0.0
     dx = dx * scale
     dy = dy * scale
     dz = dz * scale
@@ -78,10 +78,10 @@ def _update(row, program, of_material, with_jacobian):
             ux = column[4] * az - column[5] * ay
             uy = column[5] * ax - column[3] * az
             uz = column[3] * ay - column[4] * ax
-            turn = ux * nx + uy * ny + uz * nz
-            ux = -along * ux - turn * ax
-            uy = -along * uy - turn * ay
-            uz = -along * uz - turn * az
+            across = ux * nx + uy * ny + uz * nz
+            ux = -along * ux - across * ax
+            uy = -along * uy - across * ay
+            uz = -along * uz - across * az
             part = ux * dx + uy * dy + uz * dz
             factor = ring * scale
             vx = vx - factor * (ux - part * dx)
@@ -98,11 +98,11 @@ def camber(row, program, with_jacobian):
     numbers = numbers_of(row, 3)
     placement = placements_of(program)[row.joint]
     index = _number_of(row)
-    x, y, z = turned(placement, numbers[0], numbers[1], numbers[2])
+    x, y, z = rotated(placement, numbers[0], numbers[1], numbers[2])
     value_of(row)[index] = -math.asin(min(max(z, -1.0), 1.0))
     if with_jacobian:
-        length = max(math.hypot(x, y), VECTOR_SMALLEST_SIZE)
-        _write_turn(row, program, index, -y / length, x / length)
+        length = max(math.hypot(x, y), SMALLEST_LENGTH)
+        _write_angle(row, program, index, -y / length, x / length)
 
 
 @kernel
@@ -114,16 +114,16 @@ def caster(row, program, with_jacobian):
     numbers = numbers_of(row, 6)
     placement = placements_of(program)[row.joint]
     index = _number_of(row)
-    x, y, z = turned(placement, numbers[0], numbers[1], numbers[2])
-    ux, uy, uz = turned(placement, numbers[3], numbers[4], numbers[5])
+    x, y, z = rotated(placement, numbers[0], numbers[1], numbers[2])
+    ux, uy, uz = rotated(placement, numbers[3], numbers[4], numbers[5])
     wx = y * uz - z * uy
     wy = z * ux - x * uz
     wz = x * uy - y * ux
     value_of(row)[index] = math.atan2(wz, uz)
     if with_jacobian:
         # w x z and u x z, weighed by the parts of z along u and w
-        scale = 1.0 / max(uz * uz + wz * wz, VECTOR_SMALLEST_SIZE**2)
-        _write_turn(row, program, index, scale * (uz * wy - wz * uy), scale * (wz * ux - uz * wx))
+        scale = 1.0 / max(uz * uz + wz * wz, SMALLEST_LENGTH**2)
+        _write_angle(row, program, index, scale * (uz * wy - wz * uy), scale * (wz * ux - uz * wx))
 
 
 @njit
@@ -133,7 +133,7 @@ def _number_of(row):
 
 
 @njit
-def _write_turn(row, program, index, x, y):
+def _write_angle(row, program, index, x, y):
     """Write the row of an angle that changes by x and y times the angular velocity of the link."""
     joints = joints_of(program)
     jacobian = jacobian_of(row, program)
@@ -173,8 +173,8 @@ def rolling_offset(row, program, with_jacobian):
     cos = math.cos(base[0])
     sin = math.sin(base[0])
     bx, by = (base[1], base[2]) if late else (pose[0], pose[1])
-    x, y, _ = turned(placements_of(program)[row.joint], axle[0], axle[1], axle[2])
-    length = max(math.hypot(x, y), VECTOR_SMALLEST_SIZE)
+    x, y, _ = rotated(placements_of(program)[row.joint], axle[0], axle[1], axle[2])
+    length = max(math.hypot(x, y), SMALLEST_LENGTH)
     fx = y / length
     fy = -x / length
     gx = cos * reference[0] - sin * reference[1]
@@ -199,7 +199,7 @@ def rolling_offset(row, program, with_jacobian):
     of_vertex = carray(floats(row.first_jacobian), (3 * dofs,))
     of_pose = carray(floats(row.second_jacobian), (6 * dofs,))
     of_base = carray(floats(late if late else row.second_jacobian), (2 * dofs,))
-    turn = fx * gy - fy * gx
+    lever = fx * gy - fy * gx
     along = fx * gx + fy * gy
     first = index * dofs
     second = (count + index) * dofs
@@ -208,6 +208,6 @@ def rolling_offset(row, program, with_jacobian):
         dx = of_vertex[k] - of_base[k]
         dy = of_vertex[dofs + k] - of_base[dofs + k]
         rate = of_pose[5 * dofs + k]
-        jacobian[first + k] = fx * dx + fy * dy + turn * rate
+        jacobian[first + k] = fx * dx + fy * dy + lever * rate
         jacobian[second + k] = fx * dy - fy * dx - along * rate if is_lifted else 0.0
         jacobian[third + k] = of_vertex[2 * dofs + k] if is_lifted else 0.0

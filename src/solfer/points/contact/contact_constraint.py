@@ -44,7 +44,7 @@ class ContactConstraint(Acceleration):
         self.contact = contact
         self._rows = contact.constraint
         super().__init__(vector(len(self._rows)), _robot(contact))
-        self._turn = np.zeros((6, 6))
+        self._rotation = np.zeros((6, 6))
         self._held = np.zeros_like(self._rows)
         self._velocity, self._drift = np.zeros((2, 6))
 
@@ -57,8 +57,8 @@ class ContactConstraint(Acceleration):
         """Compute the Jacobian if `jacobian`, the offset and the value, at the last update of the Robot."""
         self._motion.update()
         rotation = self.contact.rotation
-        self._turn[:3, :3] = self._turn[3:, 3:] = rotation.T
-        np.dot(self._rows, self._turn, out=self._held)
+        self._rotation[:3, :3] = self._rotation[3:, 3:] = rotation.T
+        np.dot(self._rows, self._rotation, out=self._held)
         if not self.contact.active:
             self._held[:] = 0.0
         super().update(jacobian)

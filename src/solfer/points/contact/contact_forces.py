@@ -38,7 +38,7 @@ class ContactForces(ConstraintForce):
         rows = self.accelerations.rows
         self._spread = np.zeros((self.size, rows))
         self._gain = np.zeros((self.size, rows))
-        self._turned = list(self._blocks(sizes))
+        self._rotated = list(self._blocks(sizes))
         first = np.concatenate(([0], np.cumsum(sizes)))
         self._wrenches = [slice(start, start + size) for start, size in zip(first, sizes, strict=False)]
 
@@ -68,8 +68,8 @@ class ContactForces(ConstraintForce):
 
     def _spread_forces(self) -> np.ndarray:
         """See `ConstraintForce._spread_forces`: rows in frames of contacts are turned into world axes."""
-        if not self._turned:
+        if not self._rotated:
             return super()._spread_forces()
-        for block, force_map in self._turned:
+        for block, force_map in self._rotated:
             block[:] = force_map
         return np.dot(self._spread, self._inertia.value, out=self._gain)

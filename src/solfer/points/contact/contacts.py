@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from solfer.errors import NotFinite, PointError, SizeMismatch
 from solfer.model.contacts import ContactRecord
 from solfer.model.view import RobotView
-from solfer.points.compiled.instruction import VECTOR_SMALLEST_SIZE
+from solfer.points.compiled.instruction import SMALLEST_LENGTH
 from solfer.points.compiled.wheels import rolling
 from solfer.points.contact.support_vertex import UP, SupportVertex
 from solfer.points.offset import direction
@@ -167,7 +167,7 @@ class RollingContact(SupportVertex, Contact):
     def spin(self, wx: float, wy: float, wz: float) -> tuple[float, float, float]:
         """See `Contact.spin`: the frame turns about the normal n as the axle a does, at (n x a).(w x a) / |n x a|^2."""
         (ax, ay, az), (nx, ny, nz), length = self._axes()
-        if length <= VECTOR_SMALLEST_SIZE:
+        if length <= SMALLEST_LENGTH:
             return 0.0, 0.0, 0.0
         # with y across the normal and a = length y + along n: w x a, along n x y
         bx, by, bz = (self.robot.kinematics.rotation(self.link) @ self._axle).tolist()
@@ -190,7 +190,7 @@ class RollingContact(SupportVertex, Contact):
         yy = by - along * ny
         yz = bz - along * nz
         length = math.sqrt(yx * yx + yy * yy + yz * yz)
-        if length <= VECTOR_SMALLEST_SIZE:
+        if length <= SMALLEST_LENGTH:
             return across(nx, ny, nz), (nx, ny, nz), 0.0
         return (yx / length, yy / length, yz / length), (nx, ny, nz), length
 
@@ -238,7 +238,7 @@ def across(nx: float, ny: float, nz: float) -> tuple[float, float, float]:
     It is y of a frame whose z is that direction; above flat ground its axes are those of the world.
     """
     length = math.hypot(ny, nz)
-    if length > VECTOR_SMALLEST_SIZE:
+    if length > SMALLEST_LENGTH:
         return 0.0, nz / length, -ny / length
     return 0.0, 1.0, 0.0
 

@@ -16,6 +16,7 @@ from solfer.points.space import vector
 __all__ = ["SupportVertex"]
 
 UP = (0.0, 0.0, 1.0)
+"""Default of axes and normals."""
 
 
 class SupportVertex(LinkPoint):

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from solfer.errors import RecordingError
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.recording.model import Recording
 from solfer.recording.review.fit import BLOCK, DELAY, GAIN, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
 from solfer.recording.review.motion import JointMotion, Samples, measured_joints, sampled, shift_of
@@ -148,7 +148,7 @@ class _Pair:
         self.first = np.array([curve(self._times) for curve in self._curves])
         self.second = self._others(self._times + self.shift)
         # either may have begun on another revolution
-        self.second -= whole_turns(np.median(self.second - self.first, axis=1, keepdims=True), self._turns)
+        self.second -= whole_revolutions(np.median(self.second - self.first, axis=1, keepdims=True), self._turns)
         self.apart = self.second - self.first
 
     def _fit(self, joint: int, other: int, free: tuple[int, ...]) -> Law:

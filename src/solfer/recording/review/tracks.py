@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.numerics.rotations import whole_turns
+from solfer.numerics.rotations import whole_revolutions
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
 from solfer.recording.review.motion import continuous_joints
 
@@ -81,7 +81,7 @@ def tracks_of(recording: Recording, plugin: str) -> list[Track]:
 def _nearest(sent: Series, measured: Series) -> Series:
     """Return what was sent, in the count of a driver, on the turns of what was measured."""
     errors = np.nan_to_num(sent.values - measured.at(sent.times))
-    return Series(sent.times, sent.values - whole_turns(errors, np.array(math.tau)))
+    return Series(sent.times, sent.values - whole_revolutions(errors, np.array(math.tau)))
 
 
 def _columns(recording: Recording, plugin: str, parts: tuple[str, ...], field: str) -> dict[str, tuple[str, Series]]:

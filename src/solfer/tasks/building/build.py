@@ -18,9 +18,6 @@ from solfer.tasks.hierarchy import Hierarchy
 from solfer.tasks.qp_hierarchy import QpHierarchy
 from solfer.tasks.task import Task
 
-_TASK_ROWS = {3: ("x", "y", "z"), 6: ("x", "y", "z", "rx", "ry", "rz")}
-_TURNS = ("rx", "ry", "rz")
-
 
 class ConfiguredTasks:
     """Tasks of a configuration, with their references.
@@ -96,7 +93,7 @@ class ConfiguredTasks:
     def rows(self, name: str, value: float | tuple[float, ...]) -> np.ndarray:
         """Return numbers of all rows of a record's tasks, of one number or one a row; a SizeMismatch for others."""
         tasks = self._members[name]
-        parts = [_share(value, task.rows, place, count=len(tasks)) for place, task in enumerate(tasks)]
+        parts = [_part_of(value, task.rows, place, count=len(tasks)) for place, task in enumerate(tasks)]
         for task, part in zip(tasks, parts, strict=True):
             if np.shape(part) not in ((), (task.rows,)):
                 raise SizeMismatch(f"{np.size(part)} numbers for {task.rows} rows", expected="one number, or one a row")
@@ -159,7 +156,7 @@ class ConfiguredTasks:
             return None
         for key in ("velocity", "weight", "damping", "gain", "correction"):
             with faults.at(record, key):
-                setattr(task, key, _share(_number_of(record, key), task.rows, place, count=count))
+                setattr(task, key, _part_of(_number_of(record, key), task.rows, place, count=count))
         if record.is_motion and np.any(task.gain):
             with faults.at(record, "gain"):
                 raise _no_gain(record, task.where)
@@ -267,9 +264,9 @@ class ConfiguredStack(ConfiguredTasks):
         super().confine(dofs)
         self._limits.confine(dofs)
 
-    def scale_speeds(self, share: float) -> None:
-        """Let joints move with a share of their largest speeds; one number a change, no allocation of memory."""
-        self._limits.scale_speeds(share)
+    def scale_speeds(self, ratio: float) -> None:
+        """Let joints move with a ratio of their largest speeds; one number a change, no allocation of memory."""
+        self._limits.scale_speeds(ratio)
 
     def keep_apart(self, distance: float) -> None:
         """Set the least distance of links that may touch [m]."""
@@ -340,7 +337,7 @@ def _path_of_link(record: TaskRecord, index: int) -> tuple[str | int, ...]:
     return ("link",) if isinstance(record.link, str) else ("link", index)
 
 
-def _share(values: float | tuple[float, ...], rows: int, place: int, count: int) -> float | tuple[float, ...]:
+def _part_of(values: float | tuple[float, ...], rows: int, place: int, count: int) -> float | tuple[float, ...]:
     """Return the numbers of one of several tasks, where there is one for each row of all of them."""
     if isinstance(values, tuple) and count > 1 and len(values) == rows * count:
         return values[rows * place : rows * (place + 1)]
@@ -351,8 +348,11 @@ def _rows(record: TaskRecord, point: Point) -> list[int] | None:
     """Return the numbers of the rows that count, which may have names."""
     if record.rows is None:
         return [5] if record.point == "steering" else None
-    turns = record.point in ("orientation", "angular_momentum")
-    names = _TURNS if turns else _TASK_ROWS.get(point.rows, ()) if not isinstance(point, Posture) else ()
+    names: tuple[str, ...] = ()
+    if record.point in ("orientation", "angular_momentum"):
+        names = ("rx", "ry", "rz")
+    elif not isinstance(point, Posture) and point.rows in (3, 6):
+        names = ("x", "y", "z", "rx", "ry", "rz")[: point.rows]
     found = []
     for index, row in enumerate(record.rows):
         if isinstance(row, str) and row not in names:

@@ -16,9 +16,6 @@ from solfer.tasks.building.points import WORLD, PointMaker
 from solfer.tasks.collisions import CollisionLimit
 from solfer.tasks.constraints import Constraint, TorqueLimits, WorkspaceLimit
 
-TORQUES, COLLISIONS = "torques", "collisions"
-"""Names of constraints; those of workspaces are their own."""
-
 
 class LimitMaker:
     """Makes the limits of a stack.
@@ -47,7 +44,7 @@ class LimitMaker:
                     self._workspaces.append(limit)
         self._collisions: CollisionLimit | None = None
         if self._limits.collisions is not None:
-            with faults.at(record.limits, COLLISIONS):
+            with faults.at(record.limits, "collisions"):
                 self._collisions = self._collision_limit(self._limits.collisions)
         for index, name in enumerate(record.relax or ()):
             with faults.at(record, "relax", index):
@@ -109,7 +106,7 @@ class LimitMaker:
 
     @property
     def _names(self) -> tuple[str, ...]:
-        given = tuple(key for key in (TORQUES, COLLISIONS) if getattr(self._limits, key) is not None)
+        given = tuple(key for key in ("torques", "collisions") if getattr(self._limits, key) is not None)
         return (*given, *self._limits.workspace)
 
     def confine(self, dofs: np.ndarray) -> None:
@@ -133,11 +130,11 @@ class LimitMaker:
         self._bounds.append(bounds)
         return bounds
 
-    def scale_speeds(self, share: float) -> None:
-        """Let joints move with a share of their largest speeds; see `ConfiguredStack.scale_speeds`."""
+    def scale_speeds(self, ratio: float) -> None:
+        """Let joints move with a ratio of their largest speeds; see `ConfiguredStack.scale_speeds`."""
         if self._limits.speeds:
             for bounds in self._bounds:
-                np.multiply(self._robot.kinematics.velocity_limit, share, out=bounds.speed)
+                np.multiply(self._robot.kinematics.velocity_limit, ratio, out=bounds.speed)
                 bounds.speed[self._fixed] = 0.0
 
     def keep_apart(self, distance: float) -> None:

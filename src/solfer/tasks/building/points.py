@@ -29,7 +29,8 @@ from solfer.robot import Robot
 WORLD = "world"
 """What is seen from the world is not relative."""
 
-WORLD_ORIGIN = (0.0, 0.0, 0.0)
+ORIGIN = (0.0, 0.0, 0.0)
+"""Origin of a link or frame, in its axes [m]."""
 
 
 class PointMaker:
@@ -72,7 +73,7 @@ class PointMaker:
 
     def place(self, name: str, relative: str = WORLD) -> Point:
         """Make the position of a link or frame in the world, or as seen from another one in its axes [m]."""
-        point = self._position_of(name, WORLD_ORIGIN)
+        point = self._position_of(name, ORIGIN)
         return point if relative == WORLD else RelativePoint(point, self.pose(relative))
 
     def pose(self, name: str) -> Point:
@@ -145,16 +146,16 @@ class PointMaker:
         if task.relative in (None, WORLD):
             return point
         if task.axes == "world":
-            return point - self._position_of(task.relative, WORLD_ORIGIN)
+            return point - self._position_of(task.relative, ORIGIN)
         return RelativePoint(point, self.pose(task.relative))
 
     def _position(self, task: TaskRecord, link: str, _: np.ndarray | None) -> Point:
-        return self._seen(self._position_of(link, task.offset or WORLD_ORIGIN), task)
+        return self._seen(self._position_of(link, task.offset or ORIGIN), task)
 
     def _orientation(self, task: TaskRecord, link: str, _: np.ndarray | None) -> Point:
         link, frame = self._fixed(link, "orientation")
-        turn = () if frame is None else (frame.orientation,)
-        return self._seen(FrameOrientation(link, self._robot, *turn), task)
+        rotation = () if frame is None else (frame.orientation,)
+        return self._seen(FrameOrientation(link, self._robot, *rotation), task)
 
     def _pose(self, task: TaskRecord, link: str, _: np.ndarray | None) -> Point:
         if task.offset is None:
@@ -183,7 +184,7 @@ class PointMaker:
         frame = self.pose(link)
         if isinstance(task.target, str):
             own = self._own.get(task.target)
-            return LookAt(frame, self._position_of(task.target, WORLD_ORIGIN) if own is None else own)
+            return LookAt(frame, self._position_of(task.target, ORIGIN) if own is None else own)
         return LookAt(frame, task.target or ahead(frame, task))
 
     def _steering(self, task: TaskRecord, link: str, _: np.ndarray | None) -> Point:
