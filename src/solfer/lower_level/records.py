@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from solfer.config import Record
-from solfer.config.records.bounds import DURATION, PATIENCE
+from solfer.config.records.bounds import DURATION, TIMEOUT
 from solfer.lower_level.laws.controllers import CONTROLLER_TIMEOUT
 from solfer.transport.messages import LARGEST_GAIN
 
@@ -34,7 +34,7 @@ class JointControllerRecord(Record):
     group: str = Field(default=ALL, min_length=1, description="group of the SRDF that it controls, or `all`")
     except_: str | None = Field(default=None, alias="except", min_length=1, description="group that it leaves out")
     timeout: float = Field(
-        default=CONTROLLER_TIMEOUT, **PATIENCE, description="age at which a commanded velocity becomes zero [s]"
+        default=CONTROLLER_TIMEOUT, **TIMEOUT, description="age at which a commanded velocity becomes zero [s]"
     )
 
 
@@ -72,7 +72,7 @@ class LowerLevelRecord(Record):
     """Settings of the lower level's defences of its robot."""
 
     lease: float = Field(
-        default=LEASE, **PATIENCE, description="time without a command after which a claim on joints ends [s]"
+        default=LEASE, **TIMEOUT, description="time without a command after which a claim on joints ends [s]"
     )
     silence: Literal["keep", "hold", "stop", "damp"] = Field(
         default="hold",

@@ -16,8 +16,7 @@ from solfer.config import (
     PipeRecord,
     Problems,
 )
-from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
-from solfer.config.records.middlewares import MIDDLEWARES
+from solfer.config.records.middlewares import MIDDLEWARES, PREDEFINED_MAPS
 from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
@@ -163,7 +162,7 @@ class _Builder:
         """Return the first feedback of measured joints, if it is required at the start or a pipe uses its order."""
         for record in self._configuration.feedbacks:
             if record.measures_joints and record.source is not None:
-                return record if record.initialize or any(map(self._used, (FEEDBACK_MAP, *MIDDLEWARE_MAPS))) else None
+                return record if record.initialize or any(map(self._used, (FEEDBACK_MAP, *PREDEFINED_MAPS))) else None
         return None
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from solfer.config import CalibrationRecord, Configuration, DofsRecord, FeedbackRecord, Problems, Record
-from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
-from solfer.config.records.middlewares import MIDDLEWARES
+from solfer.config.records.middlewares import MIDDLEWARES, PREDEFINED_MAPS
 from solfer.config.records.robot_names import names_in
 from solfer.config.yaml.nodes import Key
 from solfer.errors import ConfigError
@@ -17,7 +16,7 @@ from solfer.robot.robot import Robot
 FEEDBACK_MAP, LOWER_LEVEL_MAP = "FEEDBACK", "LOWER_LEVEL"
 """Names of the maps of the default state feedback, and of all lower-level controllers."""
 
-LOWER_LEVEL_MAPS = (LOWER_LEVEL_MAP, *MIDDLEWARE_MAPS)
+LOWER_LEVEL_MAPS = (LOWER_LEVEL_MAP, *PREDEFINED_MAPS)
 """Maps that stand for the one of a controller in a pipe to it."""
 
 UNACTUATED = "unactuated"

@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 
-from solfer.config.kinds.point import POINT_MESSAGES
+from solfer.config.kinds.point import MESSAGES
 from solfer.errors import ComponentError, SolferError, located
 from solfer.interfaces.port import Port
 from solfer.model.urdf.scalar_joints import BASE_DOFS
@@ -184,7 +184,7 @@ def _add_joints(log: Logger, robot: Robot, field: str, values: np.ndarray, names
 
 def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
     """Declare the numbers of a port."""
-    kind = POINT_MESSAGES[port.quantity]
+    kind = MESSAGES[port.quantity]
     # of the quantities whose message does not contain them
     units = {"velocity": "m/s", "acceleration": "m/s2", "force": "N", "torque": "Nm"}
     unit = units.get(port.quantity, "")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from solfer.cli.pipes import content, received, topic_of
 from solfer.cli.plugins import component_of, configurations_of, declared_by, report_of
 from solfer.config import AnyPipeRecord, CheckReport, Configuration, ControllerRecord, FeedbackRecord, MappingRecord
-from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION
+from solfer.config.loading.library import CONTROLLER, FEEDBACK
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.plugins.generation.registry import Registry
 from solfer.robot.defaults import MODEL_MAPS
@@ -50,7 +50,7 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
             key = _direction(record), record.name
             users.setdefault(key, []).append(configuration.module.name)
             records.setdefault(key, record)
-    for key, record in sorted(records.items(), key=lambda item: (item[0][0] != FEEDBACK_SECTION, item[0][1])):
+    for key, record in sorted(records.items(), key=lambda item: (item[0][0] != FEEDBACK, item[0][1])):
         names = users[key]
         yield (
             *_pipe(record),
@@ -67,13 +67,13 @@ def _pipe(record: AnyPipeRecord) -> Row:
 
 
 def _direction(record: AnyPipeRecord) -> str:
-    return CONTROLLER if isinstance(record, ControllerRecord) else FEEDBACK_SECTION
+    return CONTROLLER if isinstance(record, ControllerRecord) else FEEDBACK
 
 
 def _unused(report: CheckReport, used: dict[tuple[str, str], AnyPipeRecord]) -> list[tuple[str, str]]:
     """Return direction and name of the pipes that the file describes and no configuration uses."""
     tree = next((each.tree for each in configurations_of(report)), None)
-    libraries = {direction: tree and tree.get(direction) for direction in (FEEDBACK_SECTION, CONTROLLER)}
+    libraries = {direction: tree and tree.get(direction) for direction in (FEEDBACK, CONTROLLER)}
     named = [(direction, name) for direction, node in libraries.items() if node for name, _ in node.items()]
     return [key for key in named if key not in used]
 

@@ -4,13 +4,13 @@ from typing import ClassVar
 
 from solfer.config.records.pipes import LOWER_LEVEL_LAYERS, Content, ControllerRecord, FeedbackRecord, KindRecords
 
-ODOMETRY, IMU = "nav_msgs/Odometry", "sensor_msgs/Imu"
-"""Messages of a rigid body: its whole state, and what an inertial measurement unit reports of it."""
+ODOMETRY = "nav_msgs/Odometry"
+"""Message of the whole state of a rigid body."""
 
-ONLINE = "imu"
+IMU_TOPIC = "imu"
 """Topic of the lower level's inertial measurements."""
 
-CONTENT = Content(body=True, measures=True, online={"state": ONLINE})
+CONTENT = Content(body=True, measures=True, online={"state": IMU_TOPIC})
 
 
 class BodyFeedbackRecord(FeedbackRecord):
@@ -21,8 +21,8 @@ class BodyFeedbackRecord(FeedbackRecord):
     @property
     def default_message(self) -> str:
         """See `PipeRecord.default_message`."""
-        inertial = self.reads_sensor or (self.layer in LOWER_LEVEL_LAYERS and self.source == ONLINE)
-        return IMU if inertial else ODOMETRY
+        inertial = self.reads_sensor or (self.layer in LOWER_LEVEL_LAYERS and self.source == IMU_TOPIC)
+        return "sensor_msgs/Imu" if inertial else ODOMETRY
 
     @property
     def measured_link(self) -> str | None:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from solfer.config.kinds.point import POINT_MESSAGES, SEVERAL, require_without
+from solfer.config.kinds.point import MESSAGES, POINTS_MESSAGE, require_without
 from solfer.config.records.pipes import Content, ControllerRecord, FeedbackRecord, KindRecords
 from solfer.config.records.record import Record
 
@@ -43,7 +43,7 @@ class ContactTags(Record):
     @property
     def default_message(self) -> str:
         """See `PipeRecord.default_message`."""
-        return SEVERAL if self.space == "CONTACTS" else POINT_MESSAGES["wrench"]
+        return POINTS_MESSAGE if self.space == "CONTACTS" else MESSAGES["wrench"]
 
     @property
     def carried(self) -> tuple[str, ...]:

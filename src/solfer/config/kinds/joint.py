@@ -11,9 +11,6 @@ from solfer.config.records.pipes import (
     KindRecords,
 )
 
-MEASUREMENT = "sensor_msgs/JointState"
-"""Message of joints that a lower level measures."""
-
 CONTENT = Content(
     joints=True, measures=True, needed=("function",), online={"state": "joint_states", "motor": "motor_states"}
 )
@@ -28,7 +25,7 @@ class JointFeedbackRecord(FeedbackRecord):
     def default_message(self) -> str:
         """See `PipeRecord.default_message`; the lower level publishes measurements."""
         measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
-        return MEASUREMENT if measured and self.interface.measurable else JOINT_COMMAND
+        return "sensor_msgs/JointState" if measured and self.interface.measurable else JOINT_COMMAND
 
 
 class JointCommandRecord(ControllerRecord):

@@ -22,7 +22,7 @@ QUANTITIES = {
 }
 """Quantities of a Robot Point, with their count of numbers; linear before angular, quaternions (x, y, z, w)."""
 
-POINT_MESSAGES = {
+MESSAGES = {
     "position": "geometry_msgs/PointStamped",
     "orientation": "geometry_msgs/QuaternionStamped",
     "pose": "geometry_msgs/PoseStamped",
@@ -35,22 +35,16 @@ POINT_MESSAGES = {
 }
 """Message of a single Point by its quantity."""
 
-SEVERAL = "solfer/RobotPoints"
+POINTS_MESSAGE = "solfer/RobotPoints"
 """Message of several Points, or wrenches."""
 
 Quantity = Literal["position", "orientation", "pose", "velocity", "acceleration", "twist", "force", "torque", "wrench"]
 
-WITHOUT_MEANING = ("convention", "filter", "calibration", "offset_position", "offset_orientation", "output_angles")
-"""Keys of other pipes that a Point or a contact cannot have."""
-
-
-ORIENTED_QUANTITIES = ("orientation", "pose")
-"""Quantities with an orientation, which has conventions."""
-
 
 def require_without(record: Record, what: str, but: tuple[str, ...] = ()) -> None:
     """Check that a pipe of `what` has no key without a meaning there, `but` some; a ValueError if it does."""
-    idle = [key for key in WITHOUT_MEANING if key not in but and getattr(record, key, None) is not None]
+    others = ("convention", "filter", "calibration", "offset_position", "offset_orientation", "output_angles")
+    idle = [key for key in others if key not in but and getattr(record, key, None) is not None]
     if idle:
         raise ValueError(f"a {what} has no '{idle[0]}'; expected a pipe without it")
 
@@ -95,7 +89,7 @@ class PointTags(Record):
             if angles is not None:
                 raise ValueError("'output_angles' without angles; expected convention.orientation.type: EULER")
             return
-        if self.quantity not in ORIENTED_QUANTITIES:
+        if self.quantity not in ("orientation", "pose"):
             raise ValueError(f"a Point of the quantity '{self.quantity}' has no conventions; it has no orientation")
         if self.convention.twist.frame is not None:
             raise ValueError("a Point has no 'convention.twist'; its axes are those of the tag 'interface'")
@@ -120,8 +114,8 @@ class PointTags(Record):
     def default_message(self) -> str:
         """See `PipeRecord.default_message`."""
         if self.size is not None:
-            return SEVERAL
-        return POINT_MESSAGES["velocity" if self.euler else self.quantity]
+            return POINTS_MESSAGE
+        return MESSAGES["velocity" if self.euler else self.quantity]
 
     @property
     def carried(self) -> tuple[str, ...]:

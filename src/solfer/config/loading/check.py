@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from solfer.config.loading.configuration import Configuration, Part
 from solfer.config.loading.layers import AS_CONFIGURED, Layers, ModulePlacement
-from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION, Library, named_records
+from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
 from solfer.config.loading.listed_plugins import Naming
 from solfer.config.loading.load import NOT_CONFIGURATIONS, Reading, Used, misspelt_key
 from solfer.config.loading.shared import SharedConfiguration, read_shared
@@ -135,13 +135,13 @@ def _check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
         source = section and section.get("source")
         if source is not None:
             parse(source, SourceRecord, problems)
-        for direction in (FEEDBACK_SECTION, CONTROLLER):
+        for direction in (FEEDBACK, CONTROLLER):
             _check_pipes(tree, middleware, direction, used=used if is_chosen else None, problems=problems)
 
 
 def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
     """Check robot configurations, and the pipes that they and the sets name."""
-    libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK_SECTION, CONTROLLER)}
+    libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK, CONTROLLER)}
     for direction, library in libraries.items():
         sets = tree.get(f"{direction}s")
         for _, node in sets.items() if sets else ():
@@ -156,9 +156,9 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
             continue
         chosen = node.get("feedback", "layer")
         if chosen is None:
-            libraries[FEEDBACK_SECTION].check_list(node.get("feedback", "list"))
+            libraries[FEEDBACK].check_list(node.get("feedback", "list"))
         else:
-            libraries[FEEDBACK_SECTION].find_set(chosen)
+            libraries[FEEDBACK].find_set(chosen)
 
 
 def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | None, problems: Problems) -> None:

@@ -13,11 +13,6 @@ from solfer.config.yaml.nodes import Key, Mark, Scalar, YamlNode
 from solfer.config.yaml.scalars import resolve
 from solfer.config.yaml.search import anchored
 
-_PLAIN = re.compile(r"[A-Za-z_/$][A-Za-z0-9_/.+$()<>~ -]*(?<! )")
-_SWITCHES = frozenset(("yes", "no", "on", "off", "y", "n"))  # booleans of YAML 1.1, which other readers know
-_YAML_SPECIAL = re.compile(r'["\\]|[^\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
-_ORIGIN_COLUMN = 48
-
 
 class EffectiveValue(NamedTuple):
     """One value.
@@ -86,7 +81,7 @@ def as_yaml(values: Iterable[EffectiveValue], origins: bool = True) -> str:
         for depth in range(common, len(path) - 1):
             lines.append(f"{'  ' * depth}{_word(path[depth])}:")
         line = f"{'  ' * (len(path) - 1)}{_word(path[-1])}: {_flow(value)}"
-        lines.append(f"{line:<{_ORIGIN_COLUMN}}  # {mark.file}:{mark.line}:{mark.column}" if origins else line)
+        lines.append(f"{line:<48}  # {mark.file}:{mark.line}:{mark.column}" if origins else line)
         before = path
     return "\n".join(lines) + "\n"
 
@@ -131,8 +126,12 @@ def _flow(value: Any) -> str:
 def _word(value: Scalar | Key) -> str:
     """Write a scalar as YAML; a text that would be read as something else is quoted."""
     if isinstance(value, str):
-        plain = _PLAIN.fullmatch(value) and value.lower() not in _SWITCHES and isinstance(resolve(value), str)
-        return value if plain else f'"{_YAML_SPECIAL.sub(_escaped, value)}"'
+        is_word = re.fullmatch(r"[A-Za-z_/$][A-Za-z0-9_/.+$()<>~ -]*(?<! )", value)
+        switches = ("yes", "no", "on", "off", "y", "n")  # booleans of YAML 1.1, which other readers know
+        if is_word and value.lower() not in switches and isinstance(resolve(value), str):
+            return value
+        special = r'["\\]|[^\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]'
+        return f'"{re.sub(special, _escaped, value)}"'
     if isinstance(value, float) and not math.isfinite(value):
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
     text = "~" if value is None else json.dumps(value)

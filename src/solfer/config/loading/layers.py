@@ -17,10 +17,6 @@ from solfer.errors import ConfigError, SolferError, UnknownName
 ROOT = ("mwoibn",)
 """Top key of every file of a configuration; other top keys are free, for anchors."""
 
-_MAIN_ONLY = (("system",), ("layers",), ("robot", "systems"))
-_CHOICES = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}  # other words are reported with their records
-_MODULE_MAIN_ONLY = ("layer", "secondary_file")
-
 
 def module_names(file: str | os.PathLike) -> tuple[str, ...]:
     """Read the names of the modules (plugin configurations) of a main configuration, in its order.
@@ -183,10 +179,10 @@ class Layers:
         return over
 
     def _refuse_main_only(self, over: YamlNode, problems: Problems) -> None:
-        paths: list[tuple[Key, ...]] = [*_MAIN_ONLY]
+        paths: list[tuple[Key, ...]] = [("system",), ("layers",), ("robot", "systems")]
         modules = over.get("modules")
         for name, module in modules.items() if modules else ():
-            paths += [("modules", name, key) for key in _MODULE_MAIN_ONLY]
+            paths += [("modules", name, key) for key in ("layer", "secondary_file")]
             if name not in self.names:
                 known = UnknownName("module", name, self.names)
                 near = f"; did you mean {' or '.join(known.names)}?" if known.names else ""
@@ -222,7 +218,8 @@ def _chosen(kind: str, folder: YamlNode | None, choice: YamlNode | None, problem
     if folder is None or choice is None or not isinstance(choice.value, str):
         return None  # either nothing to merge, or reported with the skeleton or the module
     named = folder.get(choice.value)
-    if named is None and choice.value in _CHOICES[kind]:
+    choices = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}  # other words are reported with their records
+    if named is None and choice.value in choices[kind]:
         problems.unknown(choice.mark, kind, choice.value, [name for name, _ in folder.items()])
     return named
 

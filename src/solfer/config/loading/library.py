@@ -13,10 +13,11 @@ from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 
-FEEDBACK_SECTION = "feedback"
-CONTROLLER = "controller"
+FEEDBACK = "feedback"
+"""Direction of the pipes that a plugin receives."""
 
-_RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK_SECTION: FeedbackRecord, CONTROLLER: ControllerRecord}
+CONTROLLER = "controller"
+"""Direction of the pipes that a plugin sends to."""
 
 
 class Library:
@@ -102,7 +103,8 @@ class Library:
         space = node.get("space")
         if space is not None and space.value == "SKIP":
             return None
-        kind = record_of(_RECORDS[self._direction], space and space.value)
+        base: type[PipeRecord] = FeedbackRecord if self._direction == FEEDBACK else ControllerRecord
+        kind = record_of(base, space and space.value)
         record = parse(node, kind, self._problems, name=name)
         if record is not None:
             self._require(record, parts[-1] or node)

@@ -6,7 +6,7 @@ from typing import Any
 
 from solfer.config.loading.configuration import Configuration, Part, common_tags, own_tags
 from solfer.config.loading.layers import AS_CONFIGURED, Layers, ModulePlacement, location_of
-from solfer.config.loading.library import CONTROLLER, FEEDBACK_SECTION, Library, named_records, read_calibrations
+from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records, read_calibrations
 from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE, MIDDLEWARES
 from solfer.config.records.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotHead, RobotRecord, is_shared
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
@@ -17,7 +17,7 @@ from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import UnknownName, nearest
 
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 NOT_CONFIGURATIONS = ("name", "rate", "systems")
 """Keys of `robot` beside its configurations."""
@@ -59,7 +59,7 @@ def load(  # noqa: PLR0913 for users: what replaces values of the file, by its n
     problems = Problems()
     layers = Layers(file, problems, system, folders=search_paths, middleware=middleware, over=over)
     configuration = Reading(layers, module, problems, ModulePlacement(layer, shared)).configuration(class_name)
-    problems.log(_LOG)
+    problems.log(logger)
     problems.raise_if_any()
     return configuration
 
@@ -173,9 +173,7 @@ class Reading:
         choice = parse(chosen, FeedbackChoice, self._problems) if chosen else None
         if choice is None or (choice.layer is None and choice.list is None):
             return ()
-        return self._pipes(
-            chosen.get("list") if choice.layer is None else chosen.get("layer"), middleware, FEEDBACK_SECTION
-        )
+        return self._pipes(chosen.get("list") if choice.layer is None else chosen.get("layer"), middleware, FEEDBACK)
 
     def _controllers(self, chosen: YamlNode | None, middleware: str) -> tuple[ControllerRecord, ...]:
         if chosen is None or not isinstance(chosen.value, str | tuple):

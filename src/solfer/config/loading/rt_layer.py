@@ -26,7 +26,7 @@ from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import ConfigError, SolferError, singles
 
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 Loading = Callable[..., Configuration]
 """Loads the configuration of a plugin: gets file, name, plugin, and the options of `load`."""
@@ -95,7 +95,7 @@ class RtLayer:
             problems=problems,
             one_rate=self.executor.rate is None,
         )
-        problems.log(_LOG)
+        problems.log(logger)
         problems.raise_if_any()
         return tuple(self._paced(plugin) for plugin in found)
 

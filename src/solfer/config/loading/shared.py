@@ -16,7 +16,7 @@ from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError
 
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def load_shared(
     problems = Problems()
     layers = Layers(file, problems, system, folders=search_paths, over=over)
     shared = read_shared(layers, name, default, problems)
-    problems.log(_LOG)
+    problems.log(logger)
     problems.raise_if_any()
     return shared
 

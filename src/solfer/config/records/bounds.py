@@ -1,6 +1,6 @@
 """Bounds of numbers that several records have in common: arguments of pydantic's `Field`.
 
-Each number of a record has a smallest and a largest value: numbers beyond them mean nothing for a robot, or break
+Each number of a record has a lower and an upper bound: numbers beyond them mean nothing for a robot, or break
 computations. All bounds are wider than any robot needs.
 """
 
@@ -12,21 +12,23 @@ Bounds = dict[str, Any]
 RATE: Bounds = {"ge": 1.0, "le": 4000.0}
 """Cycles of a loop [Hz]; a cycle of Python takes a fifth of a millisecond at best."""
 
-PATIENCE: Bounds = {"ge": 1e-3, "le": 3600.0}
+TIMEOUT: Bounds = {"ge": 1e-3, "le": 3600.0}
 """Timeouts [s]."""
 
 DURATION: Bounds = {"ge": 0.0, "le": 60.0}
 """Times of a motion, or of a change [s]; zero: none."""
 
 COUNT: Bounds = {"ge": 0, "le": 1_000_000}
+"""Numbers of things."""
 
 SEED: Bounds = {"ge": 0, "le": 2**32 - 1}
+"""Seeds of random numbers."""
 
 LENGTH: Bounds = {"ge": 1e-4, "le": 1e4}
 """Lengths of things [m]."""
 
 COORDINATE: Bounds = {"ge": -1e4, "le": 1e4}
-"""Coordinates of positions in a world [m], and of joints with many turns [rad]."""
+"""Coordinates of positions in a world [m], and of joints with many revolutions [rad]."""
 
 OFFSET: Bounds = {"ge": -100.0, "le": 100.0}
 """Coordinates of places on a link [m]."""

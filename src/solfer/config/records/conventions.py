@@ -10,7 +10,8 @@ from solfer.config.records.record import Record
 from solfer.errors import ConfigError
 from solfer.numerics.rotations import require_rotation
 
-_ENTRY: Bounds = {"ge": -1.001, "le": 1.001}  # of a rotation; rounding is checked with the matrix as a whole
+_ENTRY: Bounds = {"ge": -1.001, "le": 1.001}
+"""Bounds of an entry of a rotation; rounding is checked with the matrix as a whole."""
 
 
 class OrientationRecord(Record):
@@ -87,18 +88,18 @@ class OffsetOrientationRecord(Record):
 
 
 class AnglesRecord(Record):
-    """Order in which a frame is turned about its own axes: 0 is x, 1 is y, 2 is z."""
+    """Order in which a frame is rotated about its own axes: 0 is x, 1 is y, 2 is z."""
 
-    angle_1: Literal[0, 1, 2] = Field(description="axis of the first turn")
-    angle_2: Literal[0, 1, 2] = Field(description="axis of the second turn")
-    angle_3: Literal[0, 1, 2] = Field(description="axis of the third turn")
+    angle_1: Literal[0, 1, 2] = Field(description="axis of the first rotation")
+    angle_2: Literal[0, 1, 2] = Field(description="axis of the second rotation")
+    angle_3: Literal[0, 1, 2] = Field(description="axis of the third rotation")
 
     @model_validator(mode="after")
     def _each_axis_once(self) -> "AnglesRecord":
         if set(self.axes()) != {0, 1, 2}:
-            raise ValueError("three turns that do not use each axis once; expected 0, 1 and 2 in any order")
+            raise ValueError("three rotations that do not use each axis once; expected 0, 1 and 2 in any order")
         return self
 
     def axes(self) -> tuple[int, int, int]:
-        """Return the axes in the order of the turns."""
+        """Return the axes in the order of the rotations."""
         return self.angle_1, self.angle_2, self.angle_3

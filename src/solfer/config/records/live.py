@@ -23,8 +23,6 @@ LIVE: Bounds = {"json_schema_extra": {"live": True}}
 
 Path = tuple[Key, ...]
 
-_LIVE_SCALARS = {float: "number", int: "whole number", bool: "true or false", str: "text"}
-
 
 @dataclass(frozen=True)
 class LiveField:
@@ -52,13 +50,13 @@ class LiveField:
         bounds = dict(_bounds(field.annotation, field.metadata))
         description = field.description or ""
         units = re.findall(r"\[([^\]]+)\]", description)
-        least, most = (
+        minimum, maximum = (
             f"{bounds[near]:g}" if near in bounds else f"{word} {bounds[far]:g}" if far in bounds else ""
             for near, far, word in (("ge", "gt", "above"), ("le", "lt", "below"))
         )
         kinds = " or ".join(dict.fromkeys(_kinds(field.annotation)))
         default = None if field.is_required() else field.get_default(call_default_factory=True)
-        return cls(default, kinds, units[0] if units else "", minimum=least, maximum=most, description=description)
+        return cls(default, kinds, units[0] if units else "", minimum=minimum, maximum=maximum, description=description)
 
 
 def is_live(field: FieldInfo) -> bool:
@@ -211,6 +209,7 @@ def _empty(annotation: Any) -> Record | None:
 def _kinds(annotation: Any) -> Iterator[str]:
     origin = typing.get_origin(annotation)
     inner = typing.get_args(annotation)
+    scalars = {float: "number", int: "whole number", bool: "true or false", str: "text"}
     if origin is typing.Annotated:
         yield from _kinds(inner[0])
     elif origin is typing.Literal:
@@ -224,8 +223,8 @@ def _kinds(annotation: Any) -> Iterator[str]:
         yield "list"
     elif annotation is types.NoneType:
         yield "none"
-    elif annotation in _LIVE_SCALARS:
-        yield _LIVE_SCALARS[annotation]
+    elif annotation in scalars:
+        yield scalars[annotation]
 
 
 def _bounds(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Iterator[tuple[str, Any]]:

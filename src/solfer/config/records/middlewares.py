@@ -52,9 +52,13 @@ _ALL = (
 """Registered middlewares; of each layer the first one counts where the layer alone is known."""
 
 MIDDLEWARES = {kind.name: kind for kind in _ALL}
+"""All of them, by name."""
+
 SECTIONS = tuple(kind.section for kind in _ALL)
-MIDDLEWARE_MAPS = tuple(kind.map for kind in _ALL if kind.map is not None)
-"""Names, sections and maps of all."""
+"""Names of their sections."""
+
+PREDEFINED_MAPS = tuple(kind.map for kind in _ALL if kind.map is not None)
+"""Names of the maps that they give every Robot."""
 
 DEFAULT_MIDDLEWARE = _ALL[0].name
 """The middleware of a configuration that names none, so that its other mistakes are found."""

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from solfer.config.records.bounds import COUNT, DURATION, PATIENCE, RATE
+from solfer.config.records.bounds import COUNT, DURATION, RATE, TIMEOUT
 from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareName
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord
@@ -30,19 +30,19 @@ class MainKeys(Record):
     modules: dict[str, Any] = Field(description="plugin configurations by name")
 
 
-_SECTIONS: dict[str, Any] = {
+_sections: dict[str, Any] = {
     kind.section: (kind.keys, Field(default_factory=kind.keys, description=f"keys for {kind.title} only"))
     for kind in MIDDLEWARES.values()
 }
-MainRecord: type[MainKeys] = create_model("MainRecord", __base__=MainKeys, __doc__=MainKeys.__doc__, **_SECTIONS)
+MainRecord: type[MainKeys] = create_model("MainRecord", __base__=MainKeys, __doc__=MainKeys.__doc__, **_sections)
 """The skeleton with a section for each middleware."""
 
 
 class OverloadRecord(Record):
     """When a loop is overloaded: motions slow down then, and rest before the robot is lost."""
 
-    left_out: float = Field(default=0.1, ge=0.01, le=0.5, description="share of the periods of a second left out")
-    age: float = Field(default=0.05, **PATIENCE, description="age of what is measured of the robot [s]")
+    left_out: float = Field(default=0.1, ge=0.01, le=0.5, description="fraction of the periods of a second left out")
+    age: float = Field(default=0.05, **TIMEOUT, description="age of what is measured of the robot [s]")
 
 
 class BaseJumpRecord(Record):
@@ -71,7 +71,7 @@ class ModuleRecord(Record):
     )
     stall: float | None = Field(
         default=None,
-        **PATIENCE,
+        **TIMEOUT,
         description="lateness of its own loop at which the plugin holds, forgets its requests and starts again "
         "[s]; left out: 0.2, or 5 periods if these are longer; never longer than the `timeout` of a feedback",
     )
@@ -113,8 +113,8 @@ class SharedRecord(Record):
         default=None,
         ge=0.01,
         le=1,
-        description="share of the period that each component may take under ROS, where an RT layer has its `executor`; "
-        "left out: as long as it likes",
+        description="fraction of the period that each component may take under ROS, where an RT layer has its "
+        "`executor`; left out: as long as it likes",
     )
     overruns: int = Field(
         default=20, ge=1, le=1_000_000, description="overruns of it, not forgiven, at which the component is stopped"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from solfer.config.records.bounds import PATIENCE
+from solfer.config.records.bounds import TIMEOUT
 from solfer.config.records.conventions import (
     AnglesRecord,
     ConventionRecord,
@@ -215,7 +215,7 @@ class FeedbackRecord(PipeRecord):
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
     timeout: float | None = Field(
         default=None,
-        **PATIENCE,
+        **TIMEOUT,
         description="age of the newest message above which a cycle is a strike [s]; left out: 0.2, or 5 periods of the "
         "plugin if these are longer",
     )
@@ -248,7 +248,7 @@ class FeedbackRecord(PipeRecord):
     offset_orientation: OffsetOrientationRecord | None = Field(
         default=None, description="rotation from the sensor to its link, in addition to the URDF"
     )
-    output_angles: AnglesRecord | None = Field(default=None, description="order of the turns of Euler angles")
+    output_angles: AnglesRecord | None = Field(default=None, description="order of the rotations of Euler angles")
     calibrate: bool = Field(
         default=False,
         description="OPERATIONAL: whether heading and position of the first message are those that the State has then, "
@@ -292,7 +292,7 @@ class FeedbackRecord(PipeRecord):
 
     @property
     def of_plugins(self) -> bool:
-        """Whether it carries what other plugins want, and nothing that is measured."""
+        """Whether it carries what other plugins request, and nothing that is measured."""
         return not self.measures and not self.content.contacts
 
     @property

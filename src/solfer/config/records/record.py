@@ -10,12 +10,12 @@ from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 
-from solfer.config.records.validation_errors import complain
+from solfer.config.records.validation_errors import note_errors
 from solfer.config.yaml.files import read_node
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 RecordType = TypeVar("RecordType", bound="Record")
 
@@ -82,7 +82,7 @@ def read(path: str | os.PathLike, record: type[RecordType], root: Iterable[Key] 
     problems = Problems()
     node = read_node(path, problems, tuple(root))
     parsed = parse(node, record, problems)
-    problems.log(_LOG)
+    problems.log(logger)
     problems.raise_if_any()
     return parsed
 
@@ -118,7 +118,7 @@ def parse(
     try:
         parsed = record.model_validate_json(json.dumps(_without_empty(data, record)))
     except ValidationError as error:
-        complain(error, node, record, problems=problems, also=also, beside=beside)
+        note_errors(error, node, record, problems=problems, also=also, beside=beside)
         return None
     _attach(parsed, node, problems)
     return parsed

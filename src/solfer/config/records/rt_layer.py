@@ -52,7 +52,7 @@ class ExecutorRecord(Record):
     rate: float | None = Field(default=None, **RATE, description="cycles a second [Hz]; left out: that of the layer RT")
     start: tuple[str, ...] = Field(default=(), description="plugins that start by themselves, at the first cycle")
     blend: float = Field(default=2.0, **DURATION, description="shortest time in which commands blend in at a start [s]")
-    budget: float = Field(default=0.5, ge=0.01, le=1, description="share of the period that a component may take")
+    budget: float = Field(default=0.5, ge=0.01, le=1, description="fraction of the period that a component may take")
     overruns: int = Field(
         default=20, ge=1, le=1_000_000, description="overruns, not forgiven, at which the plugin or the loop is stopped"
     )

@@ -12,7 +12,7 @@ from solfer.config.yaml.nodes import Key, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
 
-_PYDANTIC_EXPECTED = {
+_EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
     "int_type": "a whole number",
@@ -44,11 +44,7 @@ _PYDANTIC_EXPECTED = {
 }
 
 
-_ALIKE = 0.75
-"""Likeness of two keys, of 1, from which one is taken for the other, misspelt."""
-
-
-def complain(
+def note_errors(
     error: ValidationError,
     node: YamlNode,
     record: type[BaseModel],
@@ -91,11 +87,12 @@ def complain(
                 also=also if len(path) == 1 else (),
             )
         else:
-            _complain_at(node, path, items, record=record, problems=problems)
+            _note_at(node, path, items, record=record, problems=problems)
 
 
 def _like(key: Key, others: list[str]) -> list[str]:
-    return difflib.get_close_matches(str(key), others, n=1, cutoff=_ALIKE)
+    """Return the one of other keys that is taken for this one, misspelt."""
+    return difflib.get_close_matches(str(key), others, n=1, cutoff=0.75)
 
 
 def _misspelt(key: str, beside: YamlNode, problems: Problems) -> bool:
@@ -119,7 +116,7 @@ def _unknown_key(
     problems.unknown(place, "key", key, [*keys, *also])
 
 
-def _complain_at(
+def _note_at(
     node: YamlNode, path: tuple[Key, ...], items: list[ErrorDetails], record: type[BaseModel], problems: Problems
 ) -> None:
     """Note the error at one place; several items are the alternatives of a union."""
@@ -140,8 +137,8 @@ def _complain_at(
 
 
 def _expected(item: ErrorDetails) -> str:
-    if item["type"] in _PYDANTIC_EXPECTED:
-        return _PYDANTIC_EXPECTED[item["type"]].format(**item.get("ctx", {}))
+    if item["type"] in _EXPECTED:
+        return _EXPECTED[item["type"]].format(**item.get("ctx", {}))
     if item["type"] == "missing":
         return "a longer list"
     words = item["msg"].removeprefix("Input should be ")

@@ -12,16 +12,6 @@ from solfer.config.records.pipes import CONTROLLER_ALIASES, ControllerRecord, Fe
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
 
-_GIVEN: dict[type[Record], tuple[str, ...]] = {
-    RobotRecord: ("name", "configuration"),
-    **dict.fromkeys((CalibrationRecord, PipeRecord, MappingRecord, ModuleRecord, SharedRecord), ("name",)),
-}
-"""Fields that the loader fills in from the key above a record, so that no file contains them."""
-
-_OR_TEXT = (FileRecord.__name__, TextRecord.__name__)  # a bare text stands for their main key
-_NAMES = {"type": "array", "items": {"type": "string"}}
-_SET = {"anyOf": [_NAMES, {"type": "object", "properties": {"list": _NAMES}, "additionalProperties": False}]}
-
 Schema = dict[str, Any]
 
 
@@ -47,10 +37,12 @@ def schema(tags: Mapping[str, type[Record]]) -> Schema:
         "mapping": _map_of(records.schema_of(MappingRecord)),
         **pipes,
     }
+    names = {"type": "array", "items": {"type": "string"}}
+    pipe_set = {"anyOf": [names, {"type": "object", "properties": {"list": names}, "additionalProperties": False}]}
     sections = {
         "robot": {**robot, "additionalProperties": records.schema_of(RobotRecord)},
-        "feedbacks": _map_of(_SET),
-        "controllers": _map_of(_SET),
+        "feedbacks": _map_of(pipe_set),
+        "controllers": _map_of(pipe_set),
         **pipes,
         "calibration": _map_of(records.schema_of(CalibrationRecord)),
         **dict.fromkeys(SECTIONS, {"type": "object", "properties": middleware, "additionalProperties": False}),
@@ -79,8 +71,11 @@ def _united(components: Iterable[Schema]) -> Schema:
 
 
 def given(record: type[Record]) -> tuple[str, ...]:
-    """Return the fields of a record that the loader fills in."""
-    return next((fields for base, fields in _GIVEN.items() if issubclass(record, base)), ())
+    """Return the fields that the loader fills in from the key above a record, so that no file contains them."""
+    if issubclass(record, RobotRecord):
+        return ("name", "configuration")
+    named = (CalibrationRecord, PipeRecord, MappingRecord, ModuleRecord, SharedRecord)
+    return ("name",) if issubclass(record, named) else ()
 
 
 def _others(direction: str) -> list[type[PipeRecord]]:
@@ -128,7 +123,8 @@ def _as_read(name: str, made: Schema) -> Schema:
         words.append("SKIP")
     for words in _words(properties.get("type", {})):
         words += ["", *CONTROLLER_ALIASES] if "impedance" in words else ()
-    return {"anyOf": [{"type": "string"}, made]} if name in _OR_TEXT else made
+    is_text = name in (FileRecord.__name__, TextRecord.__name__)  # a bare text stands for their main key
+    return {"anyOf": [{"type": "string"}, made]} if is_text else made
 
 
 def _words(key: Schema) -> Iterator[list[str]]:

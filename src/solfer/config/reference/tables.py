@@ -33,28 +33,6 @@ def _kinds() -> Iterator[tuple[str, type[Record]]]:
             yield f"{kind.title}: {words} in `feedback.NAME` and `controller.NAME`", kind.tags
 
 
-_SECTIONS: Sections = (
-    ("Top level", MainRecord),
-    ("`robot`", RobotHead),
-    ("`robot.NAME`", RobotRecord),
-    ("`feedback.NAME`", FeedbackRecord),
-    ("`controller.NAME`", ControllerRecord),
-    *_kinds(),
-    ("`calibration.NAME`", CalibrationRecord),
-    (", ".join(f"`{section}.source`" for section in SECTIONS), SourceRecord),
-    (", ".join(f"`{section}.mapping.NAME`" for section in SECTIONS), MappingRecord),
-    ("`modules.NAME`", ModuleRecord),
-    ("`modules.shared`, and every module with `plugins`", SharedRecord),
-)
-_RT_SECTIONS: Sections = (
-    ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", RtPluginsRecord),
-    ("RT layer: `executor`", ExecutorRecord),
-)
-_TABLE_SCALARS = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`", Any: "any"}
-_FILE = "file: a path, or `path` and `file`"
-_TEXT = "parameter's name, or `file` (and `path`)"
-
-
 def reference(tags: Mapping[str, type[Record]], files: Sections = ()) -> str:
     """Write Markdown: one table for each section, for the own tags of each component, and for other files.
 
@@ -63,7 +41,23 @@ def reference(tags: Mapping[str, type[Record]], files: Sections = ()) -> str:
         files: Titles and records of files beside a main configuration.
     """
     components = ((f"Tags of the component `{name}`", record) for name, record in tags.items())
-    sections = (*_SECTIONS, *components, *_RT_SECTIONS, *files)
+    sections: Sections = (
+        ("Top level", MainRecord),
+        ("`robot`", RobotHead),
+        ("`robot.NAME`", RobotRecord),
+        ("`feedback.NAME`", FeedbackRecord),
+        ("`controller.NAME`", ControllerRecord),
+        *_kinds(),
+        ("`calibration.NAME`", CalibrationRecord),
+        (", ".join(f"`{section}.source`" for section in SECTIONS), SourceRecord),
+        (", ".join(f"`{section}.mapping.NAME`" for section in SECTIONS), MappingRecord),
+        ("`modules.NAME`", ModuleRecord),
+        ("`modules.shared`, and every module with `plugins`", SharedRecord),
+        *components,
+        ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", RtPluginsRecord),
+        ("RT layer: `executor`", ExecutorRecord),
+        *files,
+    )
     return "\n".join(line for title, record in sections for line in _section(title, record))
 
 
@@ -142,8 +136,10 @@ def _bounds(metadata: Iterable[Any]) -> str:
 def _value(annotation: Any) -> str:
     origin = typing.get_origin(annotation)
     inner = typing.get_args(annotation)
-    if annotation in (FileRecord, TextRecord):
-        return _FILE if annotation is FileRecord else _TEXT
+    if annotation is FileRecord:
+        return "file: a path, or `path` and `file`"
+    if annotation is TextRecord:
+        return "parameter's name, or `file` (and `path`)"
     if origin is typing.Annotated:
         return _value(inner[0]) + "".join(_bounds(part.metadata) for part in inner[1:] if isinstance(part, FieldInfo))
     if origin is typing.Literal:
@@ -155,7 +151,8 @@ def _value(annotation: Any) -> str:
         return f"list{count}: {_value(inner[0])}"
     if inner:  # a union, or an annotated type
         return " or ".join(dict.fromkeys(_value(part) for part in inner if part is not type(None)))
-    return _TABLE_SCALARS.get(annotation, str(annotation))
+    scalars = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`", Any: "any"}
+    return scalars.get(annotation, str(annotation))
 
 
 def _default(field: FieldInfo) -> str:

@@ -10,14 +10,16 @@ from solfer.config.records.record import Record
 Weight = Annotated[float, Field(gt=0.0, le=1e9)]
 """Weight of a violation's square beside the tasks of the first level."""
 
-_WEIGHT = "weight of a violation's square beside the tasks of the first level; left out: violations are forbidden"
+_WEIGHT_MEANING = (
+    "weight of a violation's square beside the tasks of the first level; left out: violations are forbidden"
+)
 
 
 class TorqueLimitsRecord(Record):
     """Joint torques that the drives can give within one period; a QP alone keeps them."""
 
-    scale: float = Field(default=1.0, ge=1e-3, le=1.0, description="share of the robot's torque limits")
-    weight: Weight | None = Field(default=None, description=_WEIGHT)
+    scale: float = Field(default=1.0, ge=1e-3, le=1.0, description="fraction of the robot's torque limits")
+    weight: Weight | None = Field(default=None, description=_WEIGHT_MEANING)
 
 
 class WorkspaceRecord(Record):
@@ -29,9 +31,9 @@ class WorkspaceRecord(Record):
         min_length=1,
         description="link or frame that it is near to, a group of one for each, or `world`",
     )
-    nearest: float = Field(default=0.0, ge=0.0, le=1e4, description="least distance [m]")
+    nearest: float = Field(default=0.0, ge=0.0, le=1e4, description="smallest distance [m]")
     farthest: float = Field(default=1e4, gt=0.0, le=1e4, description="largest distance [m]")
-    weight: Weight | None = Field(default=None, description=_WEIGHT)
+    weight: Weight | None = Field(default=None, description=_WEIGHT_MEANING)
 
     @model_validator(mode="after")
     def _check(self) -> "WorkspaceRecord":
@@ -45,12 +47,12 @@ class WorkspaceRecord(Record):
 class CollisionsRecord(Record):
     """Distances of links that may touch each other: all but those that the SRDF leaves out; a QP alone keeps them."""
 
-    distance: float = Field(default=0.02, ge=0.0, le=10.0, **LIVE, description="least distance [m]")
+    distance: float = Field(default=0.02, ge=0.0, le=10.0, **LIVE, description="smallest distance [m]")
     influence: float = Field(default=0.1, gt=0.0, le=10.0, description="distance below which two links count [m]")
     pairs: tuple[Annotated[tuple[str, ...], Field(min_length=2, max_length=2)], ...] | None = Field(
         default=None, min_length=1, description="pairs of links, or of groups; left out: all that may touch"
     )
-    weight: Weight | None = Field(default=None, description=_WEIGHT)
+    weight: Weight | None = Field(default=None, description=_WEIGHT_MEANING)
 
     @model_validator(mode="after")
     def _check(self) -> "CollisionsRecord":
@@ -64,7 +66,7 @@ class StackLimitsRecord(Record):
 
     joints: bool = Field(default=True, description="whether joints stay in their ranges")
     speeds: bool = Field(default=True, description="whether joints stay below their largest speeds")
-    speed_scale: float = Field(default=1.0, ge=1e-3, le=1.0, **LIVE, description="share of the largest speeds")
+    speed_scale: float = Field(default=1.0, ge=1e-3, le=1.0, **LIVE, description="fraction of the largest speeds")
     horizon: float | None = Field(
         default=None,
         ge=1e-4,

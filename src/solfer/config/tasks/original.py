@@ -14,21 +14,10 @@ from solfer.config.tasks.limits import StackLimitsRecord, WorkspaceRecord
 from solfer.config.tasks.stack import Gain, StackRecord, TaskRecord
 from solfer.errors import ConfigError, UnknownName
 
-_LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
-ARMS = "ARMS"
-"""Task of the hands."""
-
-HAND_REACH = math.sqrt(0.53)
-"""Largest distance of a hand from its base [m]: the original limits its square, to a number in its code."""
-
-QP_GAIN = 2.0
-"""How much faster tasks of the original's QPs are than their gain says: their cost has 1/2 x'Hx, but 2 J'Ke."""
-
-_TAIL = "_DAMP"
-_IDLE = ("ratio", "COP")
+_DAMPING_SUFFIX = "_DAMP"
 Solver = Literal["null_spaces", "qp"]
-_KINDS: dict[str, Solver] = {"": "null_spaces", "ns": "null_spaces", "qp": "qp", "qA": "qp"}
 
 
 class OriginalTaskTags(Record):
@@ -71,7 +60,7 @@ class OriginalStackTags(OriginalTaskTags):
 def parts_of_tuning(tags: OriginalTaskTags, record: StackRecord) -> list[str]:
     """List the gains and dampings of the tuning that counts, of tasks of `record`, which was made of the tags."""
     gains = (tags.tunnings or {}).get(str(tags.tunning), {})
-    return [name for name in gains if name == "damping" or name.removesuffix(_TAIL) in record.tasks]
+    return [name for name in gains if name == "damping" or name.removesuffix(_DAMPING_SUFFIX) in record.tasks]
 
 
 def hands(tags: OriginalStackTags) -> StackRecord:
@@ -88,9 +77,10 @@ def hands(tags: OriginalStackTags) -> StackRecord:
     task = TaskRecord(point="position", link=tags.track, **seen)
     limits = StackLimitsRecord()
     if tags.workspace_init is not None:
-        workspace = WorkspaceRecord(link=tags.track, relative=tags.workspace_init, farthest=HAND_REACH).placed_as(tags)
-        limits = StackLimitsRecord(workspace={ARMS: workspace})
-    return translated(tags, {ARMS: task}, limits=limits, chain=tags.chain)
+        reach = math.sqrt(0.53)  # [m] of a hand from its base; the original limits its square
+        workspace = WorkspaceRecord(link=tags.track, relative=tags.workspace_init, farthest=reach).placed_as(tags)
+        limits = StackLimitsRecord(workspace={"ARMS": workspace})
+    return translated(tags, {"ARMS": task}, limits=limits, chain=tags.chain)
 
 
 def translated(
@@ -118,7 +108,8 @@ def translated(
     """
     levels, solver = _levels(tags, known, sums or {})
     gains = _tuning(tags, known)
-    factor, damping = (QP_GAIN, math.sqrt) if solver == "qp" else (1.0, float)
+    # the cost of the original's QPs has 1/2 x'Hx, but 2 J'Ke
+    factor, damping = (2.0, math.sqrt) if solver == "qp" else (1.0, float)
     tasks = {}
     for name in dict.fromkeys(name for level in levels for name in level):
         if name not in gains:
@@ -128,12 +119,12 @@ def translated(
                 expected=f"a number or a list of them as '{name}'",
             )
         gain = gains[name]
-        damp = gains.get(name + _TAIL, gains.get("damping"))
+        damp = gains.get(name + _DAMPING_SUFFIX, gains.get("damping"))
         if not isinstance(damp, float) or damp <= 0.0:
             raise ConfigError(
                 f"the tuning '{tags.tunning}' has no damping of '{name}'",
                 where=tags.where("tunnings", str(tags.tunning)),
-                expected=f"a positive number as 'damping' or '{name}{_TAIL}'",
+                expected=f"a positive number as 'damping' or '{name}{_DAMPING_SUFFIX}'",
             )
         doubled = tuple(factor * each for each in gain) if isinstance(gain, tuple) else factor * gain
         own = {"gain": doubled, "damping": damping(damp)} | ({"dofs": (chain,)} if chain else {})
@@ -146,14 +137,15 @@ def _levels(
     tags: OriginalTaskTags, known: Mapping[str, TaskRecord], sums: Mapping[str, Sequence[str]]
 ) -> tuple[tuple[tuple[str, ...], ...], Solver]:
     """Read `IK`: the names of the tasks of each level, and the solver."""
+    solver_of: dict[str, Solver] = {"": "null_spaces", "ns": "null_spaces", "qp": "qp", "qA": "qp"}
     levels = []
     solvers = []
     for index, entry in enumerate(tags.ik or ()):
         kind, _, name = entry.rpartition("::")
         where = tags.where("IK", index)
-        if kind not in _KINDS:
-            raise UnknownName("kind of a task", kind, [one for one in _KINDS if one], where=where)
-        solvers.append(_KINDS[kind])
+        if kind not in solver_of:
+            raise UnknownName("kind of a task", kind, [one for one in solver_of if one], where=where)
+        solvers.append(solver_of[kind])
         if kind == "qA" and name not in sums:
             raise UnknownName("sum of tasks", name, sums, where=where)
         names = tuple(sums[name]) if kind == "qA" else (name,)
@@ -174,10 +166,10 @@ def _tuning(tags: OriginalTaskTags, known: Mapping[str, TaskRecord]) -> Mapping[
     if tags.tunning is None or tags.tunning not in tunings:
         raise UnknownName("tuning", str(tags.tunning or ""), tunings, where=tags.where("tunning"))
     gains = tunings[tags.tunning]
-    names = ["damping", *known, *(name + _TAIL for name in known)]
+    names = ["damping", *known, *(name + _DAMPING_SUFFIX for name in known)]
     for name in gains:
-        if name in _IDLE:
-            _LOG.warning("%s: has no effect: nothing reads it, in the original neither", _place(tags, name))
+        if name in ("ratio", "COP"):
+            logger.warning("%s: has no effect: nothing reads it, in the original neither", _place(tags, name))
         elif name not in names:
             raise UnknownName("task of a tuning", name, names, where=_place(tags, name))
     return gains

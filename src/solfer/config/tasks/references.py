@@ -7,13 +7,13 @@ from pydantic import Field, model_validator
 from solfer.config.records.bounds import COORDINATE, DIRECTION
 from solfer.config.records.record import Record
 
-QUATERNION_BOUNDS = {"ge": -1.0, "le": 1.0}
-"""Bounds of a number of a quaternion."""
+KINDS = ("circle", "line", "sine", "waypoints", "file")
+"""Kinds of references."""
 
 Period = Annotated[float, Field(ge=0.05, le=3600.0)]
 Place = Annotated[tuple[Annotated[float, Field(**COORDINATE)], ...], Field(min_length=3, max_length=3)]
 Normal = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]
-Quaternion = Annotated[tuple[Annotated[float, Field(**QUATERNION_BOUNDS)], ...], Field(min_length=4, max_length=4)]
+Quaternion = Annotated[tuple[Annotated[float, Field(ge=-1.0, le=1.0)], ...], Field(min_length=4, max_length=4)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
 
 
@@ -21,7 +21,7 @@ class CircleReferenceRecord(Record):
     """A circle that begins where the reference is, and goes along the first axis of its plane's second."""
 
     radius: float = Field(gt=0.0, le=100.0, description="radius [m]")
-    period: Period = Field(description="time of a turn [s]")
+    period: Period = Field(description="time of a revolution [s]")
     plane: Literal["xy", "yx", "xz", "zx", "yz", "zy"] | None = Field(
         default=None, description="two axes: the centre is at minus the first, the motion begins along the second"
     )
@@ -29,7 +29,7 @@ class CircleReferenceRecord(Record):
         default=None, description="instead of `plane`: the axis about which it turns, of any length"
     )
     turns: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
-        default=None, description="number of turns; left out: without end"
+        default=None, description="number of revolutions; left out: without end"
     )
 
     @model_validator(mode="after")
@@ -99,10 +99,10 @@ class ReferenceRecord(Record):
 
     @model_validator(mode="after")
     def _check(self) -> "ReferenceRecord":
-        given = [kind for kind in REFERENCE_KINDS if getattr(self, kind) is not None]
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
         if len(given) != 1:
             has = " and ".join(f"'{kind}'" for kind in given) or "no kind"
-            raise ValueError(f"a reference with {has}; expected one of {', '.join(REFERENCE_KINDS)}")
+            raise ValueError(f"a reference with {has}; expected one of {', '.join(KINDS)}")
         if self.absolute and given[0] in ("circle", "sine"):
             raise ValueError(f"a {given[0]} begins where the reference is; expected no 'absolute'")
         return self
@@ -110,11 +110,7 @@ class ReferenceRecord(Record):
     @property
     def kind(self) -> str:
         """Which of its kinds it is."""
-        return next(kind for kind in REFERENCE_KINDS if getattr(self, kind) is not None)
-
-
-REFERENCE_KINDS = ("circle", "line", "sine", "waypoints", "file")
-"""Kinds of references."""
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
 
 class ReferencesRecord(Record):

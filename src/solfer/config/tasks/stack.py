@@ -24,11 +24,6 @@ KINDS: dict[str, tuple[str, ...]] = {
 }
 """What a task may move, and the keys that each kind has beside those of all tasks."""
 
-REFERRED = ("position", "orientation", "pose", "center_of_mass", "posture")
-"""What may have a reference that needs no program."""
-
-_POINT_SPECIAL = ("link", "offset", "relative", "axes", "axis", "target")
-
 Row = Literal["x", "y", "z", "rx", "ry", "rz"] | Annotated[int, Field(ge=0, le=999)]
 Gain = Annotated[float, Field(ge=0.0, le=1e4)]
 Rate = Annotated[float, Field(ge=-1e4, le=1e4)]
@@ -38,7 +33,7 @@ Name = Annotated[str, Field(min_length=1)]
 Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
 Axis = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]
 Place = Annotated[tuple[Coordinate, ...], Field(min_length=3, max_length=3)]
-Turn = Annotated[tuple[Annotated[float, Field(ge=-1e3, le=1e3)], ...], Field(min_length=4, max_length=4)]
+Quaternion = Annotated[tuple[Annotated[float, Field(ge=-1e3, le=1e3)], ...], Field(min_length=4, max_length=4)]
 
 
 class FrameRecord(Record):
@@ -49,7 +44,7 @@ class FrameRecord(Record):
     )
     link: str = Field(min_length=1, description="the link; for `wheel` that of a wheel among the robot's contacts")
     offset: Offset = Field(default=(0.0, 0.0, 0.0), description="link: origin in the frame of the link [m]")
-    orientation: Turn = Field(
+    orientation: Quaternion = Field(
         default=(0.0, 0.0, 0.0, 1.0), description="link: quaternion (x, y, z, w) from the frame to the link"
     )
     height: float = Field(default=0.0, **COORDINATE, description="ground: its height in the world [m]")
@@ -115,13 +110,14 @@ class TaskRecord(Record):
     @model_validator(mode="after")
     def _check(self) -> "TaskRecord":
         if self.point in KINDS:
-            for key in _POINT_SPECIAL:
+            for key in ("link", "offset", "relative", "axes", "axis", "target"):
                 if key in self.model_fields_set and key not in KINDS[self.point]:
                     raise ValueError(f"a task on '{self.point}' has no '{key}'; expected a task without it")
             if "link" in KINDS[self.point] and self.link is None:
                 raise ValueError(f"a task on '{self.point}' needs the key 'link'")
-        if isinstance(self.reference, ReferenceRecord) and self.point not in REFERRED:
-            raise ValueError(f"a reference that moves, of '{self.point}'; expected one of {', '.join(REFERRED)}")
+        movable = ("position", "orientation", "pose", "center_of_mass", "posture")
+        if isinstance(self.reference, ReferenceRecord) and self.point not in movable:
+            raise ValueError(f"a reference that moves, of '{self.point}'; expected one of {', '.join(movable)}")
         if "axes" in self.model_fields_set and self.relative is None:
             raise ValueError("'axes' without 'relative'; expected both")
         return self

@@ -12,8 +12,6 @@ from solfer.config.yaml.problems import Problems
 from solfer.errors import ConfigError, nearest
 from solfer.files import read_bytes
 
-_FILE_IN_PACKAGE = re.compile(r"(?:package://([^/]*)|\$\(find ([^)]*)\))/*(.*)", re.DOTALL)
-
 
 @dataclass(frozen=True, eq=False)
 class YamlFile:
@@ -92,7 +90,7 @@ def located(text: str, folder: str | os.PathLike, where: str = "") -> Path:
         UnknownName: There is no such package; `where` is the place that named it.
         MissingDependency: It is looked for, and ROS is not here.
     """
-    match = _FILE_IN_PACKAGE.fullmatch(text)
+    match = re.fullmatch(r"(?:package://([^/]*)|\$\(find ([^)]*)\))/*(.*)", text, re.DOTALL)
     if match is None:
         return Path(os.path.normpath(os.path.join(folder, text)))
     return Path(os.path.normpath(os.path.join(package_folder(match[1] or match[2] or "", where), match[3])))

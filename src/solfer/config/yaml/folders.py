@@ -8,11 +8,6 @@ from pathlib import Path
 from solfer.config.yaml.packages import workspace_packages
 from solfer.errors import ConfigError
 
-EXPECTED = "a .yaml file below a folder that is allowed, or package://NAME/... of this workspace"
-
-_IN_PACKAGE = re.compile(r"package://([^/]+)/+([^/]+)/+.+", re.DOTALL)
-_PACKAGE_LONGEST = 4096  # characters of a path
-
 
 class Folders:
     """The YAML files below some folders, and those of the packages of this workspace.
@@ -52,13 +47,16 @@ class Folders:
         path = self._found(text)
         if path is None:
             shown = text if len(text) <= 200 else f"{text[:200]}..."
-            raise ConfigError(f"'{shown}' is not a file that may be read", expected=EXPECTED)
+            raise ConfigError(
+                f"'{shown}' is not a file that may be read",
+                expected="a .yaml file below a folder that is allowed, or package://NAME/... of this workspace",
+            )
         return Path(path)
 
     def _found(self, text: str) -> str | None:
-        if len(text) > _PACKAGE_LONGEST or "\0" in text or not text.endswith((".yaml", ".yml")):
+        if len(text) > 4096 or "\0" in text or not text.endswith((".yaml", ".yml")):
             return None
-        in_package = _IN_PACKAGE.fullmatch(text)
+        in_package = re.fullmatch(r"package://([^/]+)/+([^/]+)/+.+", text, re.DOTALL)
         if in_package is None:
             return _below(text, self._roots) if os.path.isabs(text) else None
         package = self._workspace().get(in_package[1])

@@ -9,22 +9,6 @@ from solfer.config.yaml.problems import Problems
 
 Path = tuple[Key, ...]
 
-_REPLACED: tuple[Path, ...] = (
-    ("layers", "*"),
-    ("robot", "systems", "*"),
-    ("feedbacks", "*"),
-    ("controllers", "*"),
-    *((middleware, "source", "*") for middleware in SECTIONS),
-    *((middleware, "mapping", "*", "urdf") for middleware in SECTIONS),
-)
-"""Paths where the grammar allows a map or something else; the later one replaces the earlier one whole."""
-
-_EXCLUSIVE: tuple[tuple[Path, frozenset[str]], ...] = (
-    (("robot", "*", "feedback"), frozenset(("layer", "list"))),
-    *(((middleware, "source", "*"), frozenset(("parameter", "file"))) for middleware in SECTIONS),
-)
-"""Keys of which a map contains one; the later one replaces the map with the other one."""
-
 
 def overlaid(parts: Iterable[YamlNode | None], problems: Problems) -> YamlNode | None:
     """Lay parts of a configuration over each other in their order, as `merge` does; None if all of them are None.
@@ -59,14 +43,32 @@ def merge(base: YamlNode, over: YamlNode, problems: Problems, path: Path = ()) -
     maps = isinstance(base.value, dict), isinstance(over.value, dict)
     if all(maps):
         return _merge_maps(base, over, problems, path=path)
-    if any(maps) and not any(_matches(path, pattern) for pattern in _REPLACED):
+    if any(maps) and not _is_replaced(path):
         problems.add(over.mark, f"{over.kind} cannot replace {base.kind}", f"what {base.mark} has")
         return base
     return over
 
 
+def _is_replaced(path: Path) -> bool:
+    """Return whether the grammar allows a map or something else at a path, so that the later one replaces the other."""
+    patterns: tuple[Path, ...] = (
+        ("layers", "*"),
+        ("robot", "systems", "*"),
+        ("feedbacks", "*"),
+        ("controllers", "*"),
+        *((middleware, "source", "*") for middleware in SECTIONS),
+        *((middleware, "mapping", "*", "urdf") for middleware in SECTIONS),
+    )
+    return any(_matches(path, pattern) for pattern in patterns)
+
+
 def _merge_maps(base: YamlNode, over: YamlNode, problems: Problems, path: Path) -> YamlNode:
-    for pattern, names in _EXCLUSIVE:
+    # keys of which a map contains one; the later one replaces the map with the other one
+    exclusive: tuple[tuple[Path, frozenset[str]], ...] = (
+        (("robot", "*", "feedback"), frozenset(("layer", "list"))),
+        *(((middleware, "source", "*"), frozenset(("parameter", "file"))) for middleware in SECTIONS),
+    )
+    for pattern, names in exclusive:
         if _matches(path, pattern) and _chosen(base, names) - _chosen(over, names) and _chosen(over, names):
             return over
     entries = dict(base.items())
@@ -80,4 +82,4 @@ def _chosen(node: YamlNode, names: frozenset[str]) -> set[str]:
 
 
 def _matches(path: Path, pattern: Sequence[Key]) -> bool:
-    return len(path) == len(pattern) and all(want in ("*", got) for got, want in zip(path, pattern, strict=True))
+    return len(path) == len(pattern) and all(each in ("*", key) for key, each in zip(path, pattern, strict=True))

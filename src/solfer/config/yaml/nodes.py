@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 Scalar = bool | int | float | str | None
 Key = str | int
 
-_PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?=: |$)", re.DOTALL)
-
 
 class Mark(NamedTuple):
     """A place in a file; lines and columns count from one.
@@ -26,7 +24,7 @@ class Mark(NamedTuple):
     @classmethod
     def read(cls, text: str) -> "Mark | None":
         """Read what `str` wrote, without the path; None if it is not a place in a file."""
-        match = _PLACE.match(text)
+        match = re.match(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?=: |$)", text, re.DOTALL)
         return None if match is None else cls(match["file"], int(match["line"]), int(match["column"]))
 
     def __str__(self) -> str:

@@ -12,21 +12,20 @@ _CONSTANTS: dict[str, Scalar] = {
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), float("-inf")),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
 }
-_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
-_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
-CORE = "tag:yaml.org,2002:"
-_NUMBER_LONGEST = 18  # characters of an integer that always fit 64 bits; a longer one is a float, or not a number
+"""Words that are neither texts nor numbers of digits."""
 
-_KINDS: dict[str, type | tuple[type, ...]] = {"null": type(None), "bool": bool, "int": int, "float": (int, float)}
+CORE = "tag:yaml.org,2002:"
+"""Begin of YAML's own tags."""
 
 
 def resolve(text: str) -> Scalar:
     """Return the value of a word that stands without quotes."""
     if text in _CONSTANTS:
         return _CONSTANTS[text]
-    if len(text) <= _NUMBER_LONGEST and _INTEGER.fullmatch(text):
+    # 18 characters of an integer always fit 64 bits; a longer one is a float, or not a number
+    if len(text) <= 18 and re.fullmatch(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", text):
         return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
-    return float(text) if _FLOAT.fullmatch(text) else text
+    return float(text) if re.fullmatch(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?", text) else text
 
 
 def tagged(text: str, tag: str) -> Scalar:
@@ -38,9 +37,10 @@ def tagged(text: str, tag: str) -> Scalar:
     kind = tag[len(CORE) :] if tag.startswith(CORE) else tag
     if kind in ("str", "!"):
         return text
-    if kind not in _KINDS:
+    kinds: dict[str, type | tuple[type, ...]] = {"null": type(None), "bool": bool, "int": int, "float": (int, float)}
+    if kind not in kinds:
         raise ValueError(f"unknown tag '{tag}'")
     value = resolve(text)
-    if not isinstance(value, _KINDS[kind]) or (kind != "bool" and isinstance(value, bool)):
+    if not isinstance(value, kinds[kind]) or (kind != "bool" and isinstance(value, bool)):
         raise ValueError(f"'{text}' is not of the tag's kind '!!{kind}'")
     return float(value) if kind == "float" else value

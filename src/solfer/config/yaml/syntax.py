@@ -7,38 +7,8 @@ import yaml
 
 from solfer.errors import ConfigError
 
-_FAULTS = (
-    ("',' or '}'", "", "the map that begins with '{{' in line {begin} goes on",
-     "',' between its entries, '}' at its end"),
-    ("',' or ']'", "", "the list that begins with '[' in line {begin} goes on",
-     "',' between its entries, ']' at its end"),
-    ("mapping values are not allowed", "", "a colon where no key can be",
-     "`key: value` in a line of its own below a line that ends with ':', or quotes around a text with a colon"),
-    ("end of stream", "quoted scalar", "the quote in line {begin} is not closed", "the same quote at its end"),
-    ("expected key", "", "this does not belong to the map that begins in line {begin}",
-     "a key in the column of the others, and nothing behind a value"),
-    ("expected '-'", "", "this does not belong to the list that begins in line {begin}",
-     "'-' in the column of the others"),
-    ("alphabetic or numeric", "alias", "no name behind '*'", "the name of an anchor, or quotes around a text"),
-    ("alphabetic or numeric", "anchor", "no name behind '&'", "letters and digits, or quotes around a text"),
-    ("directive", "", "a line begins with '%'", "quotes around a text that begins with it"),
-    ("cannot start any token", "", "a value begins with {character!r}", "quotes around it"),
-    ("escape", "", "no such escape behind a backslash", "\\\\ for a backslash, or single quotes around the text"),
-    ("<document start>", "", "there is text behind the end of the document", "one document in a file"),
-    ("comment or line break", "", "there is text behind '|' or '>'", "the text in the lines below"),
-    ("node content", "", "there is no value here", "a value between two commas"),
-)  # fmt: skip
-"""Parts of a problem and of its context, what that means, and what would have been right."""
-
-
-_ODD = r"(?:(?![ \t\r\n])\s|[\u200b\u2060\ufeff])"
-"""Characters that look like a blank, or like nothing, and are none for YAML."""
-
 _LINE_END = re.compile(r"\r\n|\r|\n")
 """What ends a line for YAML 1.2; `str.splitlines` knows more."""
-
-_COMMENT_BEGIN = re.compile(r"(?:^|[ \t])#")
-_MISPLACED = re.compile(rf"^[ \t]*({_ODD})|:({_ODD})|({_ODD})\s*$")
 
 
 def odd_blank(text: str, file: str, first: int, last: int) -> ConfigError | None:
@@ -50,8 +20,11 @@ def odd_blank(text: str, file: str, first: int, last: int) -> ConfigError | None
         first: The first line to search, from zero on.
         last: The last line.
     """
+    odd = r"(?:(?![ \t\r\n])\s|[\u200b\u2060\ufeff])"  # looks like a blank, or like nothing, and is none for YAML
+    misplaced = re.compile(rf"^[ \t]*({odd})|:({odd})|({odd})\s*$")
+    comment = re.compile(r"(?:^|[ \t])#")
     for number, line in enumerate(_LINE_END.split(text)[first : last + 1], start=first + 1):
-        found = _MISPLACED.search(_COMMENT_BEGIN.split(line, maxsplit=1)[0])
+        found = misplaced.search(comment.split(line, maxsplit=1)[0])
         if found is not None:
             column = found.start(found.lastindex or 0)
             character = line[column]
@@ -75,7 +48,29 @@ def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
     if odd is not None:
         return odd
     character = written[column : column + 1]
-    for problem, context, what, expected in _FAULTS:
+    # parts of a problem and of its context, what that means, and what would have been right
+    faults = (
+        ("',' or '}'", "", "the map that begins with '{{' in line {begin} goes on",
+         "',' between its entries, '}' at its end"),
+        ("',' or ']'", "", "the list that begins with '[' in line {begin} goes on",
+         "',' between its entries, ']' at its end"),
+        ("mapping values are not allowed", "", "a colon where no key can be",
+         "`key: value` in a line of its own below a line that ends with ':', or quotes around a text with a colon"),
+        ("end of stream", "quoted scalar", "the quote in line {begin} is not closed", "the same quote at its end"),
+        ("expected key", "", "this does not belong to the map that begins in line {begin}",
+         "a key in the column of the others, and nothing behind a value"),
+        ("expected '-'", "", "this does not belong to the list that begins in line {begin}",
+         "'-' in the column of the others"),
+        ("alphabetic or numeric", "alias", "no name behind '*'", "the name of an anchor, or quotes around a text"),
+        ("alphabetic or numeric", "anchor", "no name behind '&'", "letters and digits, or quotes around a text"),
+        ("directive", "", "a line begins with '%'", "quotes around a text that begins with it"),
+        ("cannot start any token", "", "a value begins with {character!r}", "quotes around it"),
+        ("escape", "", "no such escape behind a backslash", "\\\\ for a backslash, or single quotes around the text"),
+        ("<document start>", "", "there is text behind the end of the document", "one document in a file"),
+        ("comment or line break", "", "there is text behind '|' or '>'", "the text in the lines below"),
+        ("node content", "", "there is no value here", "a value between two commas"),
+    )  # fmt: skip
+    for problem, context, what, expected in faults:
         if problem in (error.problem or "") and context in (error.context or ""):
             return ConfigError(
                 f"not YAML: {what.format(begin=begin, character=character)}", where=where, expected=expected

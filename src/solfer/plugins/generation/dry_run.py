@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord, SourceRecord, TextRecord
-from solfer.config.records.middlewares import MIDDLEWARE_MAPS as MIDDLEWARE_MAPS
+from solfer.config.records.middlewares import PREDEFINED_MAPS
 from solfer.config.yaml.files import read_text
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.interfaces.declaration import Declaration
@@ -138,7 +138,7 @@ def _as_source(path: Path) -> TextRecord:
 
 def _maps(configuration: Configuration) -> Iterator[str]:
     """Yield the maps that the Robot of an incomplete configuration gets."""
-    yield from (*MODEL_MAPS, ACTUATED, *MIDDLEWARE_MAPS, *configuration.mappings)
+    yield from (*MODEL_MAPS, ACTUATED, *PREDEFINED_MAPS, *configuration.mappings)
     if any(record.measures_joints for record in configuration.feedbacks):
         yield FEEDBACK_MAP
     for record in configuration.controllers:
