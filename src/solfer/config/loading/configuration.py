@@ -95,8 +95,8 @@ class Configuration:
     def own_topic(self, topic: str) -> str:
         """Return a topic that it publishes to other plugins, under its unique name in a list of plugins.
 
-        Where a list has the configuration again, as `NAME_2`, its topic gets the same number: `wanted_2` for `selects`.
-        A topic with a leading slash stays, since it is meant to be that one.
+        Where a list has the configuration again, as `NAME_2`, its topic gets the same number, such as `desired_2`. A
+        topic with a leading slash stays, since it is meant to be that one.
         """
         return topic if topic.startswith("/") else topic + self.module.name.removeprefix(self.name)
 
