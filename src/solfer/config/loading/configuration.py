@@ -1,6 +1,6 @@
 """The configuration of one plugin, in frozen records."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -178,7 +178,7 @@ def own_tags(module: YamlNode) -> YamlNode:
     return _part(module, lambda key: key not in common)
 
 
-def _part(module: YamlNode, selects) -> YamlNode:
+def _part(module: YamlNode, is_selected: Callable[[str], bool]) -> YamlNode:
     if not isinstance(module.value, dict):
         return module
-    return YamlNode({key: child for key, child in module.items() if selects(key)}, module.mark, module.key)
+    return YamlNode({key: child for key, child in module.items() if is_selected(key)}, module.mark, module.key)
