@@ -240,16 +240,16 @@ class PhysicsEngine(Protocol):
     def step(self) -> None:
         """Advance by STEP."""
 
-    def forget_contacts(self) -> None:
+    def clear_contacts(self) -> None:
         """End the contacts of bodies that are not near each other any more."""
 
-    def keep(self) -> int:
-        """Save where all bodies are, how they move and what touches; for `bring_back` and `forget`."""
+    def save_state(self) -> int:
+        """Save where all bodies are, how they move and what touches; for `restore_state` and `remove_state`."""
 
-    def bring_back(self, kept: int) -> None:
+    def restore_state(self, state: int) -> None:
         """Restore what was saved, even if values have become infinite since; no body may have come or gone."""
 
-    def forget(self, kept: int) -> None:
+    def remove_state(self, state: int) -> None:
         """Drop what was saved."""
 
     def show(self, target: Iterable[float]) -> None:

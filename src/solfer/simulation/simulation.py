@@ -83,7 +83,7 @@ class Simulation:
             self.state = self._make_state()
             self.pushes = Pushes(self.body, self.state.now)
             self.sensors = Sensors(self.state, bundle.equipment)
-            self._begin = self._engine.keep()
+            self._begin = self._engine.save_state()
             self.reset()
             self._engine.show(self.body.position)
         except Exception:
@@ -197,7 +197,7 @@ class Simulation:
 
     def recover(self) -> None:
         """Begin again at rest in the start, after the simulation diverged; see `reset`."""
-        self._engine.bring_back(self._begin)
+        self._engine.restore_state(self._begin)
         self.reset()
 
     def step(self) -> None:
@@ -253,21 +253,21 @@ class Simulation:
 
     def _put(self, posture: np.ndarray, placement: StartPlacement) -> None:
         """Put robot and world where they begin; if that is impossible they stay where they are."""
-        before = self._engine.keep()
+        before = self._engine.save_state()
         try:
             self.body.place(posture, (0.0, 0.0, 500.0))  # where nothing is
             self.world.scatter()
-            self._engine.forget_contacts()
+            self._engine.clear_contacts()
             self.world.reset()
             if self.floating:
                 put(self.body, self.world, posture, placement=placement)
             else:
                 fix(self.body, self.world, posture)
         except SimulationError:
-            self._engine.bring_back(before)
+            self._engine.restore_state(before)
             raise
         finally:
-            self._engine.forget(before)
+            self._engine.remove_state(before)
 
     def _remember(self) -> None:
         """Keep the state in which a step begins."""

@@ -14,11 +14,11 @@ from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.scene import ContactForce, SceneState
 from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, SetParameters
 from solfer.view.columns import PlottedColumns
-from solfer.view.control import PageControl
+from solfer.view.commands.control import PageControl
+from solfer.view.commands.parameters import KnownParameters
+from solfer.view.commands.requests import PageRequests
 from solfer.view.drawing import FORCE_COLOR, FORCE_SCALE
 from solfer.view.foxglove_relay import FOXGLOVE, FoxgloveRelay
-from solfer.view.parameters import KnownParameters
-from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer, quiet_logger
 
 try:

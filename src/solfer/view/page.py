@@ -9,15 +9,15 @@ from solfer.model.urdf.description import Description
 from solfer.scene import SceneState
 from solfer.transport import Middleware
 from solfer.view.columns import LiveColumns
-from solfer.view.control import PageControl
+from solfer.view.commands.control import PageControl
+from solfer.view.commands.emergency_stop import EmergencyStopButton
+from solfer.view.commands.parameters import KnownParameters
+from solfer.view.commands.plugin_tabs import PluginTabs
+from solfer.view.commands.requests import PageRequests
 from solfer.view.drawing import SceneDrawing
-from solfer.view.emergency_stop import EmergencyStopButton
 from solfer.view.freshness import Freshness
-from solfer.view.parameters import KnownParameters
 from solfer.view.playback import Playback
 from solfer.view.plots import Plots
-from solfer.view.plugin_tabs import PluginTabs
-from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 from solfer.view.time_line import TimeLine
 

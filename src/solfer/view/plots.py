@@ -6,8 +6,8 @@ import numpy as np
 from viser import GuiApi, GuiUplotHandle, uplot
 
 from solfer.view.columns import PlottedColumns
+from solfer.view.commands.requests import PageRequests
 from solfer.view.incoming import IncomingMessages
-from solfer.view.requests import PageRequests
 
 COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf")
 """Of the columns of a plot, which has as many at most."""

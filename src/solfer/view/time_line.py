@@ -4,8 +4,8 @@ import math
 
 from viser import GuiButtonHandle, GuiInputHandle
 
+from solfer.view.commands.requests import PageRequests
 from solfer.view.playback import Playback
-from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 
 

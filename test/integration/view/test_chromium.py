@@ -19,7 +19,6 @@ from solfer.robot.shipped import robot_of  # noqa: E402
 from solfer.scene import LiveScene  # noqa: E402
 from solfer.study import SimulatedRun, read_study  # noqa: E402
 from solfer.view import Page, PageServer  # noqa: E402
-from solfer.view.page import Page  # noqa: E402
 
 pytestmark = [pytest.mark.soak, pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")]
 

@@ -12,7 +12,7 @@ from solfer.errors import SolferError, SolferErrors
 from solfer.plugins import check_file
 
 DATA = Path(__file__).parents[2] / "data"
-TOLD = [each for file in sorted((DATA / "told").glob("*.yaml")) for each in yaml.safe_load(file.read_text())]
+MISTAKES = [each for file in sorted((DATA / "mistakes").glob("*.yaml")) for each in yaml.safe_load(file.read_text())]
 
 
 @pytest.fixture
@@ -23,10 +23,10 @@ def folder(repository, tmp_path, monkeypatch):
     return tmp_path
 
 
-def told():
-    """Return all that a check tells of the main file in the working directory."""
+def findings():
+    """Return all that a check reports of the main file in the working directory."""
     report = check_file("main.yaml")
-    return [str(told) for told in (*report.errors, *report.warnings, *report.information)]
+    return [str(each) for each in (*report.errors, *report.warnings, *report.information)]
 
 
 def without_place(text):
@@ -35,13 +35,13 @@ def without_place(text):
 
 @pytest.fixture(scope="module")
 def always(repository):
-    """Return what a check tells of the correct files, without places: a class and a plugin that nobody has."""
+    """Return what a check reports of the correct files, without places: a class and a plugin that nobody has."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(repository / "test/data/config")
-        return {without_place(text) for text in told()}
+        return {without_place(text) for text in findings()}
 
 
-def test_correct_files_tell_of_what_nobody_has(always):
+def test_a_check_reports_what_nobody_has(always):
     unread, absent = sorted(always, key=len)
     assert unread == "mwoibn.modules.mover: no plugin is known for 'mover', so its own tags are not read"
     begin, end = absent.split("ModuleNotFoundError: No module named 'my_package'")
@@ -50,20 +50,20 @@ def test_correct_files_tell_of_what_nobody_has(always):
 
 
 @pytest.mark.daily(60)
-@pytest.mark.parametrize("mistake", TOLD, ids=lambda mistake: mistake["instead"].strip()[:40])
-def test_a_check_tells_mistakes_word_for_word(folder, always, mistake):
+@pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake["instead"].strip()[:40])
+def test_a_check_reports_mistakes_word_for_word(folder, always, mistake):
     file = folder / f"{mistake['file']}.yaml"
     text = file.read_text()
     assert mistake["written"] in text
     file.write_text(text.replace(mistake["written"], mistake["instead"], 1))
-    assert [text for text in told() if without_place(text) not in always] == mistake["told"]
+    assert [text for text in findings() if without_place(text) not in always] == mistake["findings"]
 
 
 @pytest.mark.needs("ros")
 def test_an_unknown_package_is_placed(folder):
     file = folder / "main.yaml"
     file.write_text(file.read_text().replace("path: ., file", "path: package://no_such_pkg_at_all, file"))
-    assert any(text.startswith("main.yaml:64:30: ") and "unknown package" in text for text in told())
+    assert any(text.startswith("main.yaml:64:30: ") and "unknown package" in text for text in findings())
 
 
 def test_several_mistakes_are_reported_at_once(folder):

@@ -36,7 +36,7 @@ def test_every_tag_is_described(written):
 def test_the_schema_accepts_configurations_that_load(repository, name):
     schema = json.loads((repository / "config/schema/solfer.schema.json").read_text())
     wrong = list(
-        complaints(
+        violations(
             yaml.safe_load((repository / name).read_text())["mwoibn"],
             schema["properties"]["mwoibn"],
             schema["$defs"],
@@ -60,7 +60,7 @@ def test_the_schema_accepts_configurations_that_load(repository, name):
 )
 def test_the_schema_refuses_what_the_loader_refuses(repository, text, path):
     schema = json.loads((repository / "config/schema/solfer.schema.json").read_text())
-    assert path in list(complaints(yaml.safe_load(text), schema["properties"]["mwoibn"], schema["$defs"], "mwoibn"))
+    assert path in list(violations(yaml.safe_load(text), schema["properties"]["mwoibn"], schema["$defs"], "mwoibn"))
 
 
 KINDS = {
@@ -74,14 +74,14 @@ KINDS = {
 }
 
 
-def complaints(value, schema, definitions, path):
+def violations(value, schema, definitions, path):
     """Yield the places of a value that contradict a schema; JSON Schema as far as ours uses it."""
     if "$ref" in schema:
         schema = definitions[schema["$ref"].rpartition("/")[2]]
     if value is None:
         return  # a key without a value counts as not given
     if "anyOf" in schema:
-        found = [list(complaints(value, part, definitions, path)) for part in schema["anyOf"]]
+        found = [list(violations(value, part, definitions, path)) for part in schema["anyOf"]]
         yield from () if [] in found else [path, *(place for places in found for place in places)]
         return
     kind = schema.get("type")
@@ -95,7 +95,7 @@ def complaints(value, schema, definitions, path):
             if inner is False:
                 yield f"{path}.{key}"
             elif inner is not True:
-                yield from complaints(item, inner, definitions, f"{path}.{key}")
+                yield from violations(item, inner, definitions, f"{path}.{key}")
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from complaints(item, schema.get("items", {}), definitions, f"{path}[{index}]")
+            yield from violations(item, schema.get("items", {}), definitions, f"{path}[{index}]")

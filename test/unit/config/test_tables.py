@@ -55,7 +55,7 @@ def test_each_middleware_has_its_section(tmp_path, middleware):
     """A minimal configuration is made from the table alone, so a new middleware needs no other change."""
     joints = {"space": "JOINT", "function": "state", "interface": {"position": True}}
     joints["dofs"] = {"chain": "all", "type": "all", "mapping": "RBDL"}
-    here = {"source": "told", "message": "sensor_msgs/JointState", "timeout": 0.5}
+    here = {"source": "joints", "message": "sensor_msgs/JointState", "timeout": 0.5}
     robot = {"feedback": {"list": ["joints"]}, "actuators": {"read": False}, "contacts": {"read": False}}
     switches = dict.fromkeys(("kinematics", "dynamics", "model_change"), False)
     root = {
@@ -72,4 +72,4 @@ def test_each_middleware_has_its_section(tmp_path, middleware):
     file = tmp_path / "main.yaml"
     file.write_text(yaml.safe_dump({"mwoibn": root}))
     (pipe,) = load(file, "m").feedbacks
-    assert (pipe.source, pipe.timeout, pipe.function) == ("told", 0.5, "state")
+    assert (pipe.source, pipe.timeout, pipe.function) == ("joints", 0.5, "state")

@@ -155,13 +155,13 @@ def test_what_was_kept_comes_back_to_the_bit(engine):
     engine.add_plane((0.0, 0.0, 1.0), 1.0)
     robot.place_base((0.0, 0.0, 0.15), UPRIGHT)
     run(engine, 150)
-    kept = engine.keep()
+    state = engine.save_state()
     run(engine, 50)
     after = robot.base_state(), robot.joint_states()
-    engine.bring_back(kept)
+    engine.restore_state(state)
     run(engine, 50)
     assert (robot.base_state(), robot.joint_states()) == after
-    engine.forget(kept)
+    engine.remove_state(state)
 
 
 def test_boxes_stand_are_put_and_stopped(engine):

@@ -97,8 +97,11 @@ def test_a_base_is_where_it_was_put_to_the_last_digits():
     with closing(Simulation.from_file(ROBOT)) as simulation:
         body, q, v = simulation.body, np.zeros_like(simulation.q), np.zeros_like(simulation.v)
         for _ in range(5):
-            position, turn = rng.uniform(-3.0, 3.0, 3), Rotation.random(random_state=rng)
-            body.place(np.zeros(len(body.joints)), position, turn.as_quat())
+            position = rng.uniform(-3.0, 3.0, 3)
+            orientation = Rotation.random(random_state=rng)
+            body.place(np.zeros(len(body.joints)), position, orientation.as_quat())
             body.read(q, v, np.zeros(len(body._motors.rows)))
             np.testing.assert_allclose(body.position, position, atol=1e-14)
-            np.testing.assert_allclose(Rotation.from_quat(body.orientation).as_matrix(), turn.as_matrix(), atol=1e-14)
+            np.testing.assert_allclose(
+                Rotation.from_quat(body.orientation).as_matrix(), orientation.as_matrix(), atol=1e-14
+            )

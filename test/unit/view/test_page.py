@@ -186,8 +186,8 @@ def test_a_reference_is_dragged_in_the_frame_of_its_task(bench):
     assert len(messages) > 20
     torso = bench.state.measured["torso_2"]
     assert_allclose(messages[-1].values[:3], torso.rotation.T @ ((0.6, 0.1, 0.4) - torso.position), atol=1e-9)
-    turn = Rotation.from_quat(messages[-1].values[3:]).as_matrix()
-    assert_allclose(torso.rotation @ turn, np.eye(3), atol=1e-9)
+    rotation = Rotation.from_quat(messages[-1].values[3:]).as_matrix()
+    assert_allclose(torso.rotation @ rotation, np.eye(3), atol=1e-9)
     client.send(_messages.TransformControlsDragEndMessage("/drag/hands/left"))
     bench.run(4)
     bench.moved.drain()
@@ -299,7 +299,7 @@ ODD_REPLIES = {
     "huge": {"values": ("1e308",), "minimums": ("-1e308",), "maximums": ("1e308",)},
     "infinite": {"values": ("1e999",)},
     "beyond": {"values": ("1e9",)},
-    "least above most": {"minimums": ("9",), "maximums": ("1",)},
+    "lower above upper": {"minimums": ("9",), "maximums": ("1",)},
     "markup": {"names": ("<script>alert(1)</script>",), "descriptions": ("<img src=x onerror=alert(1)>",)},
 }
 

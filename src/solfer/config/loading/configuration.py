@@ -1,6 +1,6 @@
 """The configuration of one plugin, in frozen records."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -95,8 +95,8 @@ class Configuration:
     def own_topic(self, topic: str) -> str:
         """Return a topic that it publishes to other plugins, under its unique name in a list of plugins.
 
-        Where a list has the configuration again, as `NAME_2`, its topic gets the same number: `wanted_2` for `selects`.
-        A topic with a leading slash stays, since it is meant to be that one.
+        Where a list has the configuration again, as `NAME_2`, its topic gets the same number, such as `desired_2`. A
+        topic with a leading slash stays, since it is meant to be that one.
         """
         return topic if topic.startswith("/") else topic + self.module.name.removeprefix(self.name)
 
@@ -178,7 +178,7 @@ def own_tags(module: YamlNode) -> YamlNode:
     return _part(module, lambda key: key not in common)
 
 
-def _part(module: YamlNode, selects) -> YamlNode:
+def _part(module: YamlNode, is_selected: Callable[[str], bool]) -> YamlNode:
     if not isinstance(module.value, dict):
         return module
-    return YamlNode({key: child for key, child in module.items() if selects(key)}, module.mark, module.key)
+    return YamlNode({key: child for key, child in module.items() if is_selected(key)}, module.mark, module.key)

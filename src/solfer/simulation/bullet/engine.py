@@ -98,25 +98,25 @@ class BulletEngine(PhysicsEngine):
         """See `PhysicsEngine.step`."""
         self._bullet.stepSimulation(self._client)
 
-    def forget_contacts(self) -> None:
-        """See `PhysicsEngine.forget_contacts`.
+    def clear_contacts(self) -> None:
+        """See `PhysicsEngine.clear_contacts`.
 
         Bullet keeps the points and impulses of a contact for the next step, also when a body was put elsewhere and
         came back in between.
         """
         self._bullet.performCollisionDetection(self._client)
 
-    def keep(self) -> int:
-        """See `PhysicsEngine.keep`."""
+    def save_state(self) -> int:
+        """See `PhysicsEngine.save_state`."""
         return self._bullet.saveState(self._client)
 
-    def bring_back(self, kept: int) -> None:
-        """See `PhysicsEngine.bring_back`."""
-        self._bullet.restoreState(kept, physicsClientId=self._client)
+    def restore_state(self, state: int) -> None:
+        """See `PhysicsEngine.restore_state`."""
+        self._bullet.restoreState(state, physicsClientId=self._client)
 
-    def forget(self, kept: int) -> None:
-        """See `PhysicsEngine.forget`."""
-        self._bullet.removeState(kept, self._client)
+    def remove_state(self, state: int) -> None:
+        """See `PhysicsEngine.remove_state`."""
+        self._bullet.removeState(state, self._client)
 
     def show(self, target: Iterable[float]) -> None:
         """See `PhysicsEngine.show`."""

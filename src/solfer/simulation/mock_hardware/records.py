@@ -21,7 +21,7 @@ class EncoderRecord(Record):
     """The encoder of a joint: `joint position = direction * reading + zero`."""
 
     name: str = Field(min_length=1, description="the hardware's name of the joint")
-    direction: Literal[1, -1] = Field(description="1, or -1 where it turns against the model's joint")
+    direction: Literal[1, -1] = Field(description="1, or -1 where it counts against the model's joint")
     zero: float = Field(**COORDINATE, description="position of the model's joint at which it reads zero [rad, m]")
 
 
@@ -29,7 +29,9 @@ class MountRecord(Record):
     """How a sensor is really mounted, relative to the frame of its link in the URDF."""
 
     offset_position: OffsetPositionRecord | None = Field(default=None, description="where it sits on the link")
-    offset_orientation: OffsetOrientationRecord | None = Field(default=None, description="how it is turned on the link")
+    offset_orientation: OffsetOrientationRecord | None = Field(
+        default=None, description="how it is oriented on the link"
+    )
 
 
 class HardwareRecord(Record):

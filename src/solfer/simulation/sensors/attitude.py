@@ -12,7 +12,7 @@ anywhere, and a filter that began with it would learn a bias that is none, and b
 
 
 class AttitudeFilter:
-    """A complementary filter: gyroscopes turn the orientation on, and specific force, upwards on average, rights it.
+    """A complementary filter: gyroscopes predict the orientation, and specific force, upwards on average, corrects it.
 
     With the direction u of the specific force in the sensor's axes, and the estimate R of its orientation:
 
@@ -51,20 +51,20 @@ class AttitudeFilter:
         size = float(np.linalg.norm(force))
         if size < LOWEST_SPECIFIC_FORCE:
             return
-        felt = rotation @ force / size
-        axis = np.array([felt[1], -felt[0], 0.0])  # felt x z, which turns `felt` upwards
+        direction = rotation @ force / size
+        axis = np.array([direction[1], -direction[0], 0.0])  # direction x z, which rotates `direction` upwards
         sine = float(np.linalg.norm(axis))
-        angle = math.atan2(sine, float(felt[2]))
+        angle = math.atan2(sine, float(direction[2]))
         self.rotation[:] = _rotation(axis * (angle / sine if sine > 0.0 else 0.0)) @ rotation
 
     def update(self, angular: np.ndarray, force: np.ndarray, dt: float) -> None:
         """Let `dt` [s] pass with an angular velocity [rad/s] and a specific force [m/s^2] in the sensor's axes."""
-        turned = self.rotation @ _rotation(dt * (angular - self.bias))
+        predicted = self.rotation @ _rotation(dt * (angular - self.bias))
         size = float(np.linalg.norm(force))
-        error = cross(force / size, turned[2]) if size >= LOWEST_SPECIFIC_FORCE else np.zeros(3)
-        righted = -math.expm1(-dt / self._time_constant) * error
-        self.bias += math.expm1(-dt / self._bias_time) / dt * righted
-        self.rotation[:] = turned @ _rotation(righted)
+        error = cross(force / size, predicted[2]) if size >= LOWEST_SPECIFIC_FORCE else np.zeros(3)
+        correction = -math.expm1(-dt / self._time_constant) * error
+        self.bias += math.expm1(-dt / self._bias_time) / dt * correction
+        self.rotation[:] = predicted @ _rotation(correction)
 
 
 def _rotation(vector: np.ndarray) -> np.ndarray:

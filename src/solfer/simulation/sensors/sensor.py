@@ -25,7 +25,7 @@ class Sensor(abc.ABC):
         tags: Its keys below `sensors`, with their types and fields, as `pydantic.create_model` takes them.
         truth: Whether it reports what no sensor of a real robot could measure; a mock of hardware leaves it out.
         topics: Topics of its messages.
-        begun: Number of its restarts.
+        restarts: Number of its restarts.
     """
 
     name: ClassVar[str]
@@ -38,7 +38,7 @@ class Sensor(abc.ABC):
 
     def __init__(self, state: SimulationState, seed: int = 0):
         self.state, self.noise = state, Noise(seed, self.name)
-        self.begun = 0
+        self.restarts = 0
         self._seed: int | None = None
 
     @classmethod
@@ -53,7 +53,7 @@ class Sensor(abc.ABC):
     def restart(self, seed: int | None = None) -> None:
         """Begin the noise again, or that of another seed."""
         self.noise.restart(seed)
-        self.begun += 1
+        self.restarts += 1
         self._seed = seed
 
     def peek(self) -> Sequence[Message]:

@@ -36,7 +36,7 @@ class Publication:
 
     def step(self, done: int) -> None:
         """Measure and write what is due after a number of steps."""
-        if self._begun != self._sensor.begun:
+        if self._restarts != self._sensor.restarts:
             self._forget()
         if done % self._steps == 0:
             measured = self._sensor.messages()
@@ -47,7 +47,7 @@ class Publication:
 
     def repeat(self) -> None:
         """Write the newest measurement at once: simulated time stands still, and no noise goes by."""
-        if self._begun != self._sensor.begun or not self._newest:
+        if self._restarts != self._sensor.restarts or not self._newest:
             self._write(self._sensor.peek())
             self._forget()
         else:
@@ -55,7 +55,7 @@ class Publication:
 
     def _forget(self) -> None:
         """Forget what was measured before the sensor was restarted."""
-        self._begun = self._sensor.begun
+        self._restarts = self._sensor.restarts
         self._line: DelayLine[Sequence[Message]] = DelayLine(self._delay)
         self._newest = ()
 

@@ -77,7 +77,7 @@ class World:
         return self._bodies.get(GROUND_NAME, [None])[0]
 
     def orientation(self, yaw: float = 0.0) -> np.ndarray:
-        """Compute the quaternion (x, y, z, w) of a body upright on the ground, turned by `yaw` [rad] from its x."""
+        """Compute the quaternion (x, y, z, w) of a body upright on the ground, rotated by `yaw` [rad] from its x."""
         tilt = rotation_from_rpy((0.0, -self._slope, 0.0))
         heading = rotation_from_rpy((0.0, 0.0, yaw))
         return quaternion_from_rotation(tilt @ heading)

@@ -64,7 +64,7 @@ class ImuRecord(Record):
         default=None, description="where it really sits on the link (default: at its origin)"
     )
     offset_orientation: OffsetOrientationRecord | None = Field(
-        default=None, description="how it is really turned on the link (default: as its frame)"
+        default=None, description="how it is really oriented on the link (default: as its frame)"
     )
     noise: ImuNoiseRecord = Field(default_factory=ImuNoiseRecord, description="standard deviations of one sample")
     bias: ImuBiasRecord = Field(default_factory=ImuBiasRecord, description="what is added to each sample")
@@ -161,12 +161,12 @@ class Imu(SingleSensor):
         self.noise.add(message.angular, deviations.angular)
         self.noise.add(message.acceleration, deviations.acceleration)
         passed = STEP * round((message.stamp - self._time) / STEP) if self._time >= 0.0 else 0.0
-        self._err(passed)
-        message.orientation[:] = quaternion_from_rotation(self._turned(self._felt(rotation, passed)))
+        self._add_errors(passed)
+        message.orientation[:] = quaternion_from_rotation(self._with_noise(self._estimate(rotation, passed)))
         self._time = message.stamp
         return message
 
-    def _err(self, passed: float) -> None:
+    def _add_errors(self, passed: float) -> None:
         """Add the errors of gyroscopes and accelerometers; no time passes in a pause, in which biases stay."""
         message = self._message
         white = self._deviations
@@ -180,8 +180,8 @@ class Imu(SingleSensor):
             math.hypot(white.acceleration, self._accelerometer.deviation(period)),
         )
 
-    def _felt(self, rotation: np.ndarray, passed: float) -> np.ndarray:
-        """Return the rotation that the sensor believes in, by its own samples; it begins with the right heading."""
+    def _estimate(self, rotation: np.ndarray, passed: float) -> np.ndarray:
+        """Return the rotation that the sensor estimates from its own samples; it begins with the true heading."""
         if self._attitude is None:
             return rotation
         if self._time < 0.0:
@@ -196,7 +196,7 @@ class Imu(SingleSensor):
         velocity[:3] += cross(velocity[3:], moment.rotation(self._link) @ self._position)
         return velocity
 
-    def _turned(self, rotation: np.ndarray) -> np.ndarray:
+    def _with_noise(self, rotation: np.ndarray) -> np.ndarray:
         """Add noise to a rotation, a small rotation about axes of the sensor."""
         if not self._deviations.orientation:
             return rotation

@@ -27,7 +27,7 @@ class JointNoiseRecord(Record):
         default=None,
         ge=1e-9,  # the largest positions are still whole numbers of steps
         le=1e4,
-        description="step of positions, default: none; 9.58738e-5: 16 bits a turn [rad, m]",
+        description="step of positions, default: none; 9.58738e-5: 16 bits a revolution [rad, m]",
     )
     exact: bool = Field(default=False, description="leaves out all of these")
 

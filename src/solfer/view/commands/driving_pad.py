@@ -11,7 +11,7 @@ from solfer.errors import MiddlewareError
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage
 from solfer.transport.topics import Topics
-from solfer.view.requests import PageRequests
+from solfer.view.commands.requests import PageRequests
 
 CMD_VEL = "cmd_vel"
 

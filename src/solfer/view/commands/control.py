@@ -12,10 +12,10 @@ from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
+from solfer.view.commands.driving_pad import DrivingPad
+from solfer.view.commands.requests import PageRequests
 from solfer.view.drawing import name_of, wxyz
-from solfer.view.driving_pad import DrivingPad
 from solfer.view.life import PageLives
-from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 
 SILENCE_TIMEOUT = 0.5

@@ -6,7 +6,7 @@ from viser import GuiButtonHandle, GuiEvent, ViserServer
 
 from solfer.transport.lower_level import LOWER_LEVEL, Answer
 from solfer.transport.middleware import TRIGGER, NoFields
-from solfer.view.requests import PageRequests
+from solfer.view.commands.requests import PageRequests
 
 
 class EmergencyStopButton:

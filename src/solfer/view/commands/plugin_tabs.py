@@ -23,9 +23,9 @@ from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
 from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, ParametersReply, SetParameters
-from solfer.view.control import PageControl
-from solfer.view.parameters import KnownParameters
-from solfer.view.requests import PageRequests
+from solfer.view.commands.control import PageControl
+from solfer.view.commands.parameters import KnownParameters
+from solfer.view.commands.requests import PageRequests
 
 Control = GuiSliderHandle[float] | GuiCheckboxHandle | GuiTextHandle
 
