@@ -66,8 +66,8 @@ def main() -> None:
     configuration = load(CONFIG / "centauro.yaml", "joint_states")
     plugin = generate(configuration, MemoryMiddleware(bus, "joint_states"), DrivingGenerator)
     bus.every(1.0 / plugin.rate, plugin.cycle)
-    wanted = TopicOut("/joint_states/cmd_vel", "geometry_msgs/Twist", Twist, lambda: Twist(Vector(0.2)))
-    (publish,) = bind("navigation", (wanted,), MemoryMiddleware(bus, "navigation"), Inbox())
+    velocity = TopicOut("/joint_states/cmd_vel", "geometry_msgs/Twist", Twist, lambda: Twist(Vector(0.2)))
+    (publish,) = bind("navigation", (velocity,), MemoryMiddleware(bus, "navigation"), Inbox())
     bus.run_until(START)  # until the plugin runs
     begin = simulation.q[:2].copy()
     publish()

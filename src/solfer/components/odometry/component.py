@@ -60,7 +60,7 @@ class Odometry(Component):
     """Estimates pose and velocity of the base from wheels and IMU, and writes them into both States.
 
     It begins at rest above the origin of the ground, with the heading of the IMU; a service puts it elsewhere. Where
-    all sensors were silent it begins anew at its last place: encoders may count from elsewhere.
+    all sensors were silent it begins again at its last place: encoders may count from elsewhere.
     The methods are `GeometricOdometry`, that of the paper, and `FilteredOdometry`.
 
     Args:
@@ -142,15 +142,15 @@ class Odometry(Component):
         streams.read(self.passed)
         while streams.next():
             self.model.update()
-            if not streams.silence:
+            if not streams.silence.ended:
                 self.law.update(streams.elapsed, streams.measured)
             elif streams.measured:
                 log.warning(
                     "%s: neither joints nor IMU were measured for %.2f s; the base goes on from where it was",
                     self.name,
-                    streams.silence,
+                    streams.silence.ended,
                 )
-                streams.silence = 0.0
+                streams.silence.ended = 0.0
                 self.law.resume()
         streams.finish()
         self._write()

@@ -145,7 +145,7 @@ class FilteredOdometry:
         self._find_velocity()
 
     def resume(self) -> None:
-        """Begin anew at the last place and heading: nothing is known of the time since the last measurement."""
+        """Begin again at the last place and heading: nothing is known of the time since the last measurement."""
         stop_time = 1.0  # [s] in which a robot whose commands are not received comes to rest
         x, y, z = self.position.tolist()
         speeds = (*self.velocity[:2].tolist(), float(self.angular[2]))

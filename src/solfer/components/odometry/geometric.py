@@ -133,7 +133,7 @@ class GeometricOdometry:
         self._finish()
 
     def resume(self) -> None:
-        """Begin anew at the last place and heading: nothing is known of the time since the last measurement."""
+        """Begin again at the last place and heading: nothing is known of the time since the last measurement."""
         x, y, z = self.position.tolist()
         heading = self.heading
         self.start()

@@ -13,8 +13,32 @@ from solfer.robot import Robot
 LONGEST_EXTRAPOLATION = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
-LONGEST_SILENCE = 1.0
-"""Longest silence of all sensors over which the estimate goes on [s]: after it encoders may count from elsewhere."""
+
+class SensorSilence:
+    """Silence of all sensors: after a long one encoders may count from elsewhere, as those of a new robot do.
+
+    Attributes:
+        passed: Time since anything was measured [s].
+        ended: Length of the long silence after which nothing has been estimated yet [s]; 0: there is none.
+    """
+
+    LONGEST_BRIDGED = 1.0
+    """Longest silence over which an estimate goes on [s]."""
+
+    def __init__(self) -> None:
+        self.start()
+
+    def start(self) -> None:
+        """Begin with a measurement."""
+        self.passed = self.ended = 0.0
+
+    def end(self) -> bool:
+        """Note a measurement; return whether a long silence has ended."""
+        is_long = self.passed > self.LONGEST_BRIDGED
+        if is_long:
+            self.ended = self.passed
+        self.passed = 0.0
+        return is_long
 
 
 class _JointSamples:
@@ -24,25 +48,28 @@ class _JointSamples:
         width: Number of joints.
 
     Attributes:
+        stamps: Check of their stamps.
         waiting: Those that are not taken yet.
         newest: What the State has in this cycle.
         before: The measurement that was taken last.
     """
 
     def __init__(self, width: int):
+        self.stamps = StampCheck()
         self.waiting = SortedSamples(CAPACITY, 2 * width)
         self.newest = np.zeros((2, width))
         self.before = np.zeros((2, width))
 
     def start(self) -> None:
         """Begin without measurements."""
+        self.stamps.start()
         self.waiting.count = 0
         self.before[:] = math.nan
 
-    def receive(self, history: SensorHistory, check: StampCheck, begin: float, after: float) -> None:
+    def receive(self, history: SensorHistory, begin: float, after: float) -> None:
         """Sort the messages of a cycle in that are after two times [s]; what came before the first is known."""
         waiting = self.waiting
-        for index, stamp in history.accepted(check, after):
+        for index, stamp in history.accepted(self.stamps, after):
             row = waiting.insert(stamp) if stamp > begin else -1
             if row >= 0:
                 waiting.rows[row] = self.newest.ravel()  # which counts where a message lacks joints
@@ -70,9 +97,7 @@ class Streams:
         elapsed: Time from the measurement before to this one [s].
         measured: Whether the IMU has measured the base in the meantime.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
-        silence: For how long neither joints nor IMU were measured before, if longer than `LONGEST_SILENCE` [s]; 0 after
-            a measurement of both.
-        joint_stamps: Check of the joints' stamps.
+        silence: Of joints and IMU together.
     """
 
     def __init__(self, robot: Robot, offset: float = 0.0):
@@ -81,14 +106,19 @@ class Streams:
         self._imu: SensorHistory | None = None
         self.elapsed = self.ahead = 0.0
         self.measured = True
-        self.joint_stamps = StampCheck()
-        self._samples = ImuSamples(robot.kinematics.base or BaseChart(), offset, StampCheck(self.joint_stamps, offset))
+        self.silence = SensorSilence()
         self._measurements = _JointSamples(robot.size - 6)
+        self._samples = ImuSamples(robot.kinematics.base or BaseChart(), offset, StampCheck(self.joint_stamps, offset))
         self._written = np.zeros((2, 3))
         self._time = math.nan
         self._begin = math.nan
-        self._waited = self._period = self._silent = self.silence = 0.0
+        self._waited = self._period = 0.0
         self._is_due = False
+
+    @property
+    def joint_stamps(self) -> StampCheck:
+        """Check of the joints' stamps."""
+        return self._measurements.stamps
 
     @property
     def imu_stamps(self) -> StampCheck:
@@ -106,9 +136,9 @@ class Streams:
             SensorHistory.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6))
         )
         self._time = self._begin = math.nan
-        self._waited = self.ahead = self._silent = self.silence = 0.0
+        self._waited = self.ahead = 0.0
+        self.silence.start()
         self._measurements.start()
-        self.joint_stamps.start()
         self._samples.start()
         if self._joints is not None and self._imu is not None:
             self._receive(self._joints, self._imu)
@@ -129,7 +159,7 @@ class Streams:
         newest[1] = state.velocity[6:]
         if self._joints is not None and self._imu is not None:
             self._waited = self._waited + passed if self._measurements.waiting.count else 0.0
-            self._silent += passed
+            self.silence.passed += passed
             self._receive(self._joints, self._imu)
 
     def next(self) -> bool:
@@ -200,10 +230,8 @@ class Streams:
         check = self.joint_stamps
         check.begin_cycle()
         newest = self._samples.newest
-        self._measurements.receive(joints, check, begin, after=after)
+        self._measurements.receive(joints, begin, after)
         self._samples.receive(imu)
         if check.newest != check.before or self._samples.newest != newest:
-            if self._silent > LONGEST_SILENCE:
-                self.silence = self._silent
+            if self.silence.end():
                 self._samples.forget_until(newest)
-            self._silent = 0.0
