@@ -50,7 +50,7 @@ def _completer(action: argparse.Action) -> Callable[..., Iterable[str]]:
 
 
 def _robots() -> Iterable[str]:
-    from solfer.robot.shipped import robots_beside
+    from solfer.robot.description.shipped import robots_beside
 
     return robots_beside(os.curdir)
 

@@ -6,7 +6,7 @@ from solfer.cli.plugins import configurations_of, report_of
 from solfer.errors import ConfigError
 from solfer.model.srdf.semantics import Semantics
 from solfer.model.urdf.description import Description
-from solfer.robot.shipped import RobotFiles, robot_files, robot_named
+from solfer.robot.description.shipped import RobotFiles, robot_files, robot_named
 
 
 def given_robot(options: argparse.Namespace) -> RobotFiles | None:

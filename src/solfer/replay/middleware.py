@@ -7,7 +7,7 @@ from solfer.config import Configuration
 from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.recording.model import JOINTS_KIND
 from solfer.replay.rows import RecordedRows
-from solfer.robot.shipped import RobotFiles
+from solfer.robot.description.shipped import RobotFiles
 from solfer.transport.messages import GAINS
 
 

@@ -18,7 +18,7 @@ from solfer.replay.feedback import RecordedFeedbackPipe
 from solfer.replay.generator import RecordedClaim, RecordedTime, replaying
 from solfer.replay.middleware import ReplayMiddleware
 from solfer.replay.rows import LIFE, RecordedRows
-from solfer.robot.shipped import RobotFiles
+from solfer.robot.description.shipped import RobotFiles
 from solfer.telemetry.plugin_log import PluginLog
 from solfer.transport.plugin_state import PluginState
 

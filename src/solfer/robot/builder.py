@@ -20,7 +20,16 @@ from solfer.config.records.middlewares import MIDDLEWARES, PREDEFINED_MAPS
 from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
-from solfer.robot.files import own_contacts
+from solfer.robot.description.files import own_contacts
+from solfer.robot.description.shipped import with_bundled_base
+from solfer.robot.description.sources import (
+    Outside,
+    is_robot_read,
+    read_actuators,
+    read_contacts,
+    read_description,
+    read_semantics,
+)
 from solfer.robot.hardware_names import commanded_joints, received_joints
 from solfer.robot.names import (
     FEEDBACK_MAP,
@@ -33,8 +42,6 @@ from solfer.robot.names import (
 )
 from solfer.robot.robot import Robot
 from solfer.robot.selection import commanded_dofs, select
-from solfer.robot.shipped import with_bundled_base
-from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
 logger = logging.getLogger(__name__)
 

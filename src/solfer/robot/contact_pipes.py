@@ -6,7 +6,7 @@ from solfer.config import Configuration, Problems
 from solfer.config.kinds.contact import ContactFeedbackRecord, ContactTags
 from solfer.errors import SolferError
 from solfer.model.contacts import ContactRecord, read_contacts
-from solfer.robot.sources import is_robot_read, require_robot
+from solfer.robot.description.sources import is_robot_read, require_robot
 
 
 def contact_pipes(configuration: Configuration, records: Iterable[ContactRecord]) -> tuple[ContactFeedbackRecord, ...]:

@@ -10,7 +10,7 @@ from solfer.config.yaml.nodes import Key, Mark
 from solfer.model.documents import PlacedElement, parse_robot, read_text
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.unfit import unfit_parts
-from solfer.robot.shipped import RobotFiles
+from solfer.robot.description.shipped import RobotFiles
 
 LARGEST_ANGLE = 2.0 * math.pi + 1e-3
 """Angle beyond which a value looks like degrees [rad]; URDFs round a revolution."""

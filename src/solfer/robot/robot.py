@@ -20,7 +20,7 @@ from solfer.robot.defaults import (
     joint_limits,
     undescribed,
 )
-from solfer.robot.files import read_parts
+from solfer.robot.description.files import read_parts
 from solfer.robot.robot_points import RobotPoints
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from solfer.navigation import Course, Navigation, ReferenceCourse, ScenarioCours
 from solfer.plugins import Plugin, PluginSet, Registry, generate, generate_shared
 from solfer.plugins.generation.dry_run import declared
 from solfer.recording.log import Logger, LogSource
-from solfer.robot.shipped import RobotFiles
+from solfer.robot.description.shipped import RobotFiles
 from solfer.scenarios import Player, read_scenario
 from solfer.simulation import SimulationServer
 from solfer.simulation.physics import STEP

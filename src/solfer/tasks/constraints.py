@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from solfer.dynamics import BIAS, INERTIA, DynamicModel
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.points import Handler, Point
 from solfer.tasks.task import as_numbers, updated_in_order
 

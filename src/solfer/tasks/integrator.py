@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from solfer.errors import SizeMismatch, TaskError
 from solfer.model.view import RobotView
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.task import as_numbers
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from solfer.errors import SizeMismatch, TaskError, UnknownName
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.solvers.qp import QpStatus, Solution
-from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.constraints import Constraint
 from solfer.tasks.hierarchy import Descent
 from solfer.tasks.kernel import count_kept

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import SizeMismatch, TaskError
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.solvers.qp import QpSolver, Solution
-from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.constraints import Constraint
 from solfer.tasks.kernel import objective, span
 from solfer.tasks.stack import Stack

@@ -6,7 +6,7 @@ from solfer.errors import RecordingError, SolferError, UnknownName
 from solfer.recording.kinds import part_of, topic_of
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
 from solfer.robot import Robot
-from solfer.robot.shipped import robot_of
+from solfer.robot.description.shipped import robot_of
 from solfer.transport import BodyMessage, JointMessage, Middleware, Writer
 from solfer.transport.messages import PointsMessage
 

@@ -15,7 +15,7 @@ from support.browser import CHROMIUM, browser, element  # noqa: E402
 from support.page import view  # noqa: E402
 
 from solfer import Robot  # noqa: E402
-from solfer.robot.shipped import robot_of  # noqa: E402
+from solfer.robot.description.shipped import robot_of  # noqa: E402
 from solfer.scene import LiveScene  # noqa: E402
 from solfer.study import SimulatedRun, read_study  # noqa: E402
 from solfer.view import Page, PageServer  # noqa: E402

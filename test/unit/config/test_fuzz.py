@@ -28,7 +28,7 @@ from solfer.model.actuators import ActuatorsRecord
 from solfer.model.collisions.distances import LinkDistances
 from solfer.model.contacts import read_contacts
 from solfer.plugins import Registry, check_file
-from solfer.robot import shipped as names_of_robots
+from solfer.robot.description import shipped as names_of_robots
 from solfer.simulation.bundle import load_bundle
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.simulation.mock_hardware.mock_hardware import mounted

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solfer.numerics.acceleration_bounds import AccelerationBounds
+from solfer.numerics.bounds.acceleration import AccelerationBounds
 
 PERIOD, END, FASTEST, BRAKING = 0.005, 1.0, 3.0, 20.0
 

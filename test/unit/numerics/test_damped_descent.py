@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from support.allocations import check_that_it_keeps_no_memory
 from support.estimation import part
 
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.solvers.damped_descent import DampedDescent
-from solfer.numerics.velocity_bounds import VelocityBounds
 
 ENDS, SIZE = np.array([0, 6, 9, 9, 13, 17]), 14
 COLUMNS = np.array([0, 1, 2, 4, 5, 6, 7, 9, 10, 11, 12, 13])

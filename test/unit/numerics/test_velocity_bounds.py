@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solfer.errors import ConfigError, NotFinite, SizeMismatch
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 
 JOINTS = ("shoulder", "elbow", "wheel")
 LOWER, UPPER, SPEED = np.array((-1.0, 0.0, -np.inf)), np.array((2.0, 0.5, np.inf)), np.array((3.0, 1.0, np.inf))

@@ -17,7 +17,7 @@ from solfer.plugins.life.switchboard import find_conflicts
 from solfer.plugins.outputs.outputs import _refuse
 from solfer.plugins.sharing.groups import _two_sources
 from solfer.plugins.sharing.space import SharedTopic, _rivals
-from solfer.robot.shipped import robot_files
+from solfer.robot.description.shipped import robot_files
 from solfer.telemetry.plugin_log import _declared
 
 

@@ -13,7 +13,7 @@ from solfer.errors import ConfigError, UnknownName
 from solfer.plugins import Registry, check_file, generate
 from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.runners import require_ros
-from solfer.robot.shipped import robot_files
+from solfer.robot.description.shipped import robot_files
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 CONFIG = REPOSITORY / "config"

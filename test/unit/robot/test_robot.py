@@ -12,7 +12,7 @@ from solfer.errors import ConfigError, MiddlewareError, ModelError, SolferErrors
 from solfer.model import Description, Kinematics
 from solfer.model.urdf.cut import cut
 from solfer.robot import build
-from solfer.robot.shipped import robot_of
+from solfer.robot.description.shipped import robot_of
 
 ROOT = Path(__file__).parents[3]
 CENTAURO = ROOT / "config/robots/centauro"

@@ -10,7 +10,7 @@ from support.needs import pybullet_robot
 
 from solfer import Robot
 from solfer.errors import SizeMismatch, TaskError
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.tasks import ReferenceIntegrator, joint_bounds
 
 PERIOD = 0.01  # [s]

@@ -13,8 +13,8 @@ from support.unit.stacks import CENTAURO, Rows, at_random, largest_change, repea
 
 from solfer import Robot
 from solfer.errors import NotFinite, SizeMismatch, TaskError, UnknownName
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.solvers.qp import QpSolver, QpStatus
-from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.points import LinearPoint
 from solfer.tasks import (
     Constraint,

@@ -18,7 +18,7 @@ from solfer.errors import RecordingError, SimulationError
 from solfer.plugins import Plugin, generate
 from solfer.replay.replay import Replay
 from solfer.replay.rows import RecordedRows
-from solfer.robot.shipped import RobotFiles
+from solfer.robot.description.shipped import RobotFiles
 
 UNUSUAL = 5
 """First cycles with a trace, in which Python itself makes what it keeps."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from solfer.config import Configuration
 from solfer.errors import SimulationError
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.robot.shipped import RobotFiles, bundle_of
+from solfer.robot.description.shipped import RobotFiles, bundle_of
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.physics import STEP
 from solfer.simulation.server.publications import robot_parameters

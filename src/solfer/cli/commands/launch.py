@@ -173,7 +173,7 @@ def _of_the_robot(given: Mapping[str, str], launch: str) -> list[SolferError]:
     """Find what is wrong with the robot, its state, the world, the rates and the place of a recording."""
     from solfer.model.srdf.semantics import Semantics
     from solfer.model.urdf.description import Description
-    from solfer.robot.shipped import robot_named, robot_of
+    from solfer.robot.description.shipped import robot_named, robot_of
     from solfer.simulation.sensors import Rates
     from solfer.simulation.server.rates import changed_rates
     from solfer.simulation.world.world import find_world, read_world

@@ -21,7 +21,7 @@ from solfer.recording.reader import read
 from solfer.replay.differences import ReplayDifferences, differences, recorded_commands
 from solfer.replay.replay import Replay, make
 from solfer.replay.rows import LIFE, RecordedRows
-from solfer.robot.shipped import RobotFiles, robot_files
+from solfer.robot.description.shipped import RobotFiles, robot_files
 
 TABLE_LINES = 20
 """Most lines of the table."""

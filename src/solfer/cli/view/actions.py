@@ -9,7 +9,7 @@ from functools import partial
 
 from solfer.cli.view.paced import PacedMiddleware
 from solfer.robot import Robot
-from solfer.robot.shipped import robot_of
+from solfer.robot.description.shipped import robot_of
 from solfer.scene import LiveScene
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop

@@ -26,7 +26,7 @@ from solfer.dynamics import BIAS, INERTIA, CarryingTorques
 from solfer.errors import ComponentError, ModelError, UnknownName
 from solfer.interfaces.declaration import Action, LiveParameter, Service, TopicIn, TopicOut
 from solfer.interfaces.support import LiftContacts, LiftReply
-from solfer.numerics.acceleration_bounds import AccelerationBounds
+from solfer.numerics.bounds.acceleration import AccelerationBounds
 from solfer.numerics.planar_move import PlanarMove
 from solfer.points import LookAt
 from solfer.robot import Robot

@@ -4,7 +4,7 @@ import numpy as np
 
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.kernel import touch
-from solfer.numerics.acceleration_bounds import AccelerationBounds
+from solfer.numerics.bounds.acceleration import AccelerationBounds
 from solfer.robot import Robot
 
 

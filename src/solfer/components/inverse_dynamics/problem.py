@@ -7,7 +7,7 @@ import numpy as np
 from solfer.components.inverse_dynamics.constraints import ProblemConstraints
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.kernel import build, finish
-from solfer.numerics.acceleration_bounds import AccelerationBounds
+from solfer.numerics.bounds.acceleration import AccelerationBounds
 from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
 from solfer.numerics.solvers.problem import Problem
 from solfer.robot import Robot

@@ -3,7 +3,7 @@
 import numpy as np
 
 from solfer.model.state import State
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.tasks import Task
 
 AT_LIMIT = 5e-3

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.compilation import REORDERED, cached, part
-from solfer.numerics.velocity_bounds import VelocityBounds
 
 
 @part

@@ -23,10 +23,10 @@ from solfer.plugins.generation.sources import check_topics, sinks_of
 from solfer.plugins.generation.together import SharedGenerator, find_generator
 from solfer.plugins.generation.unbuilt import importable_beside
 from solfer.robot.contact_pipes import check_contacts
-from solfer.robot.file_checks import check_actuators, checked_files
+from solfer.robot.description.file_checks import check_actuators, checked_files
+from solfer.robot.description.shipped import RobotFiles
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.plausibility import check_plausibility
-from solfer.robot.shipped import RobotFiles
 
 
 def check_file(  # noqa: PLR0913 for users: what replaces values of the file, by its name

@@ -13,8 +13,8 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.interfaces.declaration import Declaration
 from solfer.plugins.generation.generator import Generator
 from solfer.robot.defaults import ACTUATED, MODEL_MAPS
+from solfer.robot.description.shipped import RobotFiles
 from solfer.robot.names import FEEDBACK_MAP, LOWER_LEVEL_MAP, controller_map
-from solfer.robot.shipped import RobotFiles
 from solfer.transport.messages import canonical
 from solfer.transport.unconnected import UnconnectedMiddleware
 

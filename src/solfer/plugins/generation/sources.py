@@ -9,7 +9,7 @@ from pathlib import Path
 from solfer.config import Configuration, Problems
 from solfer.errors import SolferError, nearest
 from solfer.model.contacts import read_contacts
-from solfer.robot.shipped import RobotFiles
+from solfer.robot.description.shipped import RobotFiles
 
 COMMAND_TOPIC = "/command"
 """Topic of a lower-level controller, behind its name."""

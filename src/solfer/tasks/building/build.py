@@ -7,7 +7,7 @@ import numpy as np
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import StackRecord, TaskLevelsRecord, TaskRecord
 from solfer.errors import ConfigError, SizeMismatch, SolferError, TaskError, UnknownName, raise_all
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.points import Constant, LookAt, Point, Posture, vector
 from solfer.points.offset import chosen
 from solfer.robot import Robot

@@ -9,7 +9,7 @@ from solfer.config.tasks.stack import StackRecord
 from solfer.errors import ConfigError, UnknownName
 from solfer.model.collisions.distances import LinkDistances, are_neighbours, pairs_that_may_touch
 from solfer.model.neutral_posture import neutral_posture
-from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.robot import Robot
 from solfer.tasks.building.placed import Faults
 from solfer.tasks.building.points import WORLD, PointMaker

@@ -17,7 +17,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Registry, check_file, generate_shared
 from solfer.plugins.generation.check import check_layer
 from solfer.plugins.generation.dry_run import DryMiddleware
-from solfer.robot.shipped import robot_files
+from solfer.robot.description.shipped import robot_files
 
 
 @dataclass(frozen=True)

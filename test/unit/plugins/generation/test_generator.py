@@ -20,7 +20,7 @@ from solfer.plugins import Registry, generate
 from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.generator import log_start
 from solfer.plugins.plugin import Plugin, PluginState
-from solfer.robot.shipped import robot_files
+from solfer.robot.description.shipped import robot_files
 
 HEARD = "heard", "sensor_msgs/JointState"
 FEEDBACK, CONTROLLER = "main/mwoibn/feedback/", "main/mwoibn/controller/"

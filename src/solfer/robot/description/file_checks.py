@@ -4,8 +4,8 @@ from solfer.config import Configuration, Problems, read
 from solfer.config.yaml.files import is_file
 from solfer.errors import SolferError, nearest
 from solfer.model.actuators import ActuatorsRecord
-from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
-from solfer.robot.sources import is_robot_read, require_robot
+from solfer.robot.description.shipped import RobotFiles, robot_files, robots_beside
+from solfer.robot.description.sources import is_robot_read, require_robot
 
 
 def checked_files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:

@@ -1,0 +1,1 @@
+"""Bounds of joint velocities and accelerations that keep joints in their ranges."""
