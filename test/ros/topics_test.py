@@ -89,8 +89,8 @@ class TopicsTest(unittest.TestCase):
             self.reports(
                 WHEELS,
                 WHEELS.replace("command", "words"),
-                "a subscriber of /velocity_controller/words expects",
-                "wants std_msgs/String, not solfer/JointCommand (controller 'velocity_controller'",
+                "a subscriber of /velocity_controller/words",
+                "expects std_msgs/String, not solfer/JointCommand (controller 'velocity_controller'",
             )
         finally:
             subscriber.unregister()

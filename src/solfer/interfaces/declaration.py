@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 REQUEST_BYTES = 65536
-"""Bytes of a request, unless its service wants it otherwise."""
+"""Bytes of a request, unless its service sets another number."""
 
 
 @dataclass(frozen=True)

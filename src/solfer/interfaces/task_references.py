@@ -1,4 +1,4 @@
-"""What others want of references: services, topics, and the action `reach`."""
+"""What others request of references: services, topics, and the action `reach`."""
 
 from dataclasses import dataclass, field
 

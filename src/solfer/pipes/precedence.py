@@ -100,18 +100,18 @@ class Precedence:
 
         DoFs of a publisher that has timed out are free from then on.
         """
-        rivals = self._owners_of(name, part)
-        if not rivals:
+        owners = self._owners_of(name, part)
+        if not owners:
             return True
-        if all([self._outlasts(owner, arrival) for owner in rivals]):
-            for owner in rivals:
+        if all([self._outlasts(owner, arrival) for owner in owners]):
+            for owner in owners:
                 del self._owners[owner.name, id(owner.part)]
             self.handovers += 1
             return True
         self.ignored += 1
         if name not in self._conflicts:
             self._forget(arrival - PUBLISHER_TIMEOUT)
-        self._conflicts[name] = arrival, rivals
+        self._conflicts[name] = arrival, owners
         return False
 
     def note(self, name: str, part: np.ndarray | None, arrival: float) -> None:
@@ -125,7 +125,7 @@ class Precedence:
             self._take(owner)
             self._arrange()
 
-    def rivals(self, since: float) -> list[str]:
+    def conflicting_publishers(self, since: float) -> list[str]:
         """List the publishers of the same DoFs since a time [s], sorted; empty: there are none."""
         self._forget(since)
         names = set()
@@ -169,7 +169,7 @@ class Precedence:
         return owner.strikes >= self.strikes
 
     def _forget(self, since: float) -> None:
-        """Drop rivals without an ignored message since a time [s]."""
+        """Drop conflicts without an ignored message since a time [s]."""
         for name, (arrival, _) in list(self._conflicts.items()):
             if arrival < since:
                 del self._conflicts[name]

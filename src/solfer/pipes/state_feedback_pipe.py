@@ -128,7 +128,7 @@ class StateFeedbackPipe(FeedbackPipe):
 
     @property
     def measures(self) -> bool:
-        """See `FeedbackPipe.measures`; other States are what a component wants."""
+        """See `FeedbackPipe.measures`; other States are desired by a component."""
         return self._precedence is not None
 
     @property
@@ -207,10 +207,12 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def conflict(self, now: float) -> str:
         """See `FeedbackPipe.conflict`."""
-        rivals = [] if self._precedence is None else self._precedence.rivals(now - PUBLISHER_TIMEOUT)
-        if not rivals:
+        publishers = (
+            [] if self._precedence is None else self._precedence.conflicting_publishers(now - PUBLISHER_TIMEOUT)
+        )
+        if not publishers:
             return ""
-        return f"{self.place}, where {' and '.join(rivals)} publish the same DoFs: end one of them"
+        return f"{self.place}, where {' and '.join(publishers)} publish the same DoFs: end one of them"
 
     def unsettled(self, now: float) -> str:
         """See `FeedbackPipe.unsettled`."""

@@ -113,8 +113,8 @@ class ClaimRequests:
             self._request("emergency_stop", TRIGGER, NoFields(), Answer)
 
     def _request(self, service: str, interface: str, fields: object, reply: type) -> "Future[Any]":
-        patience = 2.0  # longest wait for an answer of the lower level [s]
-        return self._middleware.request(f"{LOWER_LEVEL}/{service}", interface, fields, reply, patience)
+        timeout = 2.0  # longest wait for an answer of the lower level [s]
+        return self._middleware.request(f"{LOWER_LEVEL}/{service}", interface, fields, reply, timeout)
 
     def _measured(self) -> tuple[float, ...]:
         """Return where the joints are measured, in the names and numbers of the lower level."""

@@ -105,7 +105,7 @@ def test_a_command_with_nan_aborts_its_plugin(layer, value):
     check_that_it_holds(layer, moment + 20 / RATE)
     reason = layer[PLUGIN].reason
     assert layer[PLUGIN].state is PluginState.ABORTED
-    assert f"{PLUGIN} wants a 'position' of joint 'torso_yaw' that is not a finite number" in reason
+    assert f"{PLUGIN} commands a 'position' of joint 'torso_yaw' that is not a finite number" in reason
 
 
 def test_a_command_of_a_stranger_is_refused(shared):

@@ -71,7 +71,7 @@ MISTAKES = {
     ),
     "a topic with two messages": (
         TWO | {"ros/controller/one": {"sink": "joint_states"}, "ros/controller/two": {"sink": "there"}},
-        "wants solfer/JointCommand on the topic 'joint_states'",
+        "expects solfer/JointCommand on the topic 'joint_states'",
     ),
     "no DoF": (
         {"feedback/link_side_online/dofs/chain": "wheels", "controller/velocity_controller/dofs/chain": "torso"},

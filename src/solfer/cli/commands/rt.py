@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--namespace", default="solfer", **namespace)
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     add_times(actions.add_parser("top", help="as `solfer top`: health, and durations of cycles, components and stages"))
-    record = actions.add_parser("record", help="write what all plugins measure, want and send to a file")
+    record = actions.add_parser("record", help="write what all plugins measure, desire and send to a file")
     add_file(record)
     switch = actions.add_parser("switch", help="start and stop plugins at one cycle boundary, all or none")
     switch.add_argument("--start", nargs="+", default=[], metavar="NAME", help="plugins to start")

@@ -151,8 +151,8 @@ def _published_gains(
     carried = [gain for gain in GAINS if getattr(record.interface, gain)]
     if not carried or context.idle:
         return {}
-    patience = 10.0  # longest wait for the lower level's gains [s]
-    published = context.middleware.controller_gains(record.leads_to, patience, record.interface.where(carried[0]))
+    timeout = 10.0  # longest wait for the lower level's gains [s]
+    published = context.middleware.controller_gains(record.leads_to, timeout, record.interface.where(carried[0]))
     calibration = None if record.calibration is None else context.calibrations[record.calibration]
     names = external_names(mapping)
     hardware = [name if calibration is None else calibration.hardware(name) for name in names]

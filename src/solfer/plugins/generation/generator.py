@@ -394,7 +394,7 @@ class Generator:
     def _shared_topics(
         self, robot: Robot, feedbacks: Sequence[FeedbackPipe], commands: Sequence[CommandPipe]
     ) -> list[SolferError]:
-        """Return an error for each topic that two pipes publish, or that two pipes want with different messages."""
+        """Return an error for each topic that two pipes publish, or that two pipes expect other messages on."""
         records: dict[str, PipeRecord] = {record.name: record for record in self._records(robot)}
         ends: list[tuple[Reader | Writer, str, str, bool]]
         ends = [(pipe.reader, records[pipe.name].where("source"), pipe.name, False) for pipe in feedbacks]
@@ -409,7 +409,7 @@ class Generator:
                 what = f"the pipes '{other}' and '{name}' both publish the topic '{topic}'"
                 errors.append(PipeError(what, where=where, expected="a topic for each of them"))
             elif "" not in (carries, end.carries) and carries != end.carries:
-                what = f"the pipe '{name}' wants {end.carries} on the topic '{topic}', '{other}' wants {carries}"
+                what = f"the pipe '{name}' expects {end.carries} on the topic '{topic}', '{other}' expects {carries}"
                 errors.append(PipeError(what, where=where, expected="one message on each topic"))
         return errors
 

@@ -1,1 +1,1 @@
-"""The life of the plugins of one loop: states, budgets, switching on and off, joints that two of them want."""
+"""The life of the plugins of one loop: states, budgets, switching on and off, joints that two of them claim."""

@@ -79,7 +79,7 @@ class CommandGate:
         self._counts[0] += int(len(finite) - finite.sum())
         joint = self._pipe.message.names[int(np.argmin(finite))]
         raise NotFinite(
-            f"{self._owner} wants a '{field}' of joint '{joint}' that is not a finite number",
+            f"{self._owner} commands a '{field}' of joint '{joint}' that is not a finite number",
             where=f"pipe '{self._pipe.name}'",
         )
 

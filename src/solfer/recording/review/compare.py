@@ -173,7 +173,7 @@ class _Pair:
         return law, whole
 
     def verdicts(self, joints: Sequence[str]) -> list[JointVerdict]:
-        """Judge each joint alone, then look for swapped ones among those that differ."""
+        """Compare each joint alone, then look for swapped ones among those that differ."""
         found = [self._verdict(index, joint) for index, joint in enumerate(joints)]
         different = [index for index, verdict in enumerate(found) if verdict.differences]
         for place, joint in enumerate(different):
