@@ -35,6 +35,7 @@ class ReferenceInputs:
         self._wheels = wheels
         self.drive = Drive(*tags.speeds[:2], *tags.accelerations[:2])
         self.targets = Targets(len(wheels.links), tags.speeds, tags.accelerations)
+        self._settling = 0.0  # [s] for which references stay with a robot that still rolls on
         is_steered = len(wheels.steering) > 0
         self.straight = None if is_steered or tags.is_original else StraightAhead(wheels.links)
         self._throttle = Throttle(log)
@@ -53,6 +54,7 @@ class ReferenceInputs:
         """Begin without anything that is desired."""
         self.drive.start()
         self.targets.start()
+        self._settling = 0.0
 
     def update(self, step: float, gap: float) -> bool:
         """Write the received velocities and targets to the references; of the base the newest ones.
@@ -64,7 +66,7 @@ class ReferenceInputs:
             gap: Time before it in which nothing was commanded [s].
 
         Returns:
-            Whether a motion that was abandoned has come to rest in this cycle.
+            Whether a motion that was abandoned has just come to rest, so that references stay with the robot.
         """
         if gap:
             self._references.step(0.5 * gap)
@@ -90,7 +92,12 @@ class ReferenceInputs:
             )
         self.drive.update(self._references, self._wheels.offsets.heading, self.ratio, passed)
         self.targets.update(self._references, self.ratio, passed)
-        return were_abandoned and not self.are_abandoned and not self._references.waits
+        if were_abandoned and not self.are_abandoned:
+            self._settling = 0.5  # [s] in which the robot is at rest, too
+        elif self.drive.is_active or self.targets.is_active:
+            self._settling = 0.0
+        self._settling -= passed
+        return self._settling > 0.0 and not self._references.waits
 
     def leave_out(self) -> None:
         """Leave out what wheels that nothing steers cannot do, until `restore`."""

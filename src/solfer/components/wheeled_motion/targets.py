@@ -111,6 +111,11 @@ class Targets:
         return self._base.is_followed
 
     @property
+    def is_active(self) -> bool:
+        """Whether base or vertices go to places, or vertices follow velocities."""
+        return self._base.is_followed or self._vertices.is_followed or self._age != math.inf
+
+    @property
     def is_abandoned(self) -> bool:
         """Whether base or vertices brake since nothing comes any more, though the last ones were to go on."""
         return self.are_places_abandoned or (STREAM_TIMEOUT < self._age < math.inf and bool(self._desired.any()))
