@@ -282,10 +282,10 @@ class Robot:
         if not (moved or accelerated):
             return False
         self.kinematics.update(self._position, self._velocity)
-        if moved:
-            self.state.touch("position")
-        if accelerated:
-            self.state.touch("velocity")
+        if moved and accelerated:
+            self.state.touch("position", "velocity")
+        else:
+            self.state.touch("position" if moved else "velocity")
         measured.position = position
         measured.velocity = velocity
         measured.updates += 1

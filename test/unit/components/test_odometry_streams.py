@@ -200,7 +200,8 @@ def test_an_imu_of_another_clock_does_not_count(behind, kind):
     sensors.cycle()
     streams.start()
     assert not any(measured for _, _, measured, *_ in measurements(sensors, streams, 0.5))
-    assert streams.imu_stamps.refused[kind] > 140 and streams.imu_stamps.warning.endswith(f"/imu_driver is {kind}")
+    _, check = streams.stamp_checks
+    assert check.refused[kind] > 140 and check.warning.endswith(f"/imu_driver is {kind}")
 
 
 @pytest.mark.parametrize("speed", [0.03, 0.2, 0.7])

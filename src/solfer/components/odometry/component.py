@@ -154,7 +154,7 @@ class Odometry(Component):
                 self.law.resume()
         streams.finish()
         self._write()
-        for check in (streams.joint_stamps, streams.imu_stamps):
+        for check in streams.stamp_checks:
             if check.warning:
                 self._throttle.warning(check.warning, "%s: %s, it does not count", self.name, check.warning)
                 check.warning = ""

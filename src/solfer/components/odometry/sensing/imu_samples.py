@@ -60,10 +60,10 @@ class ImuSamples:
         self.measured_at = math.nan
         self.stamps.start()
 
-    def forget_until(self, time: float) -> None:
-        """Forget the samples up to a time [s], and what was measured then."""
+    def forget_until(self, stamp: float) -> None:
+        """Forget the samples up to a stamp [s], and what was measured then."""
         samples = self._samples
-        samples.drop(int(np.searchsorted(samples.stamps[: samples.count], time, side="right")))
+        samples.drop(int(np.searchsorted(samples.stamps[: samples.count], stamp + self._offset, side="right")))
         self.measured_at = math.nan
 
     def receive(self, history: SensorHistory) -> None:

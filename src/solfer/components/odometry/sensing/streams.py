@@ -98,6 +98,7 @@ class Streams:
         measured: Whether the IMU has measured the base in the meantime.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
         silence: Of joints and IMU together.
+        stamp_checks: Checks of the stamps of joints and IMU.
     """
 
     def __init__(self, robot: Robot, offset: float = 0.0):
@@ -108,22 +109,14 @@ class Streams:
         self.measured = True
         self.silence = SensorSilence()
         self._measurements = _JointSamples(robot.size - 6)
-        self._samples = ImuSamples(robot.kinematics.base or BaseChart(), offset, StampCheck(self.joint_stamps, offset))
+        imu_check = StampCheck(self._measurements.stamps, offset)
+        self._samples = ImuSamples(robot.kinematics.base or BaseChart(), offset, imu_check)
+        self.stamp_checks = self._measurements.stamps, imu_check
         self._written = np.zeros((2, 3))
         self._time = math.nan
         self._begin = math.nan
         self._waited = self._period = 0.0
         self._is_due = False
-
-    @property
-    def joint_stamps(self) -> StampCheck:
-        """Check of the joints' stamps."""
-        return self._measurements.stamps
-
-    @property
-    def imu_stamps(self) -> StampCheck:
-        """Check of the IMU's stamps."""
-        return self._samples.stamps
 
     @property
     def synchronizes(self) -> bool:
@@ -227,11 +220,11 @@ class Streams:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
         begin = -math.inf if math.isnan(self._begin) else self._begin
         after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
-        check = self.joint_stamps
-        check.begin_cycle()
-        newest = self._samples.newest
+        joint_check, imu_check = self.stamp_checks
+        joint_check.begin_cycle()
+        newest = imu_check.newest
         self._measurements.receive(joints, begin, after)
         self._samples.receive(imu)
-        if check.newest != check.before or self._samples.newest != newest:
-            if self.silence.end():
-                self._samples.forget_until(newest)
+        is_measured = joint_check.newest != joint_check.before or imu_check.newest != newest
+        if is_measured and self.silence.end():
+            self._samples.forget_until(newest)
