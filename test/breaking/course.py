@@ -40,6 +40,9 @@ AT_REST, DRIVES = 0.1, 0.5
 AWAY = 0.05
 """How far a joint may go on that nobody moves any more [rad]."""
 
+STOP = 0.05
+"""Time in which a joint stops beyond that: those that steer turn at up to 4 rad/s [s]."""
+
 NAMED = {
     "navigation": r"no position|locomotion/base",
     "hands": r"upper_body|hands",
@@ -243,7 +246,8 @@ class CourseTrial:
             places.append([commands.get(joint, place) for joint, place in zip(joints, before, strict=True)])
         low, high = np.min(places, axis=0), np.max(places, axis=0)
         beyond = np.maximum(low - samples.positions, samples.positions - high)
-        away = np.where(wheels, 0.0, np.maximum(beyond, 0.0)).max(axis=0)
+        stopping = STOP * np.abs(samples.velocities).max(axis=0)
+        away = np.where(wheels, 0.0, np.maximum(beyond - stopping, 0.0)).max(axis=0)
         verdict.away = max(verdict.away, float(away.max()))
         if away.max() > AWAY:
             verdict.complaints.append(f"{joints[int(away.argmax())]} went {away.max():.3f} rad beyond its reference")
