@@ -13,9 +13,6 @@ from solfer.robot import Robot
 LONGEST_EXTRAPOLATION = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
-LONGEST_SILENCE = 1.0
-"""Longest silence of all sensors over which the estimate goes on [s]: after it encoders may count from elsewhere."""
-
 
 class _JointSamples:
     """Measurements of the joints: positions, then velocities, shape (2, width) each.
@@ -70,7 +67,7 @@ class Streams:
         elapsed: Time from the measurement before to this one [s].
         measured: Whether the IMU has measured the base in the meantime.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
-        silence: For how long neither joints nor IMU were measured before, if longer than `LONGEST_SILENCE` [s]; 0 after
+        silence: For how long neither joints nor IMU were measured before, if longer than 1 s [s]; 0 after
             a measurement of both.
         joint_stamps: Check of the joints' stamps.
     """
@@ -203,7 +200,7 @@ class Streams:
         self._measurements.receive(joints, check, begin, after=after)
         self._samples.receive(imu)
         if check.newest != check.before or self._samples.newest != newest:
-            if self._silent > LONGEST_SILENCE:
+            if self._silent > 1.0:  # [s] encoders may count from elsewhere, and the estimate does not go on
                 self.silence = self._silent
                 self._samples.forget_until(newest)
             self._silent = 0.0
