@@ -17,6 +17,9 @@ FLOOR_DEVIATION = math.radians(0.2)
 FLOOR_LENGTH = 0.1
 """Distance after which the floor is another one [m]."""
 
+SCRUB_TIME = 1.0
+"""Time constant of the yaw rate by which wheels scrub [s]."""
+
 PLANE_DEVIATION = 3e-4
 """Standard deviation of the tilt of the plane through contacts, by encoders [rad]."""
 
@@ -205,8 +208,7 @@ class WheelInertialFilter:
         """
         tilt_yaw, imu_time = sample
         given = self._variances
-        scrub_time = 1.0  # [s] time constant of the yaw rate by which wheels scrub
-        scrub = -math.expm1(-period / scrub_time)
+        scrub = -math.expm1(-period / SCRUB_TIME)
         slope = -math.expm1(-rolled / FLOOR_LENGTH)
         estimates_tilt = given.tilt > 0.0 and imu_time > 0.0
         # scrubbing yaws the base by 0.5 mrad for each metre that wheels roll
