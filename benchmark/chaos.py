@@ -113,12 +113,12 @@ class Bench:
             system = self._ready()
         except AssertionError as error:
             self.close()
-            return Plan(()), Verdict(complaints=[str(error)])
+            return Plan(()), Verdict(findings=[str(error)])
         names = system.processes.names
         course = self._scheme == "fig5"
         trial = CourseTrial(system, draw_kill(seed, names, self._stop)) if course else Trial(system, draw(seed, names))
         plan, verdict = trial.plan, trial.run()
-        if verdict.complaints:
+        if verdict.findings:
             self.close()
         return plan, verdict
 
@@ -154,8 +154,8 @@ class Table:
         victim = " + ".join(fault.victim for fault in plan.faults) or "none"
         trials, failures, worst = self._rows.get((system, kind, victim), (0, 0, Verdict()))
         worst.add(verdict)
-        self._rows[system, kind, victim] = trials + 1, failures + bool(verdict.complaints), worst
-        self.failures += bool(verdict.complaints)
+        self._rows[system, kind, victim] = trials + 1, failures + bool(verdict.findings), worst
+        self.failures += bool(verdict.findings)
 
     def show(self, figures: Figures) -> None:
         """Print a row of each."""
@@ -181,16 +181,16 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
                 what = " and ".join(map(str, plan.faults))
                 log(
                     f"{name} {number + 1}/{options.trials} seed {seed}: {what} ({time.monotonic() - begin:.1f} s): "
-                    f"{'FAILED' if verdict.complaints else 'good'}"
+                    f"{'FAILED' if verdict.findings else 'good'}"
                 )
-                for complaint in verdict.complaints:
-                    log(f"    {complaint}")
-                if verdict.complaints:
+                for finding in verdict.findings:
+                    log(f"    {finding}")
+                if verdict.findings:
                     log(
                         f"failed: --scheme {options.scheme} --system {name} --stop {options.stop:g} "
                         f"--trials 1 --seed {seed}"
                         f"  ({what}): "
-                        f"{verdict.complaints[0]}"
+                        f"{verdict.findings[0]}"
                     )
     return table
 
@@ -206,7 +206,7 @@ class SensorTable:
     """The worst of each fault of a sensor.
 
     Attributes:
-        failed: The command that repeats each trial that failed, what it was, and its complaints.
+        failed: The command that repeats each trial that failed, what it was, and its findings.
     """
 
     def __init__(self) -> None:
@@ -216,10 +216,10 @@ class SensorTable:
     def add(self, trial: "SensorTrial", outcome: "Outcome") -> None:
         """Add a trial."""
         self._rows.setdefault(trial.fault, []).append(outcome)
-        if outcome.complaints:
+        if outcome.findings:
             what = f"{trial.motion}, {trial.fault} {outcome.size}".strip()
             command = f"./run exec python benchmark/chaos.py --sensors --trials 1 --seed {trial.seed}"
-            self.failed.append(f"{command}  # {what}: {'; '.join(outcome.complaints)}")
+            self.failed.append(f"{command}  # {what}: {'; '.join(outcome.findings)}")
 
     def show(self, figures: Figures) -> None:
         """Print a row of each fault, and the failures to stderr."""
@@ -232,7 +232,7 @@ class SensorTable:
                 named=len(times),
                 after=max(times, default=None),
                 drives=sum(each.obeys for each in outcomes),
-                failures=sum(bool(each.complaints) for each in outcomes),
+                failures=sum(bool(each.findings) for each in outcomes),
             )
         for text in self.failed:
             log(f"failed: {text}")
@@ -240,18 +240,18 @@ class SensorTable:
 
 def run_sensors(options: argparse.Namespace) -> int:
     """Run trials with wrong sensors; return the exit code."""
-    from breaking.sensors import drawn, judge
+    from breaking.sensors import check_outcome, drawn
 
     table, begin = SensorTable(), time.monotonic()
     try:
         for number in range(options.trials):
             seed = options.seed + number
             trial = drawn(seed)
-            outcome = judge(trial, trial.run())
+            outcome = check_outcome(trial, trial.run())
             table.add(trial, outcome)
             left = (time.monotonic() - begin) / (number + 1) * (options.trials - number - 1)
             what = f"{trial.motion}, {trial.fault} {outcome.size}".strip()
-            verdict = f"FAILED: {'; '.join(outcome.complaints)}" if outcome.complaints else "good"
+            verdict = f"FAILED: {'; '.join(outcome.findings)}" if outcome.findings else "good"
             named = f"+{outcome.named_after:.2f} s {outcome.named[0][1][:100]}" if outcome.named else "nothing is named"
             end = "drives" if outcome.obeys else f"{', '.join(outcome.stopped) or 'nothing'} stopped: {outcome.advice}"
             log(f"{number + 1}/{options.trials} seed {seed}: {what}: {verdict} ({named}; {end}; {left:.0f} s left)")
@@ -265,7 +265,7 @@ def run_sensors(options: argparse.Namespace) -> int:
 
 def run_sizes(options: argparse.Namespace) -> int:
     """Find the smallest size of each fault that is named soon, and run a trial below it; return the exit code."""
-    from breaking.sensors import SIZES, Messages, SensorTrial, judge
+    from breaking.sensors import SIZES, Messages, SensorTrial, check_outcome
 
     table = Figures(options.json)
     failures = 0
@@ -277,10 +277,10 @@ def run_sizes(options: argparse.Namespace) -> int:
             size, below, reason, seed = max(found, key=lambda each: each[:2])
             mean = math.exp(sum(math.log(each[0]) for each in found) / len(found))
             trial = SensorTrial("turns", fault, seed, below)
-            outcome = judge(trial, trial.run())
-            failures += bool(outcome.complaints)
+            outcome = check_outcome(trial, trial.run())
+            failures += bool(outcome.findings)
             numbers = {name: float(getattr(outcome, name)) for name in SENSOR_FIGURES}
-            texts = {"complaints": "; ".join(outcome.complaints) or "none", "reason": reason}
+            texts = {"findings": "; ".join(outcome.findings) or "none", "reason": reason}
             table.row(f"{fault} [{unit}]", named_from=size, mean=mean, **numbers, **texts)
     return 1 if failures else 0
 

@@ -42,13 +42,13 @@ def lifts(world: ForcesWorld, count: int, random: np.random.Generator) -> None:
     """Lift wheels and put them down, by drawn heights and speeds, while the base leans to the other side."""
     legs = Legs(world)
     for leg in LEGS:
-        lean = np.array((0.21 if leg in (1, 2) else 0.0, 0.07 if leg in (1, 3) else -0.07, 0.0))
+        tilt = np.array((0.21 if leg in (1, 2) else 0.0, 0.07 if leg in (1, 3) else -0.07, 0.0))
         joints = sum(legs.joints, ())
-        leant = sum((legs.reach(each, lean) for each in LEGS), ())
-        world.run(world.move(joints=joints, positions=leant, speed=0.3) + 0.5)
+        tilted = sum((legs.reach(each, tilt) for each in LEGS), ())
+        world.run(world.move(joints=joints, positions=tilted, speed=0.3) + 0.5)
         for _ in range((count + len(LEGS) - 1) // len(LEGS)):
             for height in (random.uniform(0.01, 0.1), random.uniform(-0.005, 0.0)):
-                goal = legs.reach(leg, lean + (0.0, 0.0, height))
+                goal = legs.reach(leg, tilt + (0.0, 0.0, height))
                 took = world.move(joints=legs.joints[leg - 1], positions=goal, speed=random.uniform(0.1, 0.6))
                 world.run(took + random.uniform(0.15, 0.5))
         straight = sum((legs.reach(each, np.zeros(3)) for each in LEGS), ())

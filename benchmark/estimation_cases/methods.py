@@ -137,8 +137,8 @@ class Plugins:
         plugin.component.law.write_covariance(pose, twist)
         estimate = plugin.robot.kinematics.base.to_rotation(plugin.robot.state.position[:6])
         # headings differ: only what the vertical is to the base counts
-        lean = estimate @ (estimate[2] - truth.rotation[2])
-        tilt = np.array((-lean[1], lean[0]))
+        difference = estimate @ (estimate[2] - truth.rotation[2])
+        tilt = np.array((-difference[1], difference[0]))
         true = truth.rotation
         cosine, sine = (function(math.atan2(true[1, 0], true[0, 0])) for function in (math.cos, math.sin))
         x, y, z = truth.velocity[:3]

@@ -12,7 +12,7 @@ from solfer.numerics.rotations import rotation_from_quaternion
 
 GYROSCOPE, ACCELEROMETER, GYROSCOPE_WALK, ACCELEROMETER_WALK = 9e-5, 1e-3, 1e-6, 1e-4
 """Densities of noise [rad/s, m/s^2 /sqrt(Hz)] and of the walks of biases [the same in a second /sqrt(s)]."""
-GYROSCOPE_BIAS, ACCELEROMETER_BIAS, LEAN = 5e-3, 0.02, 0.03
+GYROSCOPE_BIAS, ACCELEROMETER_BIAS, TILT = 5e-3, 0.02, 0.03
 """Deviations at the start: of biases [rad/s, m/s^2], and of the tilt [rad]."""
 CONTACT, STANDING, KINEMATICS = 0.01, 1e-4, 1e-3
 """Density of the slip of contacts, also while no joint moves [m/s/sqrt(Hz)]; deviation of places by encoders [m]."""
@@ -45,7 +45,7 @@ class PointContacts:
         self.rotation = rotation_from_quaternion(sample.imu.orientation)
         self.vectors, self.biases = np.zeros((6, 3)), np.zeros((2, 3))
         self.covariance = np.diag(
-            np.repeat((LEAN**2, 1e-6, 0.0, *[KINEMATICS**2] * 4, GYROSCOPE_BIAS**2, ACCELEROMETER_BIAS**2), 3)
+            np.repeat((TILT**2, 1e-6, 0.0, *[KINEMATICS**2] * 4, GYROSCOPE_BIAS**2, ACCELEROMETER_BIAS**2), 3)
         )
         self.covariance[2, 2] = 0.0
         self._places = self._find(sample)

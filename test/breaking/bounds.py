@@ -80,7 +80,7 @@ class Verdict:
         away: Largest distance of a joint from its path, or from where it was [rad].
         swing: The same while wheels speed up or brake [rad].
         speed: Largest speed of a joint [rad/s].
-        complaints: What is beyond its bound, in words.
+        findings: What is beyond its bound, in words.
     """
 
     wheel: float = 0.0
@@ -88,20 +88,20 @@ class Verdict:
     away: float = 0.0
     swing: float = 0.0
     speed: float = 0.0
-    complaints: list[str] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
 
     def add(self, other: "Verdict") -> None:
-        """Keep the worse figures of both, and all complaints."""
+        """Keep the worse figures of both, and all findings."""
         for name in FIGURES:
             setattr(self, name, max(getattr(self, name), getattr(other, name)))
-        self.complaints += other.complaints
+        self.findings += other.findings
 
 
 FIGURES = ("wheel", "excess", "away", "swing", "speed")
 
 
-def judge(joints: tuple[str, ...], samples: Samples, expected: Expected) -> Verdict:
-    """Judge what a robot did from the fault on.
+def check_motion(joints: tuple[str, ...], samples: Samples, expected: Expected) -> Verdict:
+    """Check what a robot did from the fault on.
 
     Args:
         joints: Names of the joints.
@@ -130,15 +130,15 @@ def _distances(
         if worst > bound:
             row, column = np.unravel_index(np.where(when[:, None], away, 0.0).argmax(), away.shape)
             words = "while wheels brake or speed up" if name == "swing" else "off its path, or off where it was"
-            verdict.complaints.append(
+            verdict.findings.append(
                 f"{joints[column]} {worst:.3f} rad {words}, {samples.times[row] - expected.end:.2f} s after the fault"
             )
 
 
-def judge_return(
+def check_return(
     joints: tuple[str, ...], samples: Samples, wheels: np.ndarray, since: float, fastest: float
 ) -> Verdict:
-    """Judge what a robot did after a new request; a plugin that starts anew may carry it out.
+    """Check what a robot did after a new request; a plugin that starts anew may carry it out.
 
     Args:
         joints: Names of the joints.
@@ -151,7 +151,7 @@ def judge_return(
     _speeds(verdict, joints, samples, afterwards, ~wheels)
     verdict.excess = float(np.abs(samples.velocities[afterwards][:, wheels]).max(initial=0.0)) - fastest
     if verdict.excess > WHEEL_EXCESS:
-        verdict.complaints.append(f"a wheel turned {verdict.excess:.2f} rad/s faster than ever asked for")
+        verdict.findings.append(f"a wheel turned {verdict.excess:.2f} rad/s faster than ever asked for")
     return verdict
 
 
@@ -161,7 +161,7 @@ def _speeds(verdict: Verdict, joints: tuple[str, ...], samples: Samples, when: n
     verdict.speed = float(speeds.max(initial=0.0))
     if verdict.speed > SPEED:
         row, column = np.unravel_index(speeds.argmax(), speeds.shape)
-        verdict.complaints.append(
+        verdict.findings.append(
             f"{np.array(joints)[held][column]} moved at {verdict.speed:.2f} rad/s at {samples.times[when][row]:.2f} s"
         )
 
@@ -205,7 +205,7 @@ def _wheels(verdict: Verdict, joints: tuple[str, ...], samples: Samples, expecte
     low, high = np.minimum(asked, 0.0), np.maximum(asked, 0.0)
     verdict.excess = float(np.maximum(low - speeds, speeds - high).max(initial=0.0))
     if verdict.excess > WHEEL_EXCESS:
-        verdict.complaints.append(f"a wheel turned {verdict.excess:.2f} rad/s faster than asked for")
+        verdict.findings.append(f"a wheel turned {verdict.excess:.2f} rad/s faster than asked for")
     if not expected.forgotten[expected.wheels].all():
         return
     worst = np.abs(speeds).max(axis=1)
@@ -213,7 +213,7 @@ def _wheels(verdict: Verdict, joints: tuple[str, ...], samples: Samples, expecte
     verdict.wheel = float(worst[afterwards].max(initial=0.0))
     if verdict.wheel > WHEEL_REST:
         moment = times[afterwards][worst[afterwards].argmax()] - expected.end
-        verdict.complaints.append(
+        verdict.findings.append(
             f"a wheel without commands turned at {verdict.wheel:.2f} rad/s, {moment:.2f} s after the fault"
         )
 

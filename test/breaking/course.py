@@ -172,9 +172,9 @@ class CourseTrial:
         try:
             self._run(verdict)
         except AssertionError as error:
-            verdict.complaints.append(str(error))
-        ours = [each for each in self._system.processes.complaints() if not each.startswith("navigation ended")]
-        verdict.complaints += ours
+            verdict.findings.append(str(error))
+        ours = [each for each in self._system.processes.errors() if not each.startswith("navigation ended")]
+        verdict.findings += ours
         return verdict
 
     def _run(self, verdict: Verdict) -> None:
@@ -191,23 +191,23 @@ class CourseTrial:
                 time.sleep(self._kill.stop)
             else:
                 system.passes(self._kill.stop)
-                self._judge(verdict, record.samples(robot), moment, commanded)
+                self._check(verdict, record.samples(robot), moment, commanded)
             system.processes.go_on(victim)
             system.passes(1.0)
         elif victim == system.simulator:
             system.replace_robot()
             system.passes(1.0)
-            self._judge_new(verdict, record.samples(record.robots))
+            self._check_new(verdict, record.samples(record.robots))
         else:
             system.passes(AFTER)
-            self._judge(verdict, record.samples(robot), moment, commanded)
+            self._check(verdict, record.samples(robot), moment, commanded)
             system.processes.start(victim)
         self._drive(f"a robot that drives on after a new {victim}")
         if self._kill.stop:
             return
         news = {name: text for name, text in self._news(lengths).items() if name != victim}
         if not any(re.search(NAMED[victim], text) for text in news.values()):
-            verdict.complaints.append(f"no survivor logs that {victim} is gone")
+            verdict.findings.append(f"no survivor logs that {victim} is gone")
 
     def _drive(self, what: str) -> None:
         """Wait until wheels turn; a navigation at its end begins again."""
@@ -224,8 +224,8 @@ class CourseTrial:
         record = self._system.record
         return max(abs(record.velocity(joint)) for joint in record.joints if joint.startswith(WHEEL))
 
-    def _judge(self, verdict: Verdict, samples: Samples, moment: float, commanded: dict[str, float]) -> None:
-        """Judge wheels and joints after a kill; joints stay between their places and all commands."""
+    def _check(self, verdict: Verdict, samples: Samples, moment: float, commanded: dict[str, float]) -> None:
+        """Check wheels and joints after a kill; joints stay between their places and all commands."""
         joints, victim = self._system.record.joints, self._kill.victim
         wheels = np.array([joint.startswith(WHEEL) for joint in joints])
         limit = SILENCE + BRAKING + SPARE if victim in STEERED else LEASE + SPARE
@@ -235,7 +235,7 @@ class CourseTrial:
         verdict.wheel = max(verdict.wheel, last)
         if last > limit:
             late = float(speeds[samples.times > moment + limit].max())
-            verdict.complaints.append(
+            verdict.findings.append(
                 f"wheels turned until {last:.2f} s after the kill, {limit:.2f} s are allowed; at {late:.2f} rad/s then"
             )
         if victim in STEERED:
@@ -250,10 +250,10 @@ class CourseTrial:
         away = np.where(wheels, 0.0, np.maximum(beyond - stopping, 0.0)).max(axis=0)
         verdict.away = max(verdict.away, float(away.max()))
         if away.max() > AWAY:
-            verdict.complaints.append(f"{joints[int(away.argmax())]} went {away.max():.3f} rad beyond its reference")
+            verdict.findings.append(f"{joints[int(away.argmax())]} went {away.max():.3f} rad beyond its reference")
 
-    def _judge_new(self, verdict: Verdict, samples: Samples) -> None:
-        """Judge a robot that begins anew: commands blend in from where it stands; wheels are steered for the course."""
+    def _check_new(self, verdict: Verdict, samples: Samples) -> None:
+        """Check a robot that begins anew: commands blend in from where it stands; wheels are steered for the course."""
         first = samples.times <= samples.times[0] + BEGINNING
         samples = Samples(*(each[first] for each in samples))
         wheels = np.array([joint.startswith((WHEEL, STEERING)) for joint in self._system.record.joints])
@@ -262,7 +262,7 @@ class CourseTrial:
         verdict.speed = max(verdict.speed, speed)
         if away.max() > AWAY or speed > 2.0:
             joint = self._system.record.joints[int(away.argmax())]
-            verdict.complaints.append(f"{joint} jumped by {away.max():.3f} rad at a start, {speed:.2f} rad/s at most")
+            verdict.findings.append(f"{joint} jumped by {away.max():.3f} rad at a start, {speed:.2f} rad/s at most")
 
     def _lengths(self) -> dict[str, int]:
         processes = self._system.processes

@@ -108,7 +108,7 @@ class Processes:
         """Return the file of a process' output."""
         return self._folder / f"{name}.log"
 
-    def complaints(self) -> list[str]:
+    def errors(self) -> list[str]:
         """List what is wrong since the last call: processes that ended by themselves, tracebacks, zombies."""
         found = []
         for name, process in list(self._running.items()):

@@ -53,7 +53,7 @@ class Outcome:
         obeys: Whether it drives as commanded in the end.
         advice: What else it says in the end: why a plugin is stopped, or the last warning.
         size: Size of the fault, as drawn.
-        complaints: What may not be.
+        findings: What may not be.
     """
 
     joint: float = 0.0
@@ -69,7 +69,7 @@ class Outcome:
     obeys: bool = False
     advice: str = ""
     size: str = ""
-    complaints: list[str] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
 
     @property
     def named_after(self) -> float:
@@ -144,7 +144,7 @@ def driven(motion: str) -> Driven:
 
 
 def in_a_copy(work: Callable[[], Outcome]) -> Outcome:
-    """Work in a copy of this process, which stays as it is; return the result, or a complaint if there is none."""
+    """Work in a copy of this process, which stays as it is; return the result, or a finding if there is none."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=lambda: sender.send(work()), daemon=True)
@@ -153,7 +153,7 @@ def in_a_copy(work: Callable[[], Outcome]) -> Outcome:
     try:
         return receiver.recv()
     except EOFError:
-        return Outcome(complaints=["the trial ended by an exception, see above"])
+        return Outcome(findings=["the trial ended by an exception, see above"])
     finally:
         process.join()
         receiver.close()
@@ -376,7 +376,7 @@ def _bounds(usual: Outcome, rests: Outcome) -> dict[str, float]:
     }
 
 
-def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
+def check_outcome(trial: SensorTrial, outcome: Outcome) -> Outcome:
     """Add what the robot may not do, during the fault and after it.
 
     It is compared with what it does without a fault, and where it moves by itself (hands that stop let it sway, an arm
@@ -386,7 +386,7 @@ def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
     A fault moves the robot if a figure comes halfway from what is usual to its bound: then it has to be named,
     unless it is a command. In the end the robot drives as commanded, or says why not.
     """
-    if outcome.complaints:
+    if outcome.findings:
         return outcome
     usual = _run(trial.motion, "", 0)
     bounds = _bounds(usual, usual)
@@ -401,13 +401,13 @@ def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
     for name, bound in bounds.items():
         if not values[name] <= bound:
             when = outcome.when.get(name, math.nan)
-            outcome.complaints.append(f"{name} {values[name]:.3f} at +{when:.2f} s, {bound:.3f} at most")
+            outcome.findings.append(f"{name} {values[name]:.3f} at +{when:.2f} s, {bound:.3f} at most")
     if moves and outcome.named_after > NAMED and trial.fault not in COMMANDS:
-        outcome.complaints.append(f"it moves the robot ({', '.join(moves)}), and is not named within {NAMED} s")
+        outcome.findings.append(f"it moves the robot ({', '.join(moves)}), and is not named within {NAMED} s")
     if "locomotion" in outcome.stopped and outcome.rest > 0.02:
-        outcome.complaints.append(f"it stopped, and still moves by {outcome.rest:.3f} m/s")
+        outcome.findings.append(f"it stopped, and still moves by {outcome.rest:.3f} m/s")
     if not outcome.obeys and not outcome.advice:
-        outcome.complaints.append(f"it neither drives as commanded ({outcome.rest:.3f} m/s) nor says why")
+        outcome.findings.append(f"it neither drives as commanded ({outcome.rest:.3f} m/s) nor says why")
     return outcome
 
 

@@ -111,9 +111,7 @@ class System(abc.ABC):
         try:
             self._start()
         except AssertionError as error:
-            raise AssertionError(
-                "; ".join([f"the system does not start: {error}", *self.processes.complaints()])
-            ) from None
+            raise AssertionError("; ".join([f"the system does not start: {error}", *self.processes.errors()])) from None
 
     def _start(self) -> None:
         self.revive()

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from breaking.bounds import AFTER, Expected, Verdict, judge, judge_return
+from breaking.bounds import AFTER, Expected, Verdict, check_motion, check_return
 from breaking.processes import WAIT, until
 from breaking.systems import MOVED, TRY, WHEELS, System, lower
 
@@ -112,8 +112,8 @@ class Trial:
         try:
             self._run(verdict)
         except AssertionError as error:
-            verdict.complaints.append(str(error))
-        verdict.complaints += self._system.processes.complaints()
+            verdict.findings.append(str(error))
+        verdict.findings += self._system.processes.errors()
         return verdict
 
     def _run(self, verdict: Verdict) -> None:
@@ -128,11 +128,11 @@ class Trial:
             self._end = float(record.samples(record.robots).times[0])
         system.passes(AFTER, self._end)
         self._watched = record.time
-        verdict.add(self._judge(robot, expected))
+        verdict.add(self._check(robot, expected))
         system.revive()
         system.obey(-TRY if plan.speed > 0.0 else TRY)
         verdict.add(
-            judge_return(
+            check_return(
                 record.joints, record.samples(record.robots), expected.wheels, self._watched, max(abs(plan.speed), TRY)
             )
         )
@@ -213,24 +213,25 @@ class Trial:
                 self._start(fault.victim)
 
     def _start(self, name: str) -> None:
-        """Start a process that has ended; without a robot there is nothing to judge."""
+        """Start a process that has ended; without a robot there is nothing to check."""
         if name == self._system.simulator:
             self._system.replace_robot()
         else:
             self._system.processes.start(name)
 
-    def _judge(self, robot: int, expected: Expected) -> Verdict:
-        """Judge what the robot did until the end of WATCH; a simulator that began anew has another one."""
+    def _check(self, robot: int, expected: Expected) -> Verdict:
+        """Check what the robot did until the end of WATCH; a simulator that began anew has another one."""
         record = self._system.record
         if record.robots == robot:
             forgotten = np.array([self._forgotten(joint) for joint in record.joints])
-            return judge(record.joints, record.samples(robot), replace(expected, end=self._end, forgotten=forgotten))
+            allowed = replace(expected, end=self._end, forgotten=forgotten)
+            return check_motion(record.joints, record.samples(robot), allowed)
         first = record.samples(robot)
-        verdict = judge(record.joints, first, replace(expected, end=first.times[-1]))
+        verdict = check_motion(record.joints, first, replace(expected, end=first.times[-1]))
         samples = record.samples(record.robots)
         place, everything = samples.positions[0], np.ones(len(record.joints), dtype=bool)
         verdict.add(
-            judge(
+            check_motion(
                 record.joints,
                 samples,
                 Expected(expected.wheels, place, place, np.zeros(len(place)), self._end, self._end, everything),

@@ -37,7 +37,7 @@ class StopsTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder, contextlib.closing(make(Path(folder))) as system:
             system.start()
             for fault in faults:
-                self.assertEqual(Trial(system, Plan((fault,))).run().complaints, [], fault)
+                self.assertEqual(Trial(system, Plan((fault,))).run().findings, [], fault)
 
     def test_a_plugin_alone(self):
         stops = [Fault("stop", "joint_states", duration) for duration in ((GAP, TIMEOUT, LONG) if SOAKS else (LONG,))]

@@ -11,9 +11,6 @@ from argcomplete.completers import FilesCompleter
 
 from solfer.errors import SolferError
 
-ENDINGS = {"file": "yaml", "urdf": "urdf", "srdf": "srdf"}
-"""Ending of the files that an argument names."""
-
 
 def complete(parser: argparse.ArgumentParser) -> None:
     """Answer a shell that completes a command line, and end the program; else do nothing."""
@@ -46,7 +43,8 @@ def _completer(action: argparse.Action) -> Callable[..., Iterable[str]]:
         return lambda parsed_args, **_: _names(parsed_args)
     if action.dest in ("running", "parameters"):
         return partial(_live, action.dest)
-    return FilesCompleter(ENDINGS.get(action.dest, ()))
+    endings = {"file": "yaml", "urdf": "urdf", "srdf": "srdf"}
+    return FilesCompleter(endings.get(action.dest, ()))
 
 
 def _robots() -> Iterable[str]:

@@ -7,8 +7,6 @@ from typing import Any
 from solfer.config import CheckReport, Notice
 from solfer.errors import SolferError
 
-_PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*))?", re.DOTALL)
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -65,7 +63,7 @@ def _of_notice(notice: Notice) -> Finding:
 
 
 def _place(where: str) -> tuple[str, int | None, int | None, str]:
-    match = _PLACE.fullmatch(where)
+    match = re.fullmatch(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*))?", where, re.DOTALL)
     if match is None:
         return where, None, None, ""
     return match["file"], int(match["line"]), int(match["column"]), match["path"] or ""

@@ -39,9 +39,6 @@ SUB_COMMANDS = {
 }
 """Modules of the sub-commands, below this package."""
 
-MOST_ERRORS = 20
-"""Largest number of errors of one input that are printed."""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
@@ -99,10 +96,11 @@ def _run(words: Sequence[str]) -> int:
     except SolferError as error:
         sys.stdout.flush()
         errors = list(singles((error,)))
-        for single in errors[:MOST_ERRORS]:
+        shown = 20  # of the errors of one input
+        for single in errors[:shown]:
             print(f"error: {single}", file=sys.stderr)
-        if len(errors) > MOST_ERRORS:
-            print(f"error: {len(errors) - MOST_ERRORS} errors more", file=sys.stderr)
+        if len(errors) > shown:
+            print(f"error: {len(errors) - shown} errors more", file=sys.stderr)
         return error.exit_code
 
 

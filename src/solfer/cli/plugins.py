@@ -18,14 +18,6 @@ from solfer.robot import robot_files
 
 _LOG = logging.getLogger(__name__)
 
-_KINDS = {
-    Service: "service",
-    TopicIn: "topic in",
-    TopicOut: "topic out",
-    Action: "action",
-    Parameter: "parameter",
-}
-
 
 def report_of(options: argparse.Namespace) -> CheckReport:
     """Check FILE, or the configuration -n in it; the correct parts of a whole FILE with mistakes can be used.
@@ -128,7 +120,14 @@ def known_declarations(configuration: Configuration) -> tuple[Declared, ...]:
 
 def _printed(owner: str, declaration: Declaration) -> Declared:
     interface = declaration.kind.__name__ if isinstance(declaration, Parameter) else declaration.interface
-    return Declared(_KINDS[type(declaration)], full_name(owner, declaration.name), interface)
+    kinds = {
+        Service: "service",
+        TopicIn: "topic in",
+        TopicOut: "topic out",
+        Action: "action",
+        Parameter: "parameter",
+    }
+    return Declared(kinds[type(declaration)], full_name(owner, declaration.name), interface)
 
 
 def network_of(file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()) -> Network:

@@ -8,9 +8,6 @@ import numpy as np
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.robot import Robot
 
-RESET = "reset"
-"""State name that requests to stay where the robot is now."""
-
 
 @dataclass(frozen=True)
 class MoveJoints:
@@ -73,6 +70,9 @@ class JointGoals:
         chain: Name of the group that they belong to, for errors.
     """
 
+    _RESET = "reset"
+    """State name that requests to stay where the robot is now."""
+
     def __init__(self, robot: Robot, joints: np.ndarray, wheels: np.ndarray, chain: str):
         self._robot = robot
         self._joints = joints
@@ -101,12 +101,12 @@ class JointGoals:
         if command.pos_step < 0.0:
             raise ComponentError(f"pos_step {command.pos_step:g} rad", expected="a positive number, or 0")
         speed = min(command.pos_step / period, 2.0)  # [rad/s] as in the original program
-        if name == RESET or name in self._robot.semantics.states:
+        if name == self._RESET or name in self._robot.semantics.states:
             return MoveJoints(state=name, speed=speed)
         if name in self._wheel_place:
             return MoveJoints(joints=(name,), velocities=(command.velocity,))
         if name not in self._place:
-            known = (RESET, *self._robot.semantics.states, *self._place, *self._wheel_place)
+            known = (self._RESET, *self._robot.semantics.states, *self._place, *self._wheel_place)
             raise UnknownName("state or joint", name, known)
         return MoveJoints(joints=(name,), positions=(command.velocity,), speed=speed)
 
@@ -136,19 +136,19 @@ class JointGoals:
             self._set_joints(request, new, new_wheels)
         else:
             raise ComponentError("the request names neither a state nor joints", expected="state, or joints")
-        if request.state != RESET:
+        if request.state != self._RESET:
             self._check_joints(new, new != goal, request.state)
             self._check_wheels(new_wheels)
         return new, new_wheels
 
     def _set_state(self, name: str, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
-        if name == RESET:
+        if name == self._RESET:
             goal[:] = self._robot.state.position[self._joints]
             wheel_goal[:] = 0.0
             return
         states = self._robot.semantics.states
         if name not in states:
-            raise UnknownName("state", name, (*states, RESET))
+            raise UnknownName("state", name, (*states, self._RESET))
         known = [(self._place[joint], value) for joint, value in states[name].items() if joint in self._place]
         if not known:
             raise ComponentError(

@@ -20,15 +20,6 @@ from solfer.transport.plugin_state import SAFE_STOP
 COURSE_RATE = 50.0
 """Of navigation and of what waves [Hz]."""
 
-STEP_TITLES = {
-    2: "drives, becomes narrower",
-    3: "through the gate",
-    4: "becomes wider",
-    5: "along a circle",
-    6: "stands",
-}
-"""What the steps of the course are, by their numbers."""
-
 
 class RealTimeLost(MiddlewareError):
     """A real-time layer has stopped the robot safely: its cycles took too long for this machine."""
@@ -110,6 +101,13 @@ class Driving:
         shown = ""
         robot_begin = robot_time(self._recorder)
         errors = ErrorWatch(middleware)
+        titles = {
+            2: "drives, becomes narrower",
+            3: "through the gate",
+            4: "becomes wider",
+            5: "along a circle",
+            6: "stands",
+        }
 
         def cycle(_: float, skipped: int) -> None:
             nonlocal cycles, shown
@@ -119,9 +117,7 @@ class Driving:
             if cycles % 10 == 0:
                 check()
                 errors.check()
-                title = (
-                    f"waits for {navigation.waits}" if navigation.waits else STEP_TITLES.get(course.number, course.name)
-                )
+                title = f"waits for {navigation.waits}" if navigation.waits else titles.get(course.number, course.name)
                 if title != shown:
                     progress.end()
                     shown = title

@@ -15,10 +15,6 @@ Row = tuple[str, str]
 LAYER = "xbotcore"
 """Name of the report of a real-time layer."""
 
-_AGE_SUFFIX = " age [ms]"
-_GATE_PREFIX = "gate: "
-"""Keys of a plugin's report: ages of its feedbacks, counts of its gates."""
-
 
 def joint_error(measured: Trace, desired: Trace, joints: Collection[str]) -> tuple[float, str]:
     """Find the largest difference of a measured position from the one desired at the same time [rad], and its joint.
@@ -99,16 +95,14 @@ def layer(reports: Mapping[str, HealthReport]) -> list[Row]:
 
 def published(values: Mapping[str, float | str]) -> list[Row]:
     """List the age of the newest message of each feedback, and the counts of the plugin's gate, as far as known."""
+    suffix = " age [ms]"
+    prefix = "gate: "
     ages = [
-        (f"age of {key.removesuffix(_AGE_SUFFIX)}", f"{float(age):.1f} ms")
+        (f"age of {key.removesuffix(suffix)}", f"{float(age):.1f} ms")
         for key, age in values.items()
-        if key.endswith(_AGE_SUFFIX)
+        if key.endswith(suffix)
     ]
-    counts = {
-        key.removeprefix(_GATE_PREFIX): int(float(count))
-        for key, count in values.items()
-        if key.startswith(_GATE_PREFIX)
-    }
+    counts = {key.removeprefix(prefix): int(float(count)) for key, count in values.items() if key.startswith(prefix)}
     listed = ", ".join(f"{count} {kind}" for kind, count in counts.items())
     return [*ages, ("held back by the gate", listed)] if listed else ages
 

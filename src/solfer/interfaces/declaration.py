@@ -13,9 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-REQUEST_BYTES = 65536
-"""Bytes of a request, unless its service sets another number."""
-
 
 @dataclass(frozen=True)
 class Accepted:
@@ -52,7 +49,7 @@ class Service:
     handler: Callable[[Any], Any]
     timeout: float = 2.0
     prepare: Callable[[Any], Any] | None = None
-    largest: int = REQUEST_BYTES
+    largest: int = 65536
     urgent: bool = False
     quick: bool = False
 

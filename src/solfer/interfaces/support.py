@@ -2,8 +2,14 @@
 
 from dataclasses import dataclass
 
-BASE_PORT, VERTICES_PORT, VELOCITIES_PORT = "base", "vertices", "vertex_velocities"
-"""Inputs of the component."""
+BASE_PORT = "base"
+"""Input of the base's pose and velocity."""
+
+VERTICES_PORT = "vertices"
+"""Input of the vertices of the support polygon."""
+
+VELOCITIES_PORT = "vertex_velocities"
+"""Input of their velocities."""
 
 LEAD = 0.5
 """Time that places are ahead of a motion which is to be followed without a lag [s]."""

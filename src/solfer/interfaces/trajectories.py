@@ -5,10 +5,13 @@ from dataclasses import dataclass, field
 TRAJECTORY = "trajectory_msgs/JointTrajectory"
 FOLLOW = "control_msgs/FollowJointTrajectory"
 
-SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS, OLD_HEADER_TIMESTAMP, PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = (
-    0, -1, -2, -3, -4, -5
-)  # fmt: skip
-"""Codes of a FollowResult."""
+# codes of a FollowResult
+SUCCESSFUL = 0
+INVALID_GOAL = -1
+INVALID_JOINTS = -2
+OLD_HEADER_TIMESTAMP = -3
+PATH_TOLERANCE_VIOLATED = -4
+GOAL_TOLERANCE_VIOLATED = -5
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,6 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-FEEDBACK_FREEZE_TIME = 0.15
-"""Time by the stamps without a change of any number after which a feedback is frozen, if joints are to move [s]."""
-
-CONTRADICTION_PATIENCE = 0.3
-"""Time after which a feedback of which each message is refused since others contradict it is wrong, and not late [s]:
-what it measured last is not kept, whatever its `on_timeout` says."""
-
-ENCODER_STEPS = 5e-3
-"""Way that a joint has to be commanded to move meanwhile: several steps of its encoder [rad, m]."""
-
-RECENT = 0.5
-"""Time for which a message that is refused or odd is a warning of the plugin's health [s]."""
-
 TIMEOUT_ACTIONS = {
     "keep": "the last message stays valid",
     "hold": "the plugin holds until it is back",
@@ -54,7 +41,12 @@ class FeedbackState(enum.Enum):
 
 
 # module globals: the lookup in the control cycle is several times as fast as on the class
-WAITING, LIVE, SILENT, FROZEN, DISPUTED, REPLACED = FeedbackState
+WAITING = FeedbackState.WAITING
+LIVE = FeedbackState.LIVE
+SILENT = FeedbackState.SILENT
+FROZEN = FeedbackState.FROZEN
+DISPUTED = FeedbackState.DISPUTED
+REPLACED = FeedbackState.REPLACED
 
 TIMED_OUT = (SILENT, FROZEN, DISPUTED)
 
@@ -176,14 +168,15 @@ class FeedbackTimeout:
             self._handovers = feedback.handovers
             self.restart()
             observed = REPLACED
-        elif age > CONTRADICTION_PATIENCE and feedback.warnings.contradicts:
+        elif age > 0.3 and feedback.warnings.contradicts:  # [s] each message is refused: it is wrong, not late
+            # what it measured last is not kept, whatever its `on_timeout` says
             observed = DISPUTED
         elif age > self.timeout:
             observed = SILENT
         elif (
             change.arrival < math.inf
-            and feedback.stamp - change.stamp > FEEDBACK_FREEZE_TIME  # while a simulation pauses, the stamps stay, too
-            and distance - change.distance > ENCODER_STEPS
+            and feedback.stamp - change.stamp > 0.15  # [s] while a simulation pauses, the stamps stay, too
+            and distance - change.distance > 5e-3  # [rad, m] several steps of an encoder
             and feedback.measures
         ):
             observed = FROZEN
@@ -234,9 +227,10 @@ class FeedbackTimeout:
         """Return why messages were refused, or odd, lately, before the time `now` [s]; empty: none was."""
         place = self.feedback.place
         warnings = self.feedback.warnings
-        if warnings.refusal and now - warnings.refused_at < RECENT:
+        recent = 0.5  # [s]
+        if warnings.refusal and now - warnings.refused_at < recent:
             return f"{place} refuses messages of {warnings.refusal}"
-        return f"{place}: {warnings.remark}" if now - warnings.remarked_at < RECENT else ""
+        return f"{place}: {warnings.remark}" if now - warnings.remarked_at < recent else ""
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""

@@ -38,7 +38,12 @@ STARTING = PluginState.STARTING
 RUNNING = PluginState.RUNNING
 STOPPED = PluginState.STOPPED
 CLOSED = PluginState.CLOSED
-CALLS, READ, ROBOT, COMPONENT, GATE, WRITE = Stage
+CALLS = Stage.CALLS
+READ = Stage.READ
+ROBOT = Stage.ROBOT
+COMPONENT = Stage.COMPONENT
+GATE = Stage.GATE
+WRITE = Stage.WRITE
 
 
 @dataclass(frozen=True)

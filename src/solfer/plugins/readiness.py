@@ -14,16 +14,6 @@ from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
-FIRST_MESSAGES_PATIENCE = 60.0
-"""Longest wait for the first messages of all required feedbacks [s]."""
-
-STALL = 0.2
-"""Default of the lateness of a plugin's own loop at which it starts again [s]. After less a component goes on, by the
-time that has passed; meanwhile the lower level carries out its last commands, for its lease on the joints is longer."""
-
-STALL_PERIODS = 5
-"""The same in periods of the plugin; the longer one counts."""
-
 
 class CycleVerdict(enum.Enum):
     """What a plugin has to do in this cycle.
@@ -40,7 +30,10 @@ class CycleVerdict(enum.Enum):
 
 
 # module globals: the lookup in the control cycle is several times as fast as on the class
-WORK, HOLD, WAIT, FORGET = CycleVerdict
+WORK = CycleVerdict.WORK
+HOLD = CycleVerdict.HOLD
+WAIT = CycleVerdict.WAIT
+FORGET = CycleVerdict.FORGET
 
 
 class Readiness:
@@ -52,7 +45,7 @@ class Readiness:
         claim: Its claim on the joints that it commands; None: it commands none.
         middleware: The clock of the pipes.
         period: Time of a control cycle [s].
-        stall: Lateness of its loop at which it begins again [s]; None: STALL or STALL_PERIODS, whichever is longer. It
+        stall: Lateness of its loop at which it begins again [s]; None: 0.2 s or five periods, whichever is longer. It
             is capped at the shortest timeout of a feedback, after which other plugins would hold, too.
 
     Attributes:
@@ -77,7 +70,9 @@ class Readiness:
         self._claim = claim
         self._middleware = middleware
         self._rewinds = middleware.rewinds
-        self._longest = period + min(stall or max(STALL, STALL_PERIODS * period), self.feedbacks.shortest_timeout)
+        # after less a component goes on, by the time that has passed; meanwhile the lower level carries out its last
+        # commands, for its lease on the joints is longer
+        self._longest = period + min(stall or max(0.2, 5 * period), self.feedbacks.shortest_timeout)
         self._past = ""
         self._logged = ""
         self._earliest = -math.inf
@@ -232,11 +227,12 @@ class Readiness:
                     expected="a publisher that goes on, or `on_timeout: hold`",
                 )
             return HOLD
+        patience = 60.0  # [s] for the first messages of all required feedbacks
         if self._latest is None:
-            self._latest = now + FIRST_MESSAGES_PATIENCE
+            self._latest = now + patience
         elif now > self._latest and not conflicts:
             raise ReceiveTimeout(
-                f"plugin '{self._plugin}' has waited {FIRST_MESSAGES_PATIENCE:g} s {self.lacks}",
+                f"plugin '{self._plugin}' has waited {patience:g} s {self.lacks}",
                 expected="a publisher; `initialize: false`, or `open_loop: true` of joints that are not measured",
             )
         return WAIT

@@ -15,10 +15,6 @@ from solfer.transport.endpoints import NEW, MessageStatus
 
 logger = logging.getLogger(__name__)
 
-READS, COMPUTES, WRITES, PUBLISHES = "reads", "computes", "writes", "publishes"
-"""What a plugin does: receives a new message, computes a quantity of its Robot, writes the State that it reads, or
-publishes a message."""
-
 
 @dataclass(frozen=True)
 class TraceEvent:
@@ -27,10 +23,11 @@ class TraceEvent:
     Attributes:
         cycle: Number of the cycle, from 1 on; 0: before the first one.
         plugin: Name of the plugin in whose turn it happened.
-        does: READS, COMPUTES, WRITES or PUBLISHES.
-        what: Name of the pipe, or of the quantity; empty for WRITES.
+        does: `reads`: it receives a new message; `computes` a quantity of its Robot; `writes` the State that it reads;
+            or `publishes` a message.
+        what: Name of the pipe, or of the quantity; empty for `writes`.
         robot: Names of the plugins that share the Robot.
-        because: COMPUTES: feedbacks and plugins that changed the State since the same quantity was computed last.
+        because: `computes`: feedbacks and plugins that changed the State since the same quantity was computed last.
     """
 
     cycle: int
@@ -127,7 +124,7 @@ class CycleTrace:
         def after(_: Any) -> None:
             if state.position.tobytes() + state.velocity.tobytes() != self._before:
                 robot.change(plugin.name)
-                self._add(WRITES, "", robot)
+                self._add("writes", "", robot)
 
         return [observed(component, method, after, before=before) for method in ("init", "update", "send")]
 
@@ -139,13 +136,13 @@ class CycleTrace:
         if status is NEW:
             if isinstance(pipe, StateFeedbackPipe) and pipe.measures:
                 robot.change(pipe.name)
-            self._add(READS, pipe.name, robot)
+            self._add("reads", pipe.name, robot)
 
     def _compute(self, robot: _TracedRobot, quantity: str) -> None:
-        self._add(COMPUTES, quantity, robot, because=robot.causes(quantity))
+        self._add("computes", quantity, robot, because=robot.causes(quantity))
 
     def _publish(self, robot: _TracedRobot, pipe: CommandPipe, _: None, __: float) -> None:
-        self._add(PUBLISHES, pipe.name, robot)
+        self._add("publishes", pipe.name, robot)
 
     def _add(self, does: str, what: str, robot: _TracedRobot, because: tuple[str, ...] = ()) -> None:
         self.events.append(TraceEvent(self.cycle, self._plugin, does, what=what, robot=robot.plugins, because=because))

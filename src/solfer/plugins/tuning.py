@@ -32,9 +32,6 @@ logger = logging.getLogger(__name__)
 RAMP = 0.5
 """Time in which numbers move to new ones [s]."""
 
-REQUEST_PARAMETERS = 16
-"""Most parameters that one request changes."""
-
 MOVING_PARAMETERS = 2
 """Most parameters that move in one cycle; more of them take turns."""
 
@@ -274,10 +271,9 @@ class Tuning:
             except SolferError as error:
                 raise error.at(name) from None
             goals[knob.motion] = numbers, bool(np.isfinite(numbers).all())
-        if len(lines) > REQUEST_PARAMETERS:
-            raise ComponentError(
-                f"{len(lines)} parameters change at once", expected=f"at most {REQUEST_PARAMETERS} in a request"
-            )
+        most = 16
+        if len(lines) > most:
+            raise ComponentError(f"{len(lines)} parameters change at once", expected=f"at most {most} in a request")
         return _Change(before, after, tuple(goals.items()), writes=tuple(writes), lines=tuple(lines))
 
     def _explained(self, error: SolferError) -> SolferError:

@@ -29,8 +29,6 @@ _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _CHUNK = struct.Struct("<QQQI")
 _CONTENT = _HEAD.size + _MESSAGE.size
-_MAX_RECORD_SIZE = 1 << 25  # [B]: solfer's own have some hundred kB
-_MAX_CHUNK_SIZE = 1 << 24  # [B], of the messages in a chunk, likewise
 _MAX_OTHERS_SIZE = 1 << 27  # [B], of all that is no chunk
 _MAX_UNPACKED_SIZE = 1 << 28  # [B], of all messages, and besides
 _MAX_EXPANSION = 64  # times the size of the file
@@ -131,7 +129,7 @@ class _Reader:
             if len(head) < _HEAD.size or length > rest - _HEAD.size:
                 self._missing.append(f"an unfinished record of {rest} bytes at the end")
                 return
-            if not opcode or length > _MAX_RECORD_SIZE:
+            if not opcode or length > 1 << 25:  # [B] solfer's own have some hundred kB
                 raise ValueError(f"a record of the kind {opcode} with {length} bytes")
             yield opcode, self._file.read(length)
             rest -= _HEAD.size + length
@@ -165,7 +163,8 @@ class _Reader:
         length = stream.read8()
         packed = stream.read(length)
         try:
-            if size > _MAX_CHUNK_SIZE or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
+            most = 1 << 24  # [B] of the messages in a chunk; solfer's own have some hundred kB
+            if size > most or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
                 raise zstandard.ZstdError("as much memory would be taken as a damaged number says")
             messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
         except zstandard.ZstdError:

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from solfer.recording.model import REQUEST, Event
 
-FEW = 3
-"""Requests of one name that are shown one by one."""
-
 
 @dataclass(frozen=True)
 class EventGroup:
@@ -38,7 +35,7 @@ def request_name(event: Event) -> str:
 
 
 def grouped(events: Iterable[Event]) -> list[EventGroup]:
-    """Count the requests of each name of each plugin, where there are more than `FEW`; other events stay alone."""
+    """Count the requests of each name of each plugin, where there are more than three; other events stay alone."""
     requests: dict[tuple[str, str], list[Event]] = {}
     alone: list[Event] = []
     for event in events:
@@ -46,7 +43,7 @@ def grouped(events: Iterable[Event]) -> list[EventGroup]:
         (requests.setdefault((event.plugin, name), []) if name else alone).append(event)
     groups = []
     for found in requests.values():
-        if len(found) > FEW:
+        if len(found) > 3:
             groups.append(EventGroup(found[0], found[-1].time, len(found)))
         else:
             alone += found

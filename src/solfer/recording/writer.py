@@ -58,11 +58,6 @@ _QOS = json.dumps(
 )
 """Quality of service of each topic, as `ros2 bag` writes it, which the profile `ros2` of MCAP requests: YAML."""
 
-_MEDIA = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
-_CHUNK = (
-    "<QQQIi4sQ"  # first and last time, size, checksum, name of the compression with its length, size of the records
-)
-
 
 class RecordingWriter:
     """A file that grows. What it holds is on the disk after each call, as whole chunks.
@@ -197,7 +192,8 @@ class RecordingWriter:
         self._texts.append(MetadataIndex(begin, len(data), name))
 
     def _attach(self, name: str, content: bytes) -> None:
-        media = _MEDIA.get(Path(name).suffix, "application/octet-stream")
+        kinds = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
+        media = kinds.get(Path(name).suffix, "application/octet-stream")
         data = _bytes(Attachment(0, 0, name, media, content))
         begin = self.size
         self._append(data)
@@ -212,7 +208,8 @@ class RecordingWriter:
         packed = self._compress(messages)
         begin = int(index[..., 0].min())
         end = int(index[..., 0].max())
-        head = struct.pack(_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
+        # first and last time, size, checksum, name of the compression with its length, size of the records
+        head = struct.pack("<QQQIi4sQ", begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
         chunk = struct.pack("<BQ", Opcode.CHUNK, len(head) + len(packed)) + head + packed
         tail = bytearray()
         places = {}
@@ -293,16 +290,13 @@ def save(recording: Recording, path: Path) -> None:
         writer.close()
 
 
-BATCH = 256
-"""Most rows of a chunk that is written from a whole recording."""
-
-
 def _save_together(writer: RecordingWriter, channels: Sequence[Channel]) -> None:
     block = writer.block(channels)
     times = np.rint(1e9 * np.asarray(channels[0].times)).astype(np.int64)
     numbers = np.arange(1, len(times) + 1)
-    for begin in range(0, len(times), BATCH):
-        part = slice(begin, begin + BATCH)
+    most = 256  # rows of a chunk
+    for begin in range(0, len(times), most):
+        part = slice(begin, begin + most)
         values = np.concatenate([channel.values[part] for channel in channels], axis=1)
         writer.write(block, numbers[part], times[part], values)
 

@@ -21,11 +21,6 @@ from solfer.references.timed import TimedReference
 POSTURE = "posture"
 """The quantity of joints."""
 
-_COLUMNS = {
-    "position": ("x", "y", "z"),
-    "orientation": ("qx", "qy", "qz", "qw"),
-    "pose": ("x", "y", "z", "qx", "qy", "qz", "qw"),
-}
 _KINDS = {
     "position": ("circle", "line", "sine", "waypoints", "file"),
     "orientation": ("waypoints", "file"),
@@ -60,7 +55,12 @@ def build_reference(record: ReferenceRecord, quantity: str, joints: Sequence[str
         return _line(record.line, size, rates, absolute=record.absolute)
     if record.sine is not None:
         return _sine(record.sine, size, rates, joints=joints)
-    columns = tuple(joints) if quantity == POSTURE else _COLUMNS[quantity]
+    columns = {
+        "position": ("x", "y", "z"),
+        "orientation": ("qx", "qy", "qz", "qw"),
+        "pose": ("x", "y", "z", "qx", "qy", "qz", "qw"),
+        POSTURE: tuple(joints),
+    }[quantity]
     if record.waypoints is not None:
         times, values = _waypoints(record, record.waypoints, quantity, columns=columns)
     else:

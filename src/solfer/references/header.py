@@ -9,19 +9,6 @@ from solfer.errors import ConfigError, UnknownName
 TIME_COLUMN = "time"
 """Name of the column of times."""
 
-_TIME_NAMES = re.compile(r"(?:header[._])?(?:t|time|timestamp|time_?stamp|stamp|secs?|seconds)", re.IGNORECASE)
-_POSITION_NAMES = re.compile(r"(?:t_?|p_?|p_\w+_|(?:pose[._])?(?:pos|position|translation)[._])?([xyz])", re.IGNORECASE)
-_QUATERNION_NAMES = re.compile(
-    r"(?:q_?|q_\w+_|(?:pose[._])?(?:quat|quaternion|orientation|rotation)[._])([xyzw])", re.IGNORECASE
-)
-_SPACED_FIELD = re.compile(r"\S+?(?:\s*[\[(][^\])]*[\])])?(?=\s|$)")
-_NAME_AND_UNIT = re.compile(r"(.*?)\s*(?:\[(.*)\]|\((.*)\))")
-
-_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-_ANGLE_UNITS = {"rad": 1.0, "deg": 0.017453292519943295}
-_NO_UNITS = {"1": 1.0, "-": 1.0}
-
 
 @dataclass(frozen=True)
 class Field:
@@ -58,7 +45,9 @@ def fields_of(text: str) -> list[Field]:
     """Split a line at its commas, or at blanks if it has none; `#` at its begin does not count."""
     text = re.sub(r"^(\s*)#", r"\1 ", text)
     if "," not in text:
-        return [Field(each.group(), each.start() + 1) for each in _SPACED_FIELD.finditer(text)]
+        # a name, and perhaps its unit in brackets behind a blank
+        fields = re.finditer(r"\S+?(?:\s*[\[(][^\])]*[\])])?(?=\s|$)", text)
+        return [Field(each.group(), each.start() + 1) for each in fields]
     places = [each.span(1) for each in re.finditer(r"(?:^|,)\s*([^,]*)", text)]
     return [Field(text[begin:end].strip().strip('"'), begin + 1) for begin, end in places]
 
@@ -121,15 +110,20 @@ def _resolved(field: Field, columns: Sequence[str]) -> tuple[str, str]:
     """Return the name of a column as solfer writes it, or as it is if it is unknown, and its unit; empty: none."""
     if field.text in columns:
         return field.text, ""
-    split = _NAME_AND_UNIT.fullmatch(field.text)
+    split = re.fullmatch(r"(.*?)\s*(?:\[(.*)\]|\((.*)\))", field.text)
     text = split[1] if split else field.text
     unit = (split[2] or split[3] or "").strip() if split else ""
     if text in columns:
         return text, unit
-    if _TIME_NAMES.fullmatch(text):
+    time_names = r"(?:header[._])?(?:t|time|timestamp|time_?stamp|stamp|secs?|seconds)"
+    position_names = r"(?:t_?|p_?|p_\w+_|(?:pose[._])?(?:pos|position|translation)[._])?([xyz])"
+    quaternion_names = r"(?:q_?|q_\w+_|(?:pose[._])?(?:quat|quaternion|orientation|rotation)[._])([xyzw])"
+    if re.fullmatch(time_names, text, re.IGNORECASE):
         return TIME_COLUMN, unit
-    position = _POSITION_NAMES.fullmatch(text)
-    quaternion = _QUATERNION_NAMES.fullmatch(text) or (re.fullmatch("([xyzw])", text) if "x" not in columns else None)
+    position = re.fullmatch(position_names, text, re.IGNORECASE)
+    quaternion = re.fullmatch(quaternion_names, text, re.IGNORECASE)
+    if quaternion is None and "x" not in columns:
+        quaternion = re.fullmatch("([xyzw])", text)
     for match, prefix in ((position, ""), (quaternion, "q")):
         if match and prefix + match[1].lower() in columns:
             return prefix + match[1].lower(), unit
@@ -139,7 +133,10 @@ def _resolved(field: Field, columns: Sequence[str]) -> tuple[str, str]:
 def _units(name: str) -> dict[str, float]:
     """Return the units in which a column may be, and their values in SI."""
     if name == TIME_COLUMN:
-        return _TIME_UNITS
+        return {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+    lengths = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
     if name in ("x", "y", "z"):
-        return _LENGTH_UNITS
-    return _NO_UNITS if name in ("qx", "qy", "qz", "qw") else _ANGLE_UNITS | _LENGTH_UNITS
+        return lengths
+    if name in ("qx", "qy", "qz", "qw"):
+        return {"1": 1.0, "-": 1.0}
+    return {"rad": 1.0, "deg": 0.017453292519943295} | lengths

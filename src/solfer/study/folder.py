@@ -46,19 +46,6 @@ RECORDING = "recording.mcap"
 COLUMNS_FILE = "columns.npz"
 CLAIM_PREFIX = "claim."
 
-_BAD_ARCHIVE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    ValueError,
-    KeyError,
-    TypeError,
-    RuntimeError,
-    MemoryError,
-)
-"""Errors of NumPy and `zipfile` about a file that is not one of theirs."""
-
 HEARTBEAT_PERIOD = 2.0
 """Period in which a worker renews its claim [s]."""
 
@@ -83,9 +70,6 @@ class Identity(BaseModel):
     process: int
     started: str
     time: float
-
-
-_RESULTS = TypeAdapter(Result)
 
 
 class Claim:
@@ -123,6 +107,8 @@ class StudyFolder:
     Raises:
         StudyError: There is no study in it, or it cannot be read.
     """
+
+    _RESULTS = TypeAdapter(Result)
 
     def __init__(self, path: Path):
         self.path = path
@@ -209,7 +195,7 @@ class StudyFolder:
     def result(self, run: PlannedRun) -> Result | None:
         """Return the result of a run; None: there is none yet."""
         try:
-            return _RESULTS.validate_json((self.of(run) / RESULT).read_bytes())
+            return self._RESULTS.validate_json((self.of(run) / RESULT).read_bytes())
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
@@ -302,7 +288,17 @@ class StudyFolder:
                 times = kept["times"].astype(float)
                 names = [str(name) for name in kept["names"]]
                 values = kept["values"].astype(float)
-        except _BAD_ARCHIVE:
+        except (  # what NumPy and `zipfile` raise of a file that is not one of theirs
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            RuntimeError,
+            MemoryError,
+        ):
             return None
         return (times, names, values) if values.shape == (len(names), *times.shape) and times.ndim == 1 else None
 

@@ -12,10 +12,6 @@ from solfer.errors import ConfigError, UnknownName
 from solfer.recording.log import LogSource
 from solfer.study.records import MeasureRecord, StudyRecord
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    each.__name__: each for each in (abs, min, max, math.sqrt, math.hypot, math.log, math.exp, math.isfinite)
-}
-
 REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
     "rms": lambda rows: math.sqrt(float(np.mean(rows**2))),
     "max": lambda rows: float(rows.max()),
@@ -109,7 +105,9 @@ def evaluated(expression: str, values: Mapping[str, Any], where: str) -> Any:
     Raises:
         ConfigError: It is no expression, or names something else.
     """
-    evaluator = SimpleEval(functions=FUNCTIONS, names={"pi": math.pi, "inf": math.inf, **values})
+    functions: Sequence[Callable[..., Any]] = (abs, min, max, math.sqrt, math.hypot, math.log, math.exp, math.isfinite)
+    by_name = {each.__name__: each for each in functions}
+    evaluator = SimpleEval(functions=by_name, names={"pi": math.pi, "inf": math.inf, **values})
     try:
         return evaluator.eval(expression)
     except (ZeroDivisionError, OverflowError, ValueError):

@@ -33,9 +33,6 @@ CODE_FOLDER = Path(__file__).resolve().parents[1]
 CONFIGURATION_KEY = "configuration"
 """First key of a path into the configuration of the plugins; others lead into the study itself."""
 
-VARYING = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
-"""First keys of paths of what may vary."""
-
 ROW = ("run", "id", "seed")
 """First columns of the table, before those of variations."""
 
@@ -232,8 +229,9 @@ class Study:
         for name, each in self._variations.items():
             path = self._path(name)
             mark = each.place() or self._node.mark
-            if path[0] not in VARYING:
-                problems.unknown(mark, "begin of a path", path[0], VARYING)
+            varying = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
+            if path[0] not in varying:
+                problems.unknown(mark, "begin of a path", path[0], varying)
             elif path[0] == CONFIGURATION_KEY and len(path) < 3:
                 problems.add(mark, f"'{'/'.join(path)}' leads to no tag", "configuration/modules/NAME/TAG")
         for name in (*self._variations, *record.measure):

@@ -7,18 +7,15 @@ from pydantic import Field, model_validator
 from solfer.config import FileRecord, Record
 from solfer.config.records.bounds import OFFSET, SEED, Bounds
 
-VALUE: Bounds = {"ge": -1e9, "le": 1e9}
-"""Of what is drawn; the tag that varies has its own."""
-
-FORCE: Bounds = {"ge": -1e5, "le": 1e5}
-"""Components of forces [N]."""
-
 TIME: Bounds = {"ge": 0.0, "le": 1e5}
 """Times of a motion [s]."""
 
 Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
-Force = Annotated[tuple[Annotated[float, Field(**FORCE)], ...], Field(min_length=3, max_length=3)]
-Pair = Annotated[tuple[Annotated[float, Field(**VALUE)], ...], Field(min_length=2, max_length=2)]
+Force = Annotated[tuple[Annotated[float, Field(ge=-1e5, le=1e5)], ...], Field(min_length=3, max_length=3)]
+"""Components of a force [N]."""
+
+Pair = Annotated[tuple[Annotated[float, Field(ge=-1e9, le=1e9)], ...], Field(min_length=2, max_length=2)]
+"""Bounds of what is drawn; the tag that varies has its own."""
 
 DRAWN_KEYS = ("uniform", "log_uniform", "normal", "choice")
 """Keys of a variation that is drawn for each run."""

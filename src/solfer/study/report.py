@@ -20,9 +20,6 @@ from solfer.study.folder import RECORDING, RUNS, StudyFolder, write_whole
 if TYPE_CHECKING:
     from solfer.recording.review import Figure
 
-MAP_VALUES = 12
-"""Most values of a variable for a map of all its values; of more the range is cut into as many pieces."""
-
 STYLE = """
 body { font: 14px/1.45 sans-serif; margin: 2em auto; max-width: 72em; padding: 0 1em; color: #222 }
 table { border-collapse: collapse; font-size: 12px; font-variant-numeric: tabular-nums }
@@ -188,11 +185,12 @@ def _levels(rows: Sequence[Row], name: str) -> tuple[np.ndarray, list[str]]:
     """Return the level of a variable in each row, shape (n,), and the names of the levels."""
     values = numbers(rows, name)
     distinct = sorted({str(row.get(name)) for row in rows}, key=lambda text: (_number(text), text))
-    if len(distinct) <= MAP_VALUES or not np.isfinite(values).all():
+    most = 12  # of more values the range is cut into as many pieces
+    if len(distinct) <= most or not np.isfinite(values).all():
         place = {text: index for index, text in enumerate(distinct)}
         return np.array([place[str(row.get(name))] for row in rows]), distinct
-    edges = np.linspace(values.min(), values.max(), MAP_VALUES + 1)
-    level = np.clip(np.digitize(values, edges) - 1, 0, MAP_VALUES - 1)
+    edges = np.linspace(values.min(), values.max(), most + 1)
+    level = np.clip(np.digitize(values, edges) - 1, 0, most - 1)
     return level, [f"{(low + high) / 2:.3g}" for low, high in itertools.pairwise(edges)]
 
 

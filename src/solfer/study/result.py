@@ -10,11 +10,6 @@ from pydantic.dataclasses import dataclass
 FAULTS = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS")
 """Signals of a fault of a run; others come from outside, and leave no result."""
 
-_INTERRUPTED = re.compile(
-    rf"SystemExit: 143\b|KeyboardInterrupt\b|its process ended by signal (?!{'|'.join(FAULTS)}\b)"
-)
-"""Failures that 0.2.0 wrote of runs that a signal from outside had ended."""
-
 
 @dataclass(frozen=True)
 class Result:
@@ -38,7 +33,9 @@ class Result:
     @property
     def is_interrupted(self) -> bool:
         """Whether an earlier version counted as a failure that the run was ended by a signal."""
-        return _INTERRUPTED.match(self.failure) is not None
+        # what 0.2.0 wrote of runs that a signal from outside had ended
+        text = rf"SystemExit: 143\b|KeyboardInterrupt\b|its process ended by signal (?!{'|'.join(FAULTS)}\b)"
+        return re.match(text, self.failure) is not None
 
     def as_json(self) -> dict[str, Any]:
         """Return it for JSON, which has no NaN."""

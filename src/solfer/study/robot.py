@@ -13,9 +13,6 @@ from solfer.simulation import BundleRecord, Simulation, find_robot, read_bundle
 from solfer.simulation.world.world import find_world
 from solfer.study.records import PayloadRecord, SimulationRecord
 
-PAYLOAD_NAME = "study_payload"
-"""Name of the link and of the joint of a payload."""
-
 
 def bundle_of(record: SimulationRecord, seed: int) -> BundleRecord:
     """Read the robot's bundle, with the sensors of the record and a seed of their noise.
@@ -130,15 +127,16 @@ def _add_payload(root: ElementTree.Element, payload: PayloadRecord) -> None:
         raise UnknownName("link", payload.link, links, where=payload.where("link"))
     if not payload.mass:
         return
-    link = ElementTree.SubElement(root, "link", name=PAYLOAD_NAME)
+    name = "study_payload"  # of the link and of its joint
+    link = ElementTree.SubElement(root, "link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "mass", value=repr(payload.mass))
     radius = 0.05  # of a solid ball, whose moment of inertia is 2/5 m r^2 [m]
     moment = repr(0.4 * payload.mass * radius**2)
     ElementTree.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
-    joint = ElementTree.SubElement(root, "joint", name=PAYLOAD_NAME, type="fixed")
+    joint = ElementTree.SubElement(root, "joint", name=name, type="fixed")
     ElementTree.SubElement(joint, "parent", link=payload.link)
-    ElementTree.SubElement(joint, "child", link=PAYLOAD_NAME)
+    ElementTree.SubElement(joint, "child", link=name)
     ElementTree.SubElement(joint, "origin", xyz=_text(np.array(payload.center)), rpy="0 0 0")
 
 

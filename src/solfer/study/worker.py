@@ -32,9 +32,6 @@ from solfer.study.records import RunLimitsRecord, StudyRecord
 from solfer.study.result import FAULTS, Result
 from solfer.supervision import end_with_parent
 
-ATTEMPTS = 3
-"""How often a run is begun that is killed from outside, as by the kernel where memory is short."""
-
 ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """Signals that end a worker and its run from outside, which leaves no result."""
 
@@ -72,7 +69,8 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
     claim = study.claim(run)
     if claim is None:
         return False
-    for _ in range(ATTEMPTS):
+    attempts = 3  # of a run that is killed from outside, as by the kernel where memory is short
+    for _ in range(attempts):
         child = _start(study, run)
         try:
             failure, code = _watch(study.study.record.limits, claim, child)
@@ -85,10 +83,10 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
         if failure:
             break
     else:
-        failure = f"its process was killed {ATTEMPTS} times; see {STDERR_FILE}"
+        failure = f"its process was killed {attempts} times; see {STDERR_FILE}"
         if code != -signal.SIGKILL:  # which the kernel sends where memory is short; others say nothing about the run
             raise StudyError(
-                f"a run was ended {ATTEMPTS} times by {_name(code)}",
+                f"a run was ended {attempts} times by {_name(code)}",
                 where=str(claim.folder),
                 expected="no signals to it",
             )

@@ -19,20 +19,8 @@ from solfer.transport.plugin_state import PluginState
 LOOP_PREFIX = "loop"
 """Begin of the names of the channels that belong to no plugin."""
 
-EVENT_KINDS = {
-    PluginState.STARTING: "start",
-    PluginState.RUNNING: "run",
-    PluginState.STOPPING: "stop",
-    PluginState.ABORTED: "abort",
-    PluginState.CLOSED: "close",
-}
-"""Kinds of events, by the state that a plugin enters; of other states, their names."""
-
 TRUTH_MESSAGE = "nav_msgs/Odometry"
 """Message of the true state of a simulated base."""
-
-HOLD = "hold"
-"""Kind of the event that a plugin which ran has to start again."""
 
 
 class BlackBox(Recorder):
@@ -54,6 +42,15 @@ class BlackBox(Recorder):
         MiddlewareError: Another process records there, or there is no room.
         ComponentError: A component cannot declare what it logs.
     """
+
+    _KINDS = {
+        PluginState.STARTING: "start",
+        PluginState.RUNNING: "run",
+        PluginState.STOPPING: "stop",
+        PluginState.ABORTED: "abort",
+        PluginState.CLOSED: "close",
+    }
+    """Kinds of events, by the state that a plugin enters; of other states, their names."""
 
     def __init__(
         self,
@@ -118,5 +115,6 @@ class BlackBox(Recorder):
         state = managed.state
         ran = self._words[3 + index] == PluginState.RUNNING
         self._words[3 + index] = state
-        kind = HOLD if ran and state is PluginState.STARTING else EVENT_KINDS.get(state, state.name.lower())
+        # a plugin that ran and has to start again holds
+        kind = "hold" if ran and state is PluginState.STARTING else self._KINDS.get(state, state.name.lower())
         self.event(Event(NANOSECOND * time, managed.name, kind, text=managed.reason))

@@ -24,10 +24,10 @@ def layer(request, tmp_path_factory):
 @pytest.mark.parametrize("layer", ["alone", "watched"], indirect=True)
 @pytest.mark.parametrize("duration", [0.08, 0.35, 1.0, 3.0])
 def test_the_layer_stands_still(layer, duration):
-    assert not Trial(layer, Plan((Fault("stop", "xbot", duration),))).run().complaints
+    assert not Trial(layer, Plan((Fault("stop", "xbot", duration),))).run().findings
 
 
 @pytest.mark.parametrize("layer", ["alone"], indirect=True)
 @pytest.mark.parametrize("duration", [0.2, 1.0, 3.0])
 def test_the_simulator_stands_still(layer, duration):
-    assert not Trial(layer, Plan((Fault("stop", "simulator", duration),))).run().complaints
+    assert not Trial(layer, Plan((Fault("stop", "simulator", duration),))).run().findings

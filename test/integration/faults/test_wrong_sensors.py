@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from breaking.alarms import find_alarms
 from breaking.sensor_faults import FAULTS, GRAVITY, LASTS, NUMBERS, SENSORS, turn_about, turn_mounting
-from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
+from breaking.sensors import MOTIONS, SensorTrial, check_outcome, drawn
 
 from solfer.middleware.memory import Bus
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
@@ -75,7 +75,7 @@ def test_an_imu_that_drifts_agrees_with_itself(fault, seed):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_keeps_the_bounds_and_is_named(fault):
     trial = SensorTrial("drives", fault, 4)
-    assert judge(trial, trial.run()).complaints == []
+    assert check_outcome(trial, trial.run()).findings == []
 
 
 def test_consecutive_seeds_have_every_fault():
@@ -132,8 +132,8 @@ def test_a_fault_that_ends_moves_the_robot_no_faster_than_commanded(monkeypatch,
     motion, fault = QUIET[name]
     monkeypatch.setitem(FAULTS, name, fault)
     trial = SensorTrial(motion, name, 7)
-    outcome = judge(trial, trial.run())
-    assert outcome.complaints == [] and outcome.obeys
+    outcome = check_outcome(trial, trial.run())
+    assert outcome.findings == [] and outcome.obeys
 
 
 @pytest.mark.soak
@@ -150,8 +150,8 @@ def test_an_imu_that_turns_on_its_link_and_is_right_again_topples_nothing(monkey
 @pytest.mark.parametrize("motion", ["drives", "turns"])
 def test_a_wrong_sensor_moves_nothing(motion, fault):
     trial = SensorTrial(motion, fault, 4)
-    outcome = judge(trial, trial.run())
-    assert outcome.complaints == []
+    outcome = check_outcome(trial, trial.run())
+    assert outcome.findings == []
     assert any(NAMED[fault] in text for _, text in outcome.named)
 
 
@@ -160,8 +160,8 @@ def test_a_wrong_sensor_moves_nothing(motion, fault):
 def test_a_wrong_posture_moves_no_leg(motion, fault, seed):
     """Swapped joints, another sign and other scales of legs that stand: the posture stays refused, or topples it."""
     trial = SensorTrial(motion, fault, seed)
-    outcome = judge(trial, trial.run())
-    assert outcome.complaints == [] and outcome.named[0][0] < NAMING_DELAY + 0.02
+    outcome = check_outcome(trial, trial.run())
+    assert outcome.findings == [] and outcome.named[0][0] < NAMING_DELAY + 0.02
 
 
 @pytest.mark.daily(1)

@@ -51,7 +51,7 @@ class Course:
         base: x, y of the centre of mass of the legs, and heading, from where they began, shape (k, 3) [m, rad].
         hands: Places of the hands as seen from the pelvis less where they are to be, shape (k, 2, 3) [m].
         wheels: Places of the wheels as seen from the pelvis at the end less those at the beginning, shape (4, 2) [m].
-        lean: Largest tilt of the pelvis [rad].
+        tilt: Largest tilt of the pelvis [rad].
         estimate: What odometry is off at the end, x, y, heading [m, rad].
     """
 
@@ -71,7 +71,7 @@ class Course:
             estimate.append(self._estimate(odometry))
             self.wheels = world.footprint() - before
         poses = np.array(rows)
-        self.lean = float(poses[:, 3].max())
+        self.tilt = float(poses[:, 3].max())
         self.base, self.hands = from_begin(poses[:, :3]), np.array(hands)
         self.estimate = from_begin(np.array(estimate))[-1] - self.base[-1]
         self.estimate[2] = math.remainder(self.estimate[2], math.tau)
@@ -131,7 +131,7 @@ def test_the_robot_goes_the_same_way(undisturbed, file, tmp_path, repository, na
     # wheels that roll on against each other in a stall slip: 20 mm with 16 seeds, 54 mm at most
     slipped = 0.005 + 0.25 * LATE.get(name, 0.0)
     assert np.linalg.norm(driven.estimate[:2]) < slipped and abs(driven.estimate[2]) < math.radians(0.5)
-    assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)
+    assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.tilt < math.radians(3.0)
     assert len(driven.base) < LONGER.get(name, 1.3) * len(undisturbed.base)
 
 
@@ -168,4 +168,4 @@ def test_the_course_of_figure_5_ends_as_its_file(tmp_path, repository, name, kin
     print(f"{name}: {1e3 * np.linalg.norm(away):.1f} mm of {way:.2f} m, {math.degrees(turned):.2f} degrees off")
     print(f"odometry {1e3 * drift:.1f} mm, {math.degrees(driven.estimate[2]):.2f} degrees, {PERIOD * periods:.1f} s")
     assert way > 5.5 and np.linalg.norm(away) < 0.01 * way and abs(turned) < math.radians(1.0)
-    assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)
+    assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.tilt < math.radians(3.0)

@@ -103,7 +103,7 @@ class KeptProgress(centauro.Progress):
         self._reports.append(shown)
 
 
-def test_a_slow_machine_is_told():
+def test_a_slow_machine_is_reported():
     seen = driving_report.Seen(np.array([0.0, 9.0]), *[np.zeros(0)] * 6)
     assert "4.0 s of simulated time" in driving_report.warning({"simulation": lost(4.0)}, seen, 10.0)
     assert not driving_report.warning({"simulation": lost(0.1)}, seen, 9.1)

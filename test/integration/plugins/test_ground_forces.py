@@ -16,18 +16,18 @@ WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 @pytest.mark.soak
 def test_lifts_and_a_push_are_seen():
-    """PyBullet's contacts judge the estimate: contact changes, forces within 2 % of the weight, a push.
+    """PyBullet's contacts check the estimate: contact changes, forces within 2 % of the weight, a push.
 
     The lifted leg's torque offsets are learnt on the way.
     """
     with closing(forces.ForcesWorld(seed=11)) as made:
         begin = len(made.rows)
         legs = forces.Legs(made)
-        lean = np.array((0.0, 0.07, 0.0))
-        leant = sum((legs.reach(each, lean) for each in forces.LEGS), ())
-        made.run(made.move(joints=sum(legs.joints, ()), positions=leant, speed=0.5) + 0.3)
+        tilt = np.array((0.0, 0.07, 0.0))
+        tilted = sum((legs.reach(each, tilt) for each in forces.LEGS), ())
+        made.run(made.move(joints=sum(legs.joints, ()), positions=tilted, speed=0.5) + 0.3)
         for height in (0.05, 0.0):
-            goal = legs.reach(3, lean + (0.0, 0.0, height))
+            goal = legs.reach(3, tilt + (0.0, 0.0, height))
             made.run(made.move(joints=legs.joints[2], positions=goal, speed=0.4) + 0.5)
         pushes = forces.push(made, 1, np.random.default_rng(11))
         figures = forces.figures(made, begin, pushes)

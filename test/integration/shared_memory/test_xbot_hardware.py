@@ -59,7 +59,7 @@ def asked(robot):
 
 @pytest.mark.soak
 def test_the_layer_moves_differently_named_hardware(hardware):
-    """The encoders' raw readings are the judge; this hardware publishes no floating base, and none may be needed."""
+    """The encoders' raw readings are the reference; this hardware publishes no floating base, and none is needed."""
     encoders = yaml.safe_load(MOCK.read_text())["joints"]
     assert list(hardware.joints) == [encoder["name"] for encoder in encoders.values()]
     assert "floating_base" not in {each.topic for each in published_topics(hardware.namespace)}

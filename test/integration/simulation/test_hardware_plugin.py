@@ -2,7 +2,7 @@
 
 `middleware: ROS -> XBOT` changes as little; in memory stands for ROS.
 
-The judge is the physical posture, which no pipe has touched.
+The reference is the physical posture, which no pipe has touched.
 """
 
 import re

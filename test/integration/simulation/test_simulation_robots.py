@@ -166,12 +166,12 @@ def test_more_joints_than_pybullet_takes_are_refused(tmp_path):
     assert caught.value.expected == "at most 127"
 
 
-def test_a_walker_that_is_held_is_told(tmp_path, caplog):
+def test_a_walker_that_is_held_is_reported(tmp_path, caplog):
     run(Simulation.from_file(bundle(tmp_path, DATA / "a1/a1.urdf")), 0)
     assert [message for message in caplog.messages if "a1.urdf: the base, link" in message]
 
 
-def test_an_arm_in_the_ground_is_told(tmp_path, caplog):
+def test_an_arm_in_the_ground_is_reported(tmp_path, caplog):
     """The rod hangs from z = 0 into the ground."""
     urdf = tmp_path / "rod.urdf"
     shape = '<collision><origin xyz="0 0 {z}"/><geometry><box size="0.1 0.1 0.4"/></geometry></collision>'

@@ -9,7 +9,7 @@ from solfer.transport.endpoints import Publisher
 class StandInReader(Reader):
     """A topic on which the test publishes."""
 
-    topic = "told"
+    topic = "measured"
 
     def __init__(self, message=None):
         self.message, self._new, self.publishers = message, message is not None, (Publisher("sender"),)

@@ -25,23 +25,24 @@ def dofs(**changes):
 
 
 def received(**changes):
-    """Make the record of a feedback on the topic `told`."""
+    """Make the record of a feedback on the topic `joints`."""
     record = {
         "name": "pipe",
         "space": "JOINT",
         "dofs": dofs(),
         "interface": {"position": True},
         "function": "reference",
-        "source": "told",
+        "source": "joints",
         "message": "custom_messages::CustomCmnd",
     } | changes
     return record_of(FeedbackRecord, record["space"]).model_validate(record)
 
 
 def published(**changes):
-    """Make the record of a controller on the topic `told`."""
+    """Make the record of a controller on the topic `joints`."""
     return record_of(ControllerRecord, changes.get("space")).model_validate(
-        {"name": "pipe", "type": "reference", "dofs": dofs(), "interface": {"position": True}, "sink": "told"} | changes
+        {"name": "pipe", "type": "reference", "dofs": dofs(), "interface": {"position": True}, "sink": "joints"}
+        | changes
     )
 
 

@@ -31,9 +31,9 @@ class Counting(Component):
 
 
 class Stage:
-    """A plugin that receives the topic `told`, and perhaps the topic `wanted`, and a node that publishes there."""
+    """A plugin that receives the topic `joints`, and perhaps the topic `desired`, and a node that publishes there."""
 
-    def __init__(self, start=0.0, stall=None, wanted=None, **tags):
+    def __init__(self, start=0.0, stall=None, desired=None, **tags):
         self.bus = Bus()
         self.bus.run_until(start)
         self.middleware = MemoryMiddleware(self.bus, "cart")
@@ -41,28 +41,28 @@ class Stage:
         context = PipeContext(robot, self.middleware, {}, RATE)
         record = received(**({"initialize": True} | tags))
         self.watch = FeedbackTimeout.from_record(factory.feedback(record, context), record, RATE)
-        self.wanted = None
-        if wanted is not None:
-            record = received(**({"initialize": True, "name": "wanted", "source": "wanted"} | wanted))
-            self.wanted = FeedbackTimeout.from_record(factory.feedback(record, context), record, RATE)
+        self.desired = None
+        if desired is not None:
+            record = received(**({"initialize": True, "name": "desired", "source": "desired"} | desired))
+            self.desired = FeedbackTimeout.from_record(factory.feedback(record, context), record, RATE)
         out = factory.controller(published(sink="out", interface={"position": True, "velocity": True}), context)
         self.component = Counting(robot)
         outputs = Outputs([(out, None)], StartBlend("cart", (), robot, RATE), robot, 1.0 / RATE)
-        watches = [watch for watch in (self.watch, self.wanted) if watch]
+        watches = [watch for watch in (self.watch, self.desired) if watch]
         self.plugin = Plugin(
             PluginParts(self.component, robot, watches, outputs, Inbox(), RATE, self.middleware, stall=stall)
         )
         self.sent = MemoryMiddleware(self.bus, "ear").queue("out", "solfer/JointCommand", 10000)
         self.names = robot.dofs
 
-    def speak(self, position=0.0, sender="speaker", names=None, topic="told"):
+    def speak(self, position=0.0, sender="speaker", names=None, topic="joints"):
         """One message."""
         names = self.names if names is None else names
         writer = MemoryMiddleware(self.bus, sender).writer(topic, "solfer/JointCommand")
         writer.write(JointMessage(names, position=np.full(len(names), position)))
 
     def served(self, later=0.0):
-        """Read the topic `told` as a cycle does so much `later`; return whether a running plugin can work with it."""
+        """Read the topic `joints` as a cycle does so much `later`; return whether a running plugin can work with it."""
         self.watch.read(self.bus.time + later)
         return self.watch.serves(True)
 
@@ -71,6 +71,6 @@ class Stage:
         for _ in range(count):
             if speaks:
                 self.speak()
-                self.speak(topic="wanted")
+                self.speak(topic="desired")
             self.plugin.cycle()
             self.bus.run_until(self.bus.time + PERIOD)

@@ -68,7 +68,7 @@ def position(bench: Callable[[Path], str], path: str) -> dict[str, Change]:
 
 def pipe(path: str, bench: Callable[[Path], str]) -> dict[str, Change]:
     """Return changes of what pipes of both directions have."""
-    joints, base = ("joints", "odometry") if path == IN else ("heard", "pose")
+    joints, base = ("joints", "odometry") if path == IN else ("desired", "pose")
     filtered = "joints" if path == IN else "arm_controller"
     return {
         "dofs.chain": Change(bench, {f"{path}{joints}/dofs/chain": "arm"}),

@@ -40,7 +40,7 @@ from support.walk.stacks import DYNAMICS, OF_AN_INVERSE, STACKS
 from support.walk.wheels import WHEELS
 
 JUMP = MODULES + "walk/base_jump/"
-COMMAND = {"sink": "heard", "message": "solfer/JointCommand"}
+COMMAND = {"sink": "desired", "message": "solfer/JointCommand"}
 MEASURED = {IN + "imu/layer": "online", XBOT + "feedback/imu": {}, IN + "imu/dofs/name": "base"}
 """An inertial sensor as XBotCore's pipes name it."""
 
@@ -61,16 +61,16 @@ RUNS: dict[str, dict[str, Change]] = {
         "feedbacks": Change(SETS, {MAIN + "feedbacks/some": ["joints"]}),
         "controllers": Change(SETS, {MAIN + "controllers/few": []}),
         "feedback": Change(WALK, {IN + "joints/interface/effort": False}),
-        "controller": Change(WALK, {OUT + "heard/interface/effort": False}),
+        "controller": Change(WALK, {OUT + "desired/interface/effort": False}),
         "calibration": Change(REAL, {MAIN + "calibration/encoders/joints/elbow/offset": 0.5}),
         "ros.source": Change(WALK, {ROS + "source/urdf/file": "bare.urdf"}),
         "ros.mapping": Change(WALK, {ROS + "mapping/OTHER/urdf/file": "smaller.urdf"}),
         "ros.feedback": Change(WALK, {ROS + "feedback/joints/source": "motor_states"}),
-        "ros.controller": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
+        "ros.controller": Change(WALK, {ROS + "controller/desired/sink": "seen"}),
         "xbot.source": Change(IN_RT, {XBOT + "source/urdf/file": "bare.urdf"}),
         "xbot.mapping": Change(IN_RT, {XBOT + "mapping/OTHER/urdf/file": "smaller.urdf"}),
         "xbot.feedback": Change(IN_RT, {XBOT + "feedback/joints/source": "motor_states"}),
-        "xbot.controller": Change(IN_RT, {XBOT + "controller/heard/sink": "seen"}),
+        "xbot.controller": Change(IN_RT, {XBOT + "controller/desired/sink": "seen"}),
         "modules": Change(WALK, {MODULES + "walk/blend": 2.0}),
     },
     "`robot`": {
@@ -128,8 +128,8 @@ RUNS: dict[str, dict[str, Change]] = {
         ),
         "convention.orientation.order": Change(WALK, {OUT + "pose/convention": {"orientation": {"order": "wxyz"}}}),
         "calibration": Change(REAL, {"real/mwoibn/controller/arm_controller/calibration": "others"}, OTHERS),
-        "message": Change(WALK, {ROS + "controller/heard/message": "solfer/JointCommand"}),
-        "space": Change(WALK, {OUT + "heard/space": "SKIP"}),
+        "message": Change(WALK, {ROS + "controller/desired/message": "solfer/JointCommand"}),
+        "space": Change(WALK, {OUT + "desired/space": "SKIP"}),
         "type": Change(
             WALK,
             {
@@ -137,22 +137,22 @@ RUNS: dict[str, dict[str, Change]] = {
                 ROS + "controller/arm_controller/message": "solfer/JointCommand",
             },
         ),
-        "function": Change(WALK, {OUT + "heard/function": "motor"}),
+        "function": Change(WALK, {OUT + "desired/function": "motor"}),
         "frame_id": Change(WALK, {OUT + "pose/frame_id": "odom"}),
         "controller": Change(
             WALK,
             {OUT + "wheel_controller/controller": "arm_controller"},
             {OUT + "arm_controller/interface/velocity": False},
         ),
-        "sink": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
+        "sink": Change(WALK, {ROS + "controller/desired/sink": "seen"}),
         **{
             f"interface.{name}": Change(
-                WALK, {f"{OUT}{pipe}/interface/{name}": True}, {ROS + "controller/heard": COMMAND}
+                WALK, {f"{OUT}{pipe}/interface/{name}": True}, {ROS + "controller/desired": COMMAND}
             )
             for name, pipe in (
                 ("stiffness", "arm_controller"),
                 ("damping", "arm_controller"),
-                ("acceleration", "heard"),
+                ("acceleration", "desired"),
             )
         },
         "open_loop": Change(SETS, {OUT + "arm_controller/open_loop": True}),
@@ -202,10 +202,10 @@ RUNS: dict[str, dict[str, Change]] = {
         "loading": Change(
             MAPPED,
             {ROS + "mapping/OUTSIDE": {"loading": "model", "urdf": {"file": "other.urdf"}}},
-            {OUT + "heard/dofs/mapping": "OUTSIDE"},
+            {OUT + "desired/dofs/mapping": "OUTSIDE"},
         ),
         "source": Change(
-            MAPPED, {ROS + "mapping/OUTSIDE/source": "joint_states"}, {OUT + "heard/dofs/mapping": "OUTSIDE"}
+            MAPPED, {ROS + "mapping/OUTSIDE/source": "joint_states"}, {OUT + "desired/dofs/mapping": "OUTSIDE"}
         ),
         "urdf": Change(WALK, {ROS + "mapping/OTHER/urdf/file": "smaller.urdf"}),
     },
@@ -370,7 +370,7 @@ REFUSED = {
     ("`ros.mapping.NAME`, `xbot.mapping.NAME`", "message"): Change(
         MAPPED,
         {ROS + "mapping/OUTSIDE/message": "solfer/JointCommand"},
-        {OUT + "heard/dofs/mapping": "OUTSIDE"},
+        {OUT + "desired/dofs/mapping": "OUTSIDE"},
     ),
     ("Contacts of a robot (`contacts.yaml`), below the robot's name", "contacts.NAME.message"): Change(
         TOUCHING, {CONTACT + "message": "geometry_msgs/PointStamped"}

@@ -82,7 +82,7 @@ FEEDBACK = {
 CONTROLLER = {
     "arm_controller": joints(type="impedance", dofs=COMMANDED, filter={"run": True, "frequency": 20.0, "damping": 0.9}),
     "wheel_controller": joints(type="velocity", dofs=COMMANDED, interface={"velocity": True}),
-    "heard": joints(type="reference", function="state"),
+    "desired": joints(type="reference", function="state"),
     "pose": body(type="reference", function="state"),
     "tip": {"space": "POINT", "quantity": "position", "interface": "fixed", "link": "hand", "type": "reference"},
     "push": {"space": "CONTACT", "contact": "rolling", "interface": "fixed", "type": "reference"},
@@ -104,7 +104,7 @@ FEEDBACK_ENDS = {
 CONTROLLER_ENDS = {
     "arm_controller": {"sink": "/command"},
     "wheel_controller": {"sink": "/command"},
-    "heard": {"sink": "heard", "message": "sensor_msgs/JointState"},
+    "desired": {"sink": "desired", "message": "sensor_msgs/JointState"},
     "pose": {"sink": "pose", "message": "nav_msgs/Odometry"},
     "tip": {"sink": "tip", "message": "geometry_msgs/PointStamped"},
     "push": {"sink": "push", "message": "geometry_msgs/WrenchStamped"},
@@ -134,7 +134,7 @@ HANDS = {
 MODULE = {
     "layer": "NRT",
     "robot": "listening",
-    "controller": ["arm_controller", "wheel_controller", "heard", "pose", "tip", "push"],
+    "controller": ["arm_controller", "wheel_controller", "desired", "pose", "tip", "push"],
     "mode": "full",
     "kinematics": True,
     "dynamics": True,
@@ -196,7 +196,7 @@ MAIN = {
         "imu": MODULE | {"robot": "turning", "controller": ["pose"]},
         "angles": MODULE | {"robot": "angled", "controller": ["pose"]},
         "contacts": MODULE | {"robot": "touching", "controller": ["push"]},
-        "mapped": MODULE | {"robot": "in_sets", "controller": ["heard"]},
+        "mapped": MODULE | {"robot": "in_sets", "controller": ["desired"]},
         "joint_states": {key: MODULE[key] for key in MODULE if key != "class"}
         | {"robot": "in_sets", "controller": "few", "dynamics": False},
         "carrying": MODULE

@@ -19,7 +19,7 @@ from solfer.transport.endpoints import MessageStatus
 from solfer.transport.inbox import Inbox
 from solfer.transport.messages import BodyMessage, JointMessage
 
-JOINTS = Route("wanted", "solfer/JointCommand")
+JOINTS = Route("desired", "solfer/JointCommand")
 BODY = Route("hand", "nav_msgs/Odometry")
 
 
@@ -58,15 +58,15 @@ class Sides:
             self.bridge.cycle()
 
 
-def wanted(position):
+def command(position):
     return JointMessage(("a", "b"), position=np.array(position), stamp=3.5)
 
 
 @pytest.mark.slow
 def test_a_topic_goes_in_whole():
     sides = Sides()
-    reader = sides.rt.reader("wanted", "solfer/JointCommand")
-    sides.nrt.writer("wanted", "solfer/JointCommand").write(wanted([1.0, 2.0]))
+    reader = sides.rt.reader("desired", "solfer/JointCommand")
+    sides.nrt.writer("desired", "solfer/JointCommand").write(command([1.0, 2.0]))
     sides.turn()
     assert reader.read() is MessageStatus.NEW
     assert reader.message.names == ("a", "b")
@@ -89,20 +89,20 @@ def test_a_topic_goes_out_whole():
 
 def test_only_the_newest_message_is_forwarded():
     sides = Sides()
-    queue = sides.rt.queue("wanted", "solfer/JointCommand")
-    writer = sides.nrt.writer("wanted", "solfer/JointCommand")
+    queue = sides.rt.queue("desired", "solfer/JointCommand")
+    writer = sides.nrt.writer("desired", "solfer/JointCommand")
     for number in range(100):
-        writer.write(wanted([number, 0.0]))
+        writer.write(command([number, 0.0]))
     sides.turn()
     assert [message.position[0] for message in queue.drain()] == [99.0]
-    crossing = sides.bridge.crossings["wanted"]
+    crossing = sides.bridge.crossings["desired"]
     assert (crossing.passed, crossing.dropped) == (1, 99)
 
 
 def test_nothing_is_forwarded_without_news():
     sides = Sides()
-    reader = sides.rt.reader("wanted", "solfer/JointCommand")
-    sides.nrt.writer("wanted", "solfer/JointCommand").write(wanted([1.0, 2.0]))
+    reader = sides.rt.reader("desired", "solfer/JointCommand")
+    sides.nrt.writer("desired", "solfer/JointCommand").write(command([1.0, 2.0]))
     sides.turn(21)
     assert reader.read() is MessageStatus.NEW
     assert reader.age() == pytest.approx(0.1)
@@ -111,20 +111,20 @@ def test_nothing_is_forwarded_without_news():
 def test_a_message_that_is_refused_stops_nothing(monkeypatch):
     """The other end's pipe belongs to another process for a moment: that is counted, and the next message passes."""
     sides = Sides()
-    crossing = sides.bridge.crossings["wanted"]
+    crossing = sides.bridge.crossings["desired"]
 
     def refuse(_message):
         raise MiddlewareError("another process writes this pipe")
 
-    writer = sides.nrt.writer("wanted", "solfer/JointCommand")
+    writer = sides.nrt.writer("desired", "solfer/JointCommand")
     with monkeypatch.context() as patch:
         patch.setattr(crossing._writer, "write", refuse)
-        writer.write(wanted([1.0, 2.0]))
+        writer.write(command([1.0, 2.0]))
         sides.turn()
     assert (crossing.passed, crossing.refused) == (0, 1)
     sides.turn(201)
     assert sides.buses[1].reports["xbot_bridge"].values["messages refused"] == 1
-    writer.write(wanted([1.0, 2.0]))
+    writer.write(command([1.0, 2.0]))
     sides.turn()
     assert (crossing.passed, crossing.refused) == (1, 1)
 
@@ -193,7 +193,7 @@ def test_a_topic_that_comes_later_goes_out():
     found.append(Route("joint_states", "sensor_msgs/JointState"))
     sides.turn(101)
     reader = sides.nrt.reader("joint_states", "sensor_msgs/JointState")
-    sides.rt.writer("joint_states", "sensor_msgs/JointState").write(wanted([1.0, 2.0]))
+    sides.rt.writer("joint_states", "sensor_msgs/JointState").write(command([1.0, 2.0]))
     sides.turn()
     assert reader.read() is MessageStatus.NEW
 
@@ -212,11 +212,11 @@ def test_known_offers_are_not_searched_again():
 
 def test_the_report_counts_what_went_each_way():
     sides = Sides()
-    sides.nrt.writer("wanted", "solfer/JointCommand").write(wanted([1.0, 2.0]))
+    sides.nrt.writer("desired", "solfer/JointCommand").write(command([1.0, 2.0]))
     sides.turn(202)
     report = sides.buses[1].reports["xbot_bridge"]
     assert (report.level, report.summary) == (0, "running")
-    assert report.values["in wanted"] == "1 passed, 0 dropped"
+    assert report.values["in desired"] == "1 passed, 0 dropped"
     assert report.values["out hand"] == "0 passed, 0 dropped"
 
 
@@ -228,18 +228,18 @@ mwoibn:
   robot:
     name: cart
     systems: {{SM: {{file: SM.yaml}}}}
-    joints: {{feedback: {{list: [measured, wanted]}}, actuators: {{read: false}}, contacts: {{read: false}}}}
+    joints: {{feedback: {{list: [measured, goal]}}, actuators: {{read: false}}, contacts: {{read: false}}}}
   feedback:
     measured: {{space: JOINT, dofs: &all {{chain: all, type: all, mapping: RBDL}}, interface: &both {{position: true}},
                function: state}}
-    wanted: {{space: JOINT, dofs: *all, interface: *both, function: reference}}
+    goal: {{space: JOINT, dofs: *all, interface: *both, function: reference}}
   controller:
     out: {{space: JOINT, type: reference, dofs: *all, interface: *both, function: state}}
   xbot:
     source: {{urdf: /robot_description}}
     feedback:
       measured: {{source: joint_states, layer: lower_level}}
-      wanted: {{source: /desired, layer: NRT}}
+      goal: {{source: /desired, layer: NRT}}
     controller:
       out: {{sink: {sink}, layer: NRT, message: sensor_msgs/JointState}}
   modules:

@@ -151,7 +151,7 @@ def test_the_robot_may_be_another_one(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         (["none.yaml"], "there is no file 'none.yaml'"),
         ([str(CENTAURO), "-n", "joint_stats"], "did you mean: joint_states"),
@@ -159,10 +159,10 @@ def test_the_robot_may_be_another_one(tmp_path, capsys):
         ([str(CENTAURO), "--urdf", "none.urdf"], "none.urdf"),
     ],
 )
-def test_unusable_arguments_are_reported(arguments, complaint, capsys):
+def test_unusable_arguments_are_reported(arguments, message, capsys):
     assert main(["check", *arguments]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("error: ") and complaint in err and "Traceback" not in err
+    assert err.startswith("error: ") and message in err and "Traceback" not in err
 
 
 @pytest.mark.slow

@@ -25,22 +25,22 @@ FIGURE_4 = ("upper_body", "lower_body", "whole_body")
 
 
 @dataclass(frozen=True)
-class Told:
+class Place:
     """geometry_msgs/PointStamped."""
 
     header: Header = field(default_factory=Header)
     point: Vector = field(default_factory=Vector)
 
 
-class Telling(Component):
+class Publishing(Component):
     """Declares a topic out."""
 
     def topics(self):
         """Publish."""
-        return (TopicOut("told", "geometry_msgs/PointStamped", Told, Told),)
+        return (TopicOut("place", "geometry_msgs/PointStamped", Place, Place),)
 
 
-class Hearing(Component):
+class Receiving(Component):
     """Declares the same topic in, and has an input."""
 
     def __init__(self, robot, tags=None, name=""):
@@ -49,7 +49,7 @@ class Hearing(Component):
 
     def topics(self):
         """Receive."""
-        return (TopicIn("/first/told", "geometry_msgs/PointStamped", Told, print),)
+        return (TopicIn("/first/place", "geometry_msgs/PointStamped", Place, print),)
 
 
 def plugin(name):
@@ -118,17 +118,17 @@ def test_a_declared_topic_leads_to_those_that_receive_it(tmp_path):
     changed = tree()
     (tmp_path / "cart.urdf").write_text(URDF)
     changed["ros"]["source"] = {"urdf": {"file": str(tmp_path / "cart.urdf")}}
-    changed["ros"]["feedback"]["goal"] = {"source": "first/told", "message": "geometry_msgs/PointStamped"}
+    changed["ros"]["feedback"]["goal"] = {"source": "first/place", "message": "geometry_msgs/PointStamped"}
     changed["feedback"]["goal"] = {"space": "POINT", "quantity": "position"}
     listening = changed["robot"]["deaf"] | {"feedback": {"list": ["goal"]}}
     changed["robot"]["listening"] = listening
-    changed["modules"]["first"] |= {"class": f"{__name__}:Telling", "robot": "deaf"}
-    changed["modules"]["second"] |= {"class": f"{__name__}:Hearing", "robot": "listening"}
+    changed["modules"]["first"] |= {"class": f"{__name__}:Publishing", "robot": "deaf"}
+    changed["modules"]["second"] |= {"class": f"{__name__}:Receiving", "robot": "listening"}
     file = tmp_path / "main.yaml"
     file.write_text(yaml.safe_dump({"mwoibn": changed}))
     network = network_of(str(file), ["first", "second"])
     found = {(arrow.pipe, arrow.tail, arrow.head) for arrow in network.arrows if arrow.tail == plugin("first")}
-    expected = {("goal", plugin("first"), plugin("second")), ("first/told", plugin("first"), plugin("second"))}
+    expected = {("goal", plugin("first"), plugin("second")), ("first/place", plugin("first"), plugin("second"))}
     assert expected <= found
 
 
@@ -229,7 +229,7 @@ def test_an_idle_plugin_has_a_dashed_arrow():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         (["-n", "whole_bdy"], "did you mean: whole_body"),
         (["-n", "whole_body", "-o", "figure.gif"], ".svg"),
@@ -237,10 +237,10 @@ def test_an_idle_plugin_has_a_dashed_arrow():
         (["-n", "whole_body", "-n", "nonsense"], "unknown module 'nonsense'"),
     ],
 )
-def test_a_mistake_is_one_block(arguments, complaint, capsys):
+def test_a_mistake_is_one_block(arguments, message, capsys):
     assert main(["graph", str(CENTAURO), *arguments]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("error: ") and complaint in err
+    assert out == "" and err.startswith("error: ") and message in err
 
 
 def test_a_missing_graphviz_is_reported(monkeypatch, tmp_path, capsys):

@@ -120,7 +120,7 @@ def test_correct_parts_of_a_file_are_listed(tmp_path, capsys, caplog):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         (["joints"], "FILE, --robot NAME, or --urdf FILE"),
         (["joints", "--robot", "centaur"], "did you mean: centauro?"),
@@ -131,10 +131,10 @@ def test_correct_parts_of_a_file_are_listed(tmp_path, capsys, caplog):
         (["pipes", str(CENTAURO), "-n", "joint_stats"], "did you mean: joint_states"),
     ],
 )
-def test_missing_arguments_are_reported(arguments, complaint, capsys):
+def test_missing_arguments_are_reported(arguments, message, capsys):
     assert main(["list", *arguments]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("error: ") and complaint in err
+    assert out == "" and err.startswith("error: ") and message in err
 
 
 def test_an_unknown_kind_shows_the_known_ones(capsys):

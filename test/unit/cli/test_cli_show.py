@@ -53,16 +53,16 @@ def test_the_system_may_be_another_one(capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         ([str(CENTAURO), "-n", "joint_stats"], "did you mean: joint_states"),
         (["none.yaml", "-n", "joint_states"], "there is no file 'none.yaml'"),
     ],
 )
-def test_a_mistake_is_one_block(arguments, complaint, capsys):
+def test_a_mistake_is_one_block(arguments, message, capsys):
     assert main(["show", *arguments]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("error: ") and complaint in err
+    assert out == "" and err.startswith("error: ") and message in err
 
 
 def test_what_its_component_declares_is_listed(capsys):

@@ -104,7 +104,7 @@ def test_baselines_learn_the_bias_at_rest(method):
     made, period, count = maker(CONTACTS, sample), log.PERIOD, 600
     sample.imu.angular[2] = bias
     for cycle in range(count):
-        # the heading of an IMU is what its gyroscope tells
+        # the heading of an IMU is the integral of its gyroscope
         sample.imu.orientation[:] = Rotation.from_rotvec((0.0, 0.0, bias * period * (cycle + 1))).as_quat()
         made.cycle(sample, np.full(4, 200.0))
     assert abs(made.pose[3]) < 0.02 * bias * period * count

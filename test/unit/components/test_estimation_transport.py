@@ -127,7 +127,7 @@ def test_a_bad_file_is_one_error(program, text, error, tmp_path, monkeypatch, ca
     file = tmp_path / "faults.yaml"
     file.write_text(text)
     monkeypatch.setattr(sys, "argv", [f"{program}.py", "--transport", str(file)])
-    monkeypatch.setattr(logging, "disable", lambda _: None)  # the other tests of this process want to see theirs
+    monkeypatch.setattr(logging, "disable", lambda _: None)  # the other tests of this process check theirs
     with pytest.raises(SystemExit) as ended:
         part(program).main()
     assert ended.value.code == 2

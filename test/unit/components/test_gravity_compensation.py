@@ -1,4 +1,4 @@
-"""The component `gravity_compensation` on CENTAURO, without any transport: torques, what others want, contacts."""
+"""The component `gravity_compensation` on CENTAURO, without any transport: torques, what others command, contacts."""
 
 from pathlib import Path
 

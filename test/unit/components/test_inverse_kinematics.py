@@ -230,7 +230,7 @@ LEFT_ARM, RIGHT_ARM = [f"j_arm1_{joint}" for joint in range(1, 8)], [f"j_arm2_{j
 
 
 @pytest.mark.parametrize(
-    ("yaw", "left", "right", "wanted"),
+    ("yaw", "left", "right", "expected"),
     [
         (
             -0.12,
@@ -246,20 +246,20 @@ LEFT_ARM, RIGHT_ARM = [f"j_arm1_{joint}" for joint in range(1, 8)], [f"j_arm2_{j
         ),
     ],
 )
-def test_arms_that_swing_round_rest_in_time(upper, make, yaw, left, right, wanted):
+def test_arms_that_swing_round_rest_in_time(upper, make, yaw, left, right, expected):
     """References that come to rest late, and arms that still gain by swinging on then."""
     names = ["torso_yaw", *LEFT_ARM, *RIGHT_ARM]
     upper.state.position[[upper.dof(name) for name in names]] = (yaw, *left, *right)
     upper.update()
     component, model, places = make(upper, "manipulation"), upper.twin(), []
-    for name, place in wanted.items():
+    for name, place in expected.items():
         component.references.targets[name].request(place)
     for position in run(component, 3.5)[round(3.0 * RATE) :]:
         model.state.position[:] = position
         model.update()
-        places.append([model.kinematics.position(link).copy() for name, link in SIDES if name in wanted])
+        places.append([model.kinematics.position(link).copy() for name, link in SIDES if name in expected])
     assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() < 1e-4 * PERIOD
-    assert all(component.references.targets[name].is_unreachable for name in wanted)
+    assert all(component.references.targets[name].is_unreachable for name in expected)
 
 
 def test_a_hand_that_gave_up_goes_on(upper, make):

@@ -145,7 +145,7 @@ def test_the_weight_is_shifted_before_a_lift(make, wheel):
     assert margin(component, wheel) < 0.059
     assert lift(component, LEGS[wheel]).success
     assert margin(component, wheel) > 0.049
-    assert_allclose(places(component), standing, atol=8e-3)  # wheels that lean move a little
+    assert_allclose(places(component), standing, atol=8e-3)  # tilted wheels move a little
     component.references.vertex_velocity[wheel, 2] = 0.05
     cycle(component, 100)
     component.references.vertex_velocity[wheel] = 0.0

@@ -1,4 +1,4 @@
-"""What holds motions of `wheeled_motion`, whatever they are: the support polygon, wheels that lean, straight legs."""
+"""What holds motions of `wheeled_motion`, whatever they are: the support polygon, tilted wheels, straight legs."""
 
 import math
 from types import SimpleNamespace

@@ -61,10 +61,10 @@ INWARD = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.
         ({}, -INWARD, 0.0, "rad off"),
         ({}, NONE, 1.0, "near a singularity"),
     ],
-    ids=["support", "lean", "legs"],
+    ids=["support", "tilt", "legs"],
 )
 def test_a_motion_holds_before_its_bound(make, caplog, tags, vertices, up, reason):
-    """Support, lean and singular legs each stop the motion without slip, give their reason, and allow the way back."""
+    """Support, tilt and singular legs each stop the motion without slip, give their reason, and allow the way back."""
     component = make(**tags)
     references, start = component.references, component.references.position.copy()
     references.vertex_velocity[:], references.velocity[2] = 0.1 * vertices, 0.1 * up

@@ -140,9 +140,9 @@ def test_a_lifted_wheel_stays_lifted_while_swaying(robot):
 
     def sway(k):
         # its leg and the base move it to and fro, by the same way in all and never together
-        lower, lean = phases[k % 3]
+        lower, pitch = phases[k % 3]
         robot.state.position[knee] += 0.002 if k < 100 else 0.004 * lower
-        robot.state.position[4] = 0.012 * (k >= 100 and lean < 0)
+        robot.state.position[4] = 0.012 * (k >= 100 and pitch < 0)
 
     drive(made, 2.0, np.zeros(4), move=sway)
     assert made.law.lifted.tolist() == [True, False, False, False]
@@ -216,11 +216,11 @@ def test_covariance_grows_without_the_imu():
 
 def test_covariances_of_pose_and_twist_stand_in_the_desired_state(robot):
     """Other plugins read them there: symmetric, not negative, and the twist in the axes of a tilted base."""
-    made, lean = component(robot), (0.2, -0.3)
+    made, angles = component(robot), (0.2, -0.3)
 
     def tilt(k):
-        robot.state.position[3:5] = np.array(lean) * min(1.0, (k + 1) / 100)
-        robot.state.velocity[3:5] = np.array(lean) * RATE / 100 * (k < 100)
+        robot.state.position[3:5] = np.array(angles) * min(1.0, (k + 1) / 100)
+        robot.state.velocity[3:5] = np.array(angles) * RATE / 100 * (k < 100)
 
     drive(made, 1.0, move=tilt)
     pose, twist = (robot.command[name].reshape(6, 6) for name in ("pose_covariance", "twist_covariance"))

@@ -15,7 +15,7 @@ SIDES = np.array((1.0, -1.0, 1.0, -1.0))
 
 
 class Rolling:
-    """The plugin, and CENTAURO that rolls straight on, as far as anybody tells of it."""
+    """The plugin, and CENTAURO that rolls straight on, by the messages of its sensors."""
 
     def __init__(self, folder, method="filter", count=lambda angles: angles):
         self._driver = count

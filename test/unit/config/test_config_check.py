@@ -244,7 +244,7 @@ def test_a_robot_without_files_is_a_warning():
     ],
 )
 @pytest.mark.parametrize("modules", [None, ["joint_states"]])
-def test_a_misspelt_robot_is_told_once(wrong, what, meant, modules):
+def test_a_misspelt_robot_is_reported_once(wrong, what, meant, modules):
     line = line_of("centauro.yaml", "name: centauro  #")
     replace("centauro.yaml", ("name: centauro  #", wrong))
     report = check_file("centauro.yaml", modules)
@@ -257,7 +257,7 @@ def test_a_misspelt_robot_is_told_once(wrong, what, meant, modules):
 @pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("key", ["urdf", "srdf"])
-def test_a_missing_description_is_told_once(key):
+def test_a_missing_description_is_reported_once(key):
     parameter = {"urdf": "urdf: /robot_description", "srdf": "srdf: /robot_semantic_description"}[key]
     replace("centauro.yaml", (f"      {parameter}", f"      {key}: {{file: robots/centauro/centaur.{key}}}"))
     (error,) = check_file("centauro.yaml").errors
@@ -313,7 +313,7 @@ def test_a_component_is_found_beside_the_file(tmp_path):
 
 
 @pytest.mark.usefixtures("folder")
-def test_an_interface_close_to_a_known_one_is_told():
+def test_an_interface_close_to_a_known_one_is_suggested():
     replace("centauro.yaml", ("velocity: true\n        effort: true", "velocty: true\n        effort: true"))
     report = check_file("centauro.yaml", ["joint_states"])
     (error,) = report.errors

@@ -38,7 +38,7 @@ def test_a_refusal_of_a_moment_is_no_end(until):
     assert middleware.asked == [f"{UPPER}/trajectory"] * (1 + 3 * bool(until))
 
 
-def test_a_refusal_that_stays_is_told():
+def test_a_refusal_that_stays_is_reported():
     middleware = Refusing(1e9)
     teller = StoryTeller(middleware, middleware, lambda *_: None)
     with pytest.raises(ComponentError, match=f"'arms' is refused by {UPPER}: its own loop stood still"):

@@ -28,7 +28,7 @@ class Listening(Generator):
     def init_callbacks(self, component):
         """Make the pipe."""
         super().init_callbacks(component)
-        component.heard = self.middleware.reader("first/push", FORCE)
+        component.received = self.middleware.reader("first/push", FORCE)
 
 
 @pytest.fixture(scope="module")
@@ -89,8 +89,8 @@ def test_its_program_moves_both_parts(folder, page):
         world.run(1.2)
         upper, lower, whole = (managed.plugin.robot for managed in together.plugins)
         for part, joint in ((upper, "torso_yaw"), (lower, "ankle_yaw_1")):
-            wanted = part.command.position[part.dof(joint)]
-            assert abs(wanted - 0.15) < 1e-6 and whole.command.position[whole.dof(joint)] == wanted  # the same cycle
+            desired = part.command.position[part.dof(joint)]
+            assert abs(desired - 0.15) < 1e-6 and whole.command.position[whole.dof(joint)] == desired  # the same cycle
             assert abs(world.simulation.q[whole.dof(joint)] - 0.15) < 0.05
     finally:
         world.close()
@@ -116,8 +116,8 @@ def test_its_component_publishes_in_the_same_cycle(page, tmp_path, monkeypatch):
     members.sharing.turns.next()
     for plugin in members.plugins:
         plugin.cycle()
-    heard = members.plugins[1].component.heard
-    for reader in (heard, *outside):
+    received = members.plugins[1].component.received
+    for reader in (received, *outside):
         reader.read()
         np.testing.assert_array_equal(reader.message.values, (0.0, 0.0, 10.0))
-    assert heard.channel.publication.component == "first"
+    assert received.channel.publication.component == "first"

@@ -183,7 +183,7 @@ def test_the_next_owner_finds_the_default_gains(lower_level):
     assert arm.stiffness[0] == 200.0
 
 
-def test_gains_are_told(lower_level):
+def test_gains_are_reported(lower_level):
     reply = ask_arm(lower_level, "get_gains", NoFields())
     assert (reply.names, reply.stiffness, reply.damping) == (("shoulder",), (200.0,), (2.0,))
 

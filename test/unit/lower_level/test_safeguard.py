@@ -101,7 +101,7 @@ def test_the_tilt_includes_the_base_joints_origin():
     assert "90 degrees" in cart.safeguard.reason
 
 
-def test_a_new_beginning_forgets_how_long_it_leant(cart):
+def test_a_new_beginning_forgets_how_long_it_tilted(cart):
     update(cart, 0.4, tilted(61.0))
     cart.start(np.zeros(8))
     update(cart, 0.4, tilted(61.0))

@@ -18,7 +18,7 @@ def legged(root="base", kind="fixed"):
     )
 
 
-def test_a_base_that_is_held_is_told(caplog):
+def test_a_base_that_is_held_is_reported(caplog):
     warn_of_fixed_base(legged(), None)
     (message,) = caplog.messages
     assert "r.urdf: the base, link 'base', is fixed" in message and "`floating_base: true` lets it float" in message
@@ -34,6 +34,6 @@ def test_a_base_that_is_held_is_told(caplog):
         (legged(kind="continuous"), None),
     ],
 )
-def test_nothing_is_told_where_somebody_decided(description, floating_base, caplog):
+def test_nothing_is_reported_where_the_user_decided(description, floating_base, caplog):
     warn_of_fixed_base(description, floating_base)
     assert not caplog.messages

@@ -282,7 +282,7 @@ def test_a_target_whose_pace_ends_is_waited_for(bus, play, tmp_path, wrong):
 
 
 @pytest.mark.slow
-def test_a_robot_that_is_stuck_is_told(bus, play, tmp_path):
+def test_a_robot_that_is_stuck_is_reported(bus, play, tmp_path):
     base = DrivenBase(bus)
     base.pace = lambda: 0.0
     with pytest.raises(ComponentError, match="has not gone on for 60 s: its pace is 0.00"):

@@ -33,14 +33,14 @@ def test_gathered_numbers_stand_at_their_places(numbers):
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
-def test_the_first_number_not_finite_is_told(numbers, wrong):
+def test_the_first_number_not_finite_is_returned(numbers, wrong):
     numbers[0, 3] = wrong
     assert gather(numbers, ROWS, SOURCE, PLACES, np.zeros((2, 4))) == 5
     numbers[2, 1] = wrong
     assert gather(numbers, ROWS, SOURCE, PLACES, np.zeros((2, 4))) == 1
 
 
-def test_scattered_values_are_told_where_they_change(live):
+def test_scattered_values_are_found_where_they_change(live):
     dofs, values = np.array([5, 0, 2]), np.zeros((2, 3))
     values[0], values[1] = live[0][dofs], live[1][dofs]
     everything = np.arange(3)

@@ -208,12 +208,12 @@ def test_links_that_cannot_measure_the_base():
     [("base", "layer: online\nsensor: world\n", "sensor"), ("world", "", "name")],
     ids=["sensor", "link"],
 )
-def test_a_link_that_cannot_measure_is_told(tmp_path, link, extra, key):
+def test_a_link_that_cannot_measure_is_refused(tmp_path, link, extra, key):
     """The world does not move with the base: the error points to the line of the tag that names it."""
     file = tmp_path / "pipe.yaml"
     file.write_text(f"""name: pelvis
 space: OPERATIONAL
-source: told
+source: base
 message: nav_msgs::Odometry
 interface: {{position: true, velocity: true}}
 dofs:

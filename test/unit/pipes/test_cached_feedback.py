@@ -24,12 +24,12 @@ def make_pipe(robot, **changes):
 
 
 def test_patience_is_that_of_the_source(monkeypatch):
-    told, pipe = [], make_pipe(make_robot())
-    monkeypatch.setattr(pipe, "set_timeout", lambda *patience: told.append(patience))
+    timeouts, pipe = [], make_pipe(make_robot())
+    monkeypatch.setattr(pipe, "set_timeout", lambda *patience: timeouts.append(patience))
     source = CachedFeedback(pipe, CycleCount())
     for patience in ((0.7, 9), (0.5, 10)):  # the most patient plugin counts
         source.share(record()).set_timeout(*patience)
-    assert told == [(0.7, 9), (0.7, 10)]
+    assert timeouts == [(0.7, 9), (0.7, 10)]
 
 
 @pytest.mark.parametrize("ended", ["roll", "shoulder"])
@@ -39,7 +39,7 @@ def test_each_plugin_needs_the_drivers_of_its_own_joints(ended):
     pipe = factory.feedback(record(), PipeContext(robot, MemoryMiddleware(bus, "cart"), {}, 200.0))
     source = CachedFeedback(pipe, turns)
     shares = {name: source.share(record()) for name in names}
-    writers = {name: MemoryMiddleware(bus, f"driver_of_{name}").writer("told", pipe.reader.carries) for name in names}
+    writers = {name: MemoryMiddleware(bus, f"driver_of_{name}").writer("joints", pipe.reader.carries) for name in names}
     for name, share in shares.items():
         share.require(np.array([robot.dofs.index(name)]))
     for tick in range(5):

@@ -204,7 +204,7 @@ def test_where_the_robot_strikes_something_velocities_do_not_show_ways(struck, i
     assert any(refused[100:]) is is_refused
 
 
-def test_after_an_impact_joints_are_judged_again():
+def test_after_an_impact_joints_are_checked_again():
     limits = SimpleNamespace(position=np.ones(6), velocity=np.full(6, 10.0))
     robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, revolutions=np.zeros(6))
     leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)

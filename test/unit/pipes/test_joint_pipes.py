@@ -68,7 +68,7 @@ def test_a_reference_needs_a_sink(context):
 def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
     interface = {"position": True, "velocity": True}
     pipe = factory.feedback(received(interface=interface), context)
-    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer = context.middleware.writer("joints", "solfer/JointCommand")
     writer.write(JointMessage(("roll", "shoulder"), position=np.ones(2), velocity=numbers))
     pipe.run()
     assert (pipe.accepted, pipe.refused) == (0, 1) and words in caplog.text
@@ -80,7 +80,7 @@ def test_a_contradiction_is_logged_unless_the_robot_was_reset(is_reset, caplog):
     context = PipeContext(make_robot(), MemoryMiddleware(bus, "cart"), {}, RATE)
     record = received(function="state", message="sensor_msgs::JointState", dofs=dofs(type="actuated"))
     pipe = factory.feedback(record, context)
-    writer = context.middleware.writer("told", "sensor_msgs/JointState")
+    writer = context.middleware.writer("joints", "sensor_msgs/JointState")
     logged = []
     for cycle in range(30):
         bus.run_until(cycle / RATE)
@@ -99,7 +99,7 @@ def test_versions_tell_which_numbers_changed(context, tags):
     """What is computed of a State is computed anew where its version moved, and only there."""
     changed = received(interface={"position": True, "velocity": True}, dofs=dofs(type="actuated"), **tags)
     pipe, state = factory.feedback(changed, context), context.robot.command
-    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer = context.middleware.writer("joints", "solfer/JointCommand")
     moved = []
     for position, names in (([1.0, 2.0], 2), ([1.0, 2.0], 2), ([1.0, 2.5], 2), ([1.5], 1)):
         before = state.version("position"), state.version("velocity")
@@ -137,7 +137,7 @@ def test_any_interfaces_pass_between_robots(context, function, fields):
 
 
 def test_the_motor_side_has_joints_only():
-    for record, more in ((BodyFeedbackRecord, {"source": "told"}), (BodyControllerRecord, {"sink": "told"})):
+    for record, more in ((BodyFeedbackRecord, {"source": "base"}), (BodyControllerRecord, {"sink": "base"})):
         with pytest.raises(ValidationError, match="the motor side in OPERATIONAL space"):
             record.model_validate(
                 {
@@ -152,7 +152,7 @@ def test_the_motor_side_has_joints_only():
 
 
 def test_a_feedback_is_filtered_in_every_cycle(context):
-    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer = context.middleware.writer("joints", "solfer/JointCommand")
     pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
     state, seen = context.robot.command, []
     news = {0: 3.0, 1: 4.0, 5: 1.0, 6: 2.0}
@@ -167,7 +167,7 @@ def test_a_feedback_is_filtered_in_every_cycle(context):
 
 
 def test_a_refused_message_does_not_reach_the_filter(context):
-    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer = context.middleware.writer("joints", "solfer/JointCommand")
     pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
     for position in (1.0, np.nan, 1.0):
         writer.write(JointMessage(("roll", "shoulder"), np.array((1.0, position))))
@@ -177,7 +177,7 @@ def test_a_refused_message_does_not_reach_the_filter(context):
 
 
 def test_the_filter_keeps_what_a_message_leaves_out(context):
-    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer = context.middleware.writer("joints", "solfer/JointCommand")
     pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
     for names, values in ((("roll", "shoulder"), (1.0, 2.0)), *[(("roll",), (1.0,))] * 50):
         writer.write(JointMessage(names, np.array(values)))
@@ -187,12 +187,12 @@ def test_the_filter_keeps_what_a_message_leaves_out(context):
 
 def test_a_reset_restarts_the_filter(context):
     pipe = factory.controller(published(filter=FILTER), context)
-    wanted, seen = [1.0, 2.0, 0.0, 0.0, 5.0], []
-    for value in wanted:
+    positions, seen = [1.0, 2.0, 0.0, 0.0, 5.0], []
+    for value in positions:
         context.robot.command.position[6] = value
         pipe.collect()
         seen.append(pipe.message.position[6])
-    assert_allclose(seen, low_passed(wanted, **FILTER), atol=1e-12)
+    assert_allclose(seen, low_passed(positions, **FILTER), atol=1e-12)
     pipe.reset()
     context.robot.command.position[6] = -3.0
     pipe.collect()

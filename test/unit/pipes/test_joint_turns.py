@@ -12,7 +12,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.transport import JointMessage
 
-TOPIC = "told"
+TOPIC = "joints"
 NAMES = ("roll", "shoulder")
 
 

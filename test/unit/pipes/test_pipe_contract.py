@@ -156,9 +156,9 @@ def refuses(wire, case, message, logged, text):
 @every_pipe
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_nan_or_infinity_is_refused(wire, case, value, logged):
-    wanted = numbers(case, 2)
-    wanted[0] = value
-    refuses(wire, case, case.message(wanted), logged, "finite")
+    values = numbers(case, 2)
+    values[0] = value
+    refuses(wire, case, case.message(values), logged, "finite")
 
 
 @every_pipe

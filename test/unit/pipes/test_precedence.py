@@ -8,7 +8,7 @@ from support.unit.watch import PERIOD, Stage
 
 from solfer.plugins import PluginState
 
-DISPUTE = "'pipe' (told), where first and second publish the same DoFs: end one of them"
+DISPUTE = "'pipe' (joints), where first and second publish the same DoFs: end one of them"
 
 
 class Measured(Stage):

@@ -30,7 +30,7 @@ def base(**changes):
 
 def sent(**changes):
     """Make the record of a controller that sends the base."""
-    record = {"name": "pipe", "type": "reference", **BASE, "interface": {"position": True}, "sink": "told", **changes}
+    record = {"name": "pipe", "type": "reference", **BASE, "interface": {"position": True}, "sink": "base", **changes}
     return BodyControllerRecord.model_validate({key: value for key, value in record.items() if value is not None})
 
 
@@ -101,7 +101,7 @@ REFUSED = [
 
 
 def text_of(error):
-    """Join what an error tells."""
+    """Join what an error says."""
     names = f"|{', '.join(error.names)}" if error.names else ""
     return f"{error.what}|{error.expected}{names}"
 
@@ -161,7 +161,7 @@ def test_joints_that_the_robot_lacks_are_ignored_with_one_warning(caplog):
     """They are in every message, join later, leave again, and stand anywhere in the message."""
     context = PipeContext(make_robot(), MemoryMiddleware(Bus(), "cart"), {}, RATE)
     pipe = factory.feedback(received(dofs=dofs(type="actuated"), function="state"), context)
-    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer = context.middleware.writer("joints", "solfer/JointCommand")
     messages = [
         ("roll", "shoulder"),
         ("finger", "roll", "shoulder"),

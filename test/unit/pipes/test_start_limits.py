@@ -15,21 +15,21 @@ MEASURED = {"function": "state", "interface": {"position": True, "velocity": Tru
 
 
 def stage(**tolerance):
-    """Make a plugin whose pipe `told` is checked at the start."""
+    """Make a plugin whose pipe `joints` is checked at the start."""
     return Stage(**MEASURED, initialize=False, limits={"tolerance": tolerance})
 
 
-def tell(stage, position=0.0, velocity=0.0, effort=0.0):
-    """One measurement, in which the shoulder alone may be anywhere."""
+def publish(stage, position=0.0, velocity=0.0, effort=0.0):
+    """Publish one measurement, in which the shoulder alone may be anywhere."""
     numbers = {"position": position, "velocity": velocity, "effort": effort}
     one = np.array([name == "shoulder" for name in stage.names], dtype=float)
     message = JointMessage(stage.names, **{name: number * one for name, number in numbers.items()})
-    MemoryMiddleware(stage.bus, "speaker").writer("told", "solfer/JointCommand").write(message)
+    MemoryMiddleware(stage.bus, "speaker").writer("joints", "solfer/JointCommand").write(message)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "values, told, allowed",
+    "values, message, allowed",
     [
         (
             {"position": 2.3},
@@ -49,10 +49,10 @@ def tell(stage, position=0.0, velocity=0.0, effort=0.0):
         ),
     ],
 )
-def test_start_outside_of_limits_is_refused(values, told, allowed):
+def test_start_outside_of_limits_is_refused(values, message, allowed):
     made = stage(position=5, torque=7.0)
-    tell(made, **values)
-    with pytest.raises(OutOfLimits, match=told) as caught:
+    publish(made, **values)
+    with pytest.raises(OutOfLimits, match=message) as caught:
         run(made.plugin, made.middleware)
     assert f"at most {allowed}" in caught.value.expected
     assert made.component.inits == 0 and not made.sent.drain()
@@ -62,27 +62,27 @@ def test_start_outside_of_limits_is_refused(values, told, allowed):
 @pytest.mark.parametrize("values", [{"position": 2.08}, {"position": -2.08}, {"velocity": 3.0}, {"effort": 46.9}])
 def test_tolerances_widen_the_limits(values):
     made = stage(position=5, torque=7.0)
-    tell(made, **values)
+    publish(made, **values)
     made.cycles(1)
     assert made.plugin.life is PluginState.RUNNING
 
 
 def test_later_measurements_are_not_checked():
     made = stage()
-    tell(made)
+    publish(made)
     made.cycles(1)
-    tell(made, position=2.3)
+    publish(made, position=2.3)
     made.cycles(1)
     assert made.plugin.life is PluginState.RUNNING
 
 
 def test_each_start_is_checked():
     made = stage()
-    tell(made)
+    publish(made)
     made.cycles(1)
     made.plugin.stop()
     made.plugin.restart()
-    tell(made, position=2.3)
+    publish(made, position=2.3)
     with pytest.raises(OutOfLimits):
         made.cycles(1)
 

@@ -46,8 +46,8 @@ def test_strikes_in_a_row_time_a_feedback_out(caplog):
     assert stage.plugin.life is PluginState.RUNNING and not stage.watch.timed_out
     stage.cycles(1)
     assert stage.plugin.life is PluginState.STARTING and stage.watch.timed_out
-    assert "'pipe' (told): nothing new for 0.1" in caplog.text
-    assert stage.plugin.health() == (1, "holds and waits for feedback 'pipe' (told)")
+    assert "'pipe' (joints): nothing new for 0.1" in caplog.text
+    assert stage.plugin.health() == (1, "holds and waits for feedback 'pipe' (joints)")
     stage.cycles(1, speaks=True)
     assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
 
@@ -101,23 +101,23 @@ def test_keep_goes_on_with_the_last_message(caplog):
     stage.speak(0.25)
     stage.cycles(200)
     assert stage.component.updates == 200 and stage.sent.drain()[-1].position[-1] == 0.25
-    assert stage.plugin.health() == (1, "goes on with the last message of feedback 'pipe' (told)")
+    assert stage.plugin.health() == (1, "goes on with the last message of feedback 'pipe' (joints)")
     assert caplog.text.count("the last message stays valid") == 1
     stage.cycles(2, speaks=True)
     assert stage.plugin.health() == (0, "running") and stage.component.inits == 1
 
 
 def test_no_start_with_a_kept_message():
-    stage = Stage(on_timeout="hold", wanted={"on_timeout": "keep"})
+    stage = Stage(on_timeout="hold", desired={"on_timeout": "keep"})
     stage.cycles(20, speaks=True)
     assert stage.plugin.life is PluginState.RUNNING
     stage.cycles(100)
-    assert stage.watch.timed_out and stage.wanted.timed_out
+    assert stage.watch.timed_out and stage.desired.timed_out
     for _ in range(10):
         stage.speak()
         stage.cycles(1)
     assert stage.plugin.life is PluginState.STARTING
-    assert "for feedback 'wanted' (wanted)" in stage.plugin.inbox.refusal
+    assert "for feedback 'desired' (desired)" in stage.plugin.inbox.refusal
     stage.cycles(2, speaks=True)
     assert stage.plugin.life is PluginState.RUNNING
 
@@ -135,7 +135,9 @@ def test_hold_sends_zero_velocities_once():
 def test_stop_ends_the_plugin():
     stage = Stage(on_timeout="stop")
     stage.cycles(3, speaks=True)
-    with pytest.raises(MiddlewareError, match="nothing new for feedback 'pipe' .told., and its 'on_timeout' is 'stop'"):
+    with pytest.raises(
+        MiddlewareError, match="nothing new for feedback 'pipe' .joints., and its 'on_timeout' is 'stop'"
+    ):
         stage.cycles(100)
 
 
@@ -153,7 +155,7 @@ def test_a_required_pipe_names_its_missing_dofs():
     stage.speak(names=stage.names[:-1])
     stage.cycles(1)
     assert stage.plugin.life is PluginState.STARTING
-    assert stage.plugin.health()[1] == "holds and waits for feedback shoulder of 'pipe' (told)"
+    assert stage.plugin.health()[1] == "holds and waits for feedback shoulder of 'pipe' (joints)"
     stage.speak(names=stage.names[-1:])
     stage.cycles(1)
     assert stage.plugin.life is PluginState.RUNNING
@@ -161,7 +163,7 @@ def test_a_required_pipe_names_its_missing_dofs():
 
 def test_the_wait_at_the_start_is_limited():
     stage = Stage()
-    with pytest.raises(ReceiveTimeout, match="has waited 60 s for feedback 'pipe' .told."):
+    with pytest.raises(ReceiveTimeout, match="has waited 60 s for feedback 'pipe' .joints."):
         stage.cycles(int(61 * RATE))
     assert stage.component.inits == 0 and not stage.sent.drain()
 
@@ -229,7 +231,7 @@ def test_two_senders_are_named_once_a_second(caplog):
         for position, sender in enumerate(("first", "second") * 20):
             stage.speak(float(position), sender)
             stage.cycles(1)
-    assert caplog.text.count("first and second publish on told at the same time") == 1
+    assert caplog.text.count("first and second publish on joints at the same time") == 1
     assert stage.plugin.robot.command.position[-1] == 39.0  # the newest counts
     caplog.clear()
     stage.bus.run_until(stage.bus.time + 2.0)
@@ -240,11 +242,11 @@ def test_two_senders_are_named_once_a_second(caplog):
 
 @pytest.mark.parametrize(("first", "second"), [("hold", "stop"), ("stop", "hold")])
 def test_the_gravest_of_two_timeouts_counts(first, second):
-    stage = Stage(on_timeout=first, wanted={"on_timeout": second})
+    stage = Stage(on_timeout=first, desired={"on_timeout": second})
     stage.cycles(3, speaks=True)
     with pytest.raises(MiddlewareError, match="its 'on_timeout' is 'stop'"):
         stage.cycles(100)
-    assert stage.watch.timed_out and stage.wanted.timed_out
+    assert stage.watch.timed_out and stage.desired.timed_out
 
 
 @pytest.mark.parametrize(("rate", "tags", "timeout"), [
@@ -366,13 +368,13 @@ def test_refusals_are_in_the_health_and_in_what_a_plugin_waits_for():
     stage.cycles(1)
     stage.cycles(1, speaks=True)
     refuses = f"refuses messages of speaker: a 'position' of joint '{stage.names[0]}' that is not a finite number"
-    assert stage.plugin.health() == (1, f"feedback 'pipe' (told) {refuses}")
+    assert stage.plugin.health() == (1, f"feedback 'pipe' (joints) {refuses}")
     stage.cycles(round(0.6 / PERIOD), speaks=True)
     assert stage.plugin.health() == (0, "running")
     for _ in range(30):
         stage.speak(math.nan)
         stage.cycles(1)
-    lacks = f"waits for feedback 'pipe' (told), which {refuses}"
+    lacks = f"waits for feedback 'pipe' (joints), which {refuses}"
     assert stage.plugin.health() == (1, f"holds and {lacks}")
     assert ("reset", lacks) in stage.plugin.requests.notes
     stage.cycles(2, speaks=True)

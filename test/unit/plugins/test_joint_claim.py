@@ -1,4 +1,4 @@
-"""How a plugin asks for its joints and gives them back, against a lower level that answers when it is told to."""
+"""How a plugin asks for its joints and gives them back, against a lower level that answers when the test lets it."""
 
 import numpy as np
 import pytest
@@ -185,14 +185,14 @@ def test_refusals_of_earlier_commands_are_ignored():
     assert not claim.restarted
 
 
-def test_a_wrong_command_is_a_complaint(caplog):
+def test_a_wrong_command_is_a_warning(caplog):
     claim, _, bus, refusals = granted()
     bus.run_until(2.0 * REFUSAL_GRACE)
     refusals.write(RefusalMessage(("cart",), (False,), ("beyond its limit",)))
     assert not claim.lost() and claim.refused == 1
-    complaint = "the lower level refuses a command: beyond its limit"
-    assert claim.warning() == complaint and claim.warning() == ""
-    assert caplog.messages == [f"cart: {complaint}"]
+    warning = "the lower level refuses a command: beyond its limit"
+    assert claim.warning() == warning and claim.warning() == ""
+    assert caplog.messages == [f"cart: {warning}"]
 
 
 def test_without_claims_commands_go_out(caplog):

@@ -182,19 +182,19 @@ def test_who_commands_no_efforts_sends_none():
     assert not sender.cycles(SHORTEST)["effort"].any()
 
 
-def test_blended_commands_stay_between_measured_and_wanted():
+def test_blended_commands_stay_between_measured_and_desired():
     sender, random = Sender(), np.random.default_rng(3)
     shoulder = sender.dof("shoulder")
     sender.robot.state.position[shoulder] = 0.3
-    wanted = []
+    desired = []
 
     def jump():
-        wanted.append(random.uniform(-2.0, 2.0))
-        sender.robot.command.position[shoulder] = wanted[-1]
+        desired.append(random.uniform(-2.0, 2.0))
+        sender.robot.command.position[shoulder] = desired[-1]
 
     sender.outputs.start()
     sent = sender.cycles(3.0, jump)["position"][:, sender.place("shoulder")]
-    share = (sent - 0.3) / (np.array(wanted) - 0.3)
+    share = (sent - 0.3) / (np.array(desired) - 0.3)
     assert share.min() >= 0.0 and share.max() <= 1.0 + 1e-12 and share[0] == 0.0
 
 

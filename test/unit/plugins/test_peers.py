@@ -123,33 +123,33 @@ def test_a_missing_joint_order_warns_after_a_second(looking, caplog):
     assert failure.value.names == ("joint_states",) and looking.bus.time == pytest.approx(5.0)
 
 
-def test_what_the_same_process_receives_is_heard(looking, caplog):
-    space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
+def test_what_the_same_process_receives_counts(looking, caplog):
+    space = SharedSpace([SharedTopic("cart", "desired", KIND)])
     member = SpaceMember("cart", space, looking.node)
     looking.context = PipeContext(make_robot(), member, {}, RATE)
-    looking.publish("wanted", needed=False)
-    SpaceMember("other", space, looking.other).reader("wanted", KIND)
+    looking.publish("desired", needed=False)
+    SpaceMember("other", space, looking.other).reader("desired", KIND)
     looking.after(20.0)
     assert not caplog.messages and looking.peers.done
 
 
 def test_what_nobody_receives_is_warned_about(looking, caplog):
-    space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
+    space = SharedSpace([SharedTopic("cart", "desired", KIND)])
     looking.context = PipeContext(make_robot(), SpaceMember("cart", space, looking.node), {}, RATE)
-    looking.publish("wanted", needed=False)
+    looking.publish("desired", needed=False)
     looking.after(20.0)
-    assert len(caplog.messages) == 1 and "no subscriber on wanted" in caplog.messages[0]
+    assert len(caplog.messages) == 1 and "no subscriber on desired" in caplog.messages[0]
 
 
-def test_what_is_written_into_a_shared_robot_is_heard(looking):
+def test_what_is_written_into_a_shared_robot_is_received(looking):
     written = LocalTopic("cart")
-    writer = LocalWriter(looking.node.writer("wanted", KIND), written, looking.node.now)
+    writer = LocalWriter(looking.node.writer("desired", KIND), written, looking.node.now)
     assert not writer.is_received
-    LocalReader("wanted", written, looking.node.now)
+    LocalReader("desired", written, looking.node.now)
     assert writer.is_received
-    space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
+    space = SharedSpace([SharedTopic("cart", "desired", KIND)])
     member = SpaceMember("cart", space, looking.node)
-    shared = LocalWriter(member.writer("wanted", KIND), LocalTopic("cart"), member.now)
+    shared = LocalWriter(member.writer("desired", KIND), LocalTopic("cart"), member.now)
     assert not shared.is_received
-    SpaceMember("other", space, looking.other).reader("wanted", KIND)
+    SpaceMember("other", space, looking.other).reader("desired", KIND)
     assert shared.is_received

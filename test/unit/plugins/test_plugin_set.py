@@ -23,7 +23,7 @@ GAP = 1e-3  # [rad]
 
 
 class Bent:
-    """A plugin that wants the arm of a cart to be GAP away, and what it sends there.
+    """A plugin that moves the arm of a cart GAP away, and what it sends there.
 
     Args:
         blend: Shortest time in which its commands blend in, as its configuration says [s].

@@ -145,7 +145,7 @@ def test_a_topic_has_one_publisher():
 
 
 @pytest.mark.parametrize(
-    ("source", "ways"), [("told", "with other settings from the same topic"), ("heard", "from 'heard'")]
+    ("source", "ways"), [("joints", "with other settings from the same topic"), ("encoders", "from 'encoders'")]
 )
 @pytest.mark.parametrize(
     ("number", "named"),
@@ -156,11 +156,11 @@ def test_a_topic_has_one_publisher():
     ],
 )
 def test_a_number_has_one_source(source, ways, number, named):
-    first, second = received(name="joints"), received(name="others", source=source)
+    first, second = received(name="measured"), received(name="others", source=source)
     error = _two_sources(number, (first, "one"), (second, "two"))
     assert error.what == (
-        f"{named} has two sources: 'two' receives it by 'others' {ways}, 'one', which shares its Robot, by 'joints' "
-        "from 'told'"
+        f"{named} has two sources: 'two' receives it by 'others' {ways}, 'one', which shares its Robot, by 'measured' "
+        "from 'joints'"
     )
     assert error.expected == (
         f"one source for both, as in {first.where('source')}, or one plugin with model_change that receives either of "

@@ -43,7 +43,7 @@ def test_a_configuration_of_any_name_is_a_plugin():
         ("solfer.components.joint_stats:JointStates", ComponentError, "cannot be imported"),
         ("solfer.components.joint_states:JointState", UnknownName, "did you mean: JointStates"),
         ("solfer.errors:SolferError", ComponentError, "is not a component"),
-        ("solfer.components.move_joints:RESET", ComponentError, "is not a component"),
+        ("solfer.components.following.progress:CREEP_RATIO", ComponentError, "is not a component"),
     ],
 )
 def test_an_unusable_class_is_reported_with_its_place(target, error, text):

@@ -28,7 +28,7 @@ def service(**changes):
     return replace(Service("scale", "test/Scale", Ask, float, handler), **changes), got
 
 
-def test_requests_are_noted_only_if_wanted():
+def test_requests_are_noted_only_if_enabled():
     notes, (plain, got) = RequestNotes(), service()
     noted = notes.noted(plain)
     assert noted.handler(Ask(1.0)) == 2.0 and notes.notes == []

@@ -37,7 +37,7 @@ class Bench:
 
 
 def object_without():
-    """Return a feedback that does not measure: what a component wants."""
+    """Return a feedback that does not measure: what is desired."""
 
     class Desired:
         measures, stamp = False, 123.0

@@ -66,10 +66,10 @@ def named(comparison, joint):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_planted_differences_are_found_and_no_others(motion, simulated, seed):
-    positions, wanted = planted(motion, seed)
+    positions, expected = planted(motion, seed)
     comparison = compare(simulated, hardware(motion, positions, seed))
-    assert found(comparison) == {joint: (kind,) for joint, kind in wanted.items()}
-    for joint, kind in wanted.items():
+    assert found(comparison) == {joint: (kind,) for joint, kind in expected.items()}
+    for joint, kind in expected.items():
         law = named(comparison, joint).law
         if kind is Difference.DELAY:
             assert law[2] == pytest.approx(1e-3 * LATE, abs=1.5e-3)
@@ -104,7 +104,7 @@ def test_the_joint_that_differs_first_is_named(motion, simulated):
     assert [verdict.since for verdict in comparison.different] == pytest.approx([0.5, 2.0], abs=0.04)
 
 
-def test_still_missing_and_shifted_joints_are_told_apart(motion, simulated):
+def test_still_missing_and_shifted_joints_are_distinguished(motion, simulated):
     """Four planted faults at four joints: each gets its own kind of difference, and no other joint gets one."""
     positions = motion.positions.copy()
     still, offset, wheel = (motion.joints.index(name) for name in ("j_arm2_4", "torso_yaw", "j_wheel_1"))
@@ -133,7 +133,7 @@ def test_an_outlier_or_two_change_nothing(motion, simulated):
 
 
 def test_the_age_of_a_message_counts(motion, simulated):
-    """Rows of a faster cycle repeat what was received last; its age tells when that was."""
+    """Rows of a faster cycle repeat what was received last; its age is the time since then."""
     channel = motion.recording(noise=NOISE, seed=5).channels[POSITION]
     times = np.arange(0.0, channel.times[-1], 0.002)
     row = np.searchsorted(channel.times, times + 1e-9) - 1
@@ -146,7 +146,7 @@ def test_the_age_of_a_message_counts(motion, simulated):
 
 
 @pytest.mark.parametrize(
-    ("change", "complaint"),
+    ("change", "message"),
     [
         (lambda channel: {"values": np.zeros_like(channel.values)}, "no joint moves in both recordings"),
         (lambda channel: {"times": channel.times[:99], "values": channel.values[:99]}, "too short to be compared"),
@@ -154,10 +154,10 @@ def test_the_age_of_a_message_counts(motion, simulated):
         (lambda channel: {"columns": tuple(f"{name}x" for name in channel.columns)}, "no joint is in both"),
     ],
 )
-def test_what_cannot_be_compared_is_said(motion, simulated, change, complaint):
+def test_what_cannot_be_compared_is_said(motion, simulated, change, message):
     channel = simulated.channels[POSITION]
     other = dataclasses.replace(channel, **change(channel))
-    with pytest.raises(RecordingError, match=complaint):
+    with pytest.raises(RecordingError, match=message):
         compare(simulated, Recording({other.name: other}))
 
 
@@ -170,12 +170,12 @@ def test_an_unknown_plugin_is_named(simulated):
 @pytest.mark.slow
 def test_the_command_prints_and_draws(motion, simulated, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    positions, wanted = planted(motion, 3)
+    positions, expected = planted(motion, 3)
     save(simulated, tmp_path / "sim.mcap")
     save(hardware(motion, positions, 3), tmp_path / "robot.mcap")
     assert main(["compare", "sim.mcap", "robot.mcap", "--limits", "--plot", "out.png"]) == 1
     text = capsys.readouterr().out
-    assert all(joint in text for joint in wanted) and "wrong sign" in text and "late by" in text
+    assert all(joint in text for joint in expected) and "wrong sign" in text and "late by" in text
     assert re.search(r"neck_yaw +0\.\d{3} +0\.\d{4} +\d+\.\d\n", text)
     assert (tmp_path / "out.png").read_bytes()[1:4] == b"PNG"
     assert main(["compare", "sim.mcap", "sim.mcap"]) == 0

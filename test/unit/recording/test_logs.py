@@ -170,20 +170,20 @@ def test_no_message_of_a_bag_is_at_time_0(kind, first, tmp_path, monkeypatch, ca
 @pytest.mark.parametrize("kind", NAMED)
 def test_each_kind_fits_into_a_bag(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    wanted = channel("arm/log/it", NAMED[kind], kind)
-    save(Recording({wanted.name: wanted}), tmp_path / "run.mcap")
+    saved = channel("arm/log/it", NAMED[kind], kind)
+    save(Recording({saved.name: saved}), tmp_path / "run.mcap")
     assert main(["log", "export", "run.mcap", "--bag", "out.bag"]) == 0
     store = get_typestore(Stores.ROS1_NOETIC)
     with Reader(Path("out.bag")) as bag:
         connection, _, data = next(bag.messages())
         text = repr(store.deserialize_ros1(data, connection.msgtype))
     assert connection.msgtype == kind.replace("/", "/msg/")
-    assert all(f"={float(number)!r}" in text for number in wanted.values[0])
+    assert all(f"={float(number)!r}" in text for number in saved.values[0])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         (["log", "info", "none.mcap"], "none.mcap: the recording cannot be read: No such file or directory"),
         (["log", "info", "text.mcap"], "text.mcap: this is no MCAP file"),
@@ -197,12 +197,12 @@ def test_each_kind_fits_into_a_bag(kind, tmp_path, monkeypatch, capsys):
         (["plot", "run.mcap", "-o", "none/out.png", "-c", "j_arm1_1"], "the picture cannot be written: No such file"),
     ],
 )
-def test_a_mistake_is_one_clear_error(file, arguments, complaint, capsys):
+def test_a_mistake_is_one_clear_error(file, arguments, message, capsys):
     Path("text.mcap").write_text("no recording at all")
     before = Path("run.mcap").read_bytes()
     assert main(arguments) == 2
     text = capsys.readouterr().err
-    assert complaint in text and "Traceback" not in text and text.count("error:") == 1
+    assert message in text and "Traceback" not in text and text.count("error:") == 1
     assert Path("run.mcap").read_bytes() == before
 
 
@@ -213,7 +213,7 @@ def test_a_cut_off_file_says_what_is_missing(file, capsys):
     assert "warning: missing: " in capsys.readouterr().err
 
 
-def test_what_is_wanted_is_found_for_each_joint(recording):
+def test_what_is_desired_is_found_for_each_joint(recording):
     tracks = {track.joint: track for track in tracks_of(recording, "arm")}
     assert [(track.joint, track.field, track.unit) for track in tracks.values()] == [
         ("j_arm1_1", "position", "rad"), ("j_arm1_2", "position", "rad"), ("j_wheel_1", "velocity", "rad/s")

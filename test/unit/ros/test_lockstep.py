@@ -113,7 +113,7 @@ class Network:
 
     def __init__(self, monkeypatch):
         self.handlers = {}
-        state = ([["/joint_states", ["/simulator"]]], [["/wanted", ["/simulator"]]], [])
+        state = ([["/joint_states", ["/simulator"]]], [["/desired", ["/simulator"]]], [])
         monkeypatch.setattr(client.rosgraph, "Master", lambda name: SimpleNamespace(getSystemState=lambda: state))
         monkeypatch.setattr(rospy, "Service", self._serve)
         monkeypatch.setattr(rospy, "ServiceProxy", lambda name, kind, persistent: Proxy(self.handlers, name))
@@ -141,7 +141,7 @@ class Proxy:
 
 
 class Node:
-    """A node `/arm` that follows: receives `joint_states`, publishes `wanted` once in each cycle."""
+    """A node `/arm` that follows: receives `joint_states`, publishes `desired` once in each cycle."""
 
     def __init__(self, alive):
         self.received, self.sent = {}, [0]
@@ -149,7 +149,7 @@ class Node:
         self.follower = LockstepClient(
             "/arm",
             clock,
-            [reader("/joint_states", self.received), writer("/wanted", self.sent)],
+            [reader("/joint_states", self.received), writer("/desired", self.sent)],
             lambda: [],
             alive.is_set,
         )
@@ -173,11 +173,11 @@ def network(monkeypatch):
 
 @pytest.fixture
 def pair(alive, network):
-    """Make a node that follows, and the server of a simulator that has published its joints and receives `wanted`."""
+    """Make a node that follows, and the server of a simulator that has published its joints and receives `desired`."""
     node, received, published = Node(alive), {}, [1]
     node.received["/simulator"] = 1
     made = LockstepServer(
-        ["/arm"], "/simulator", [writer("/joint_states", published), reader("/wanted", received)], alive.is_set
+        ["/arm"], "/simulator", [writer("/joint_states", published), reader("/desired", received)], alive.is_set
     )
     yield SimpleNamespace(node=node, conductor=made, received=received, published=published)
     made.close()
@@ -231,7 +231,7 @@ def test_messages_before_the_node_came_are_not_awaited(alive, network, pair):
 def test_a_message_that_does_not_arrive_is_named(pair, monkeypatch):
     monkeypatch.setattr(client, "LOCKSTEP_TIMEOUT", 0.05)
     join(pair)
-    with pytest.raises(MiddlewareError, match="message 1 of /arm on topic /wanted has not arrived"):
+    with pytest.raises(MiddlewareError, match="message 1 of /arm on topic /desired has not arrived"):
         pair.conductor.follow(0.0, lambda: None)
 
 
@@ -256,7 +256,7 @@ def test_a_restarted_simulator_goes_on_with_the_node(pair, alive):
     pair.conductor.close()
     pair.published[0], pair.node.received["/simulator"] = 1, 1
     pair.conductor = LockstepServer(
-        ["/arm"], "/simulator", [writer("/joint_states", pair.published), reader("/wanted", received)], alive.is_set
+        ["/arm"], "/simulator", [writer("/joint_states", pair.published), reader("/desired", received)], alive.is_set
     )
     join(pair)
     pair.conductor.follow(0.0, lambda: None)

@@ -78,7 +78,7 @@ def test_a_request_that_is_overtaken_is_tried_again(offered, overtaken, success)
     ("runs", "reason"), [(False, "lower_level ends"), (True, "no answer of its loop within 0.01 s")]
 )
 def test_a_claim_that_finds_no_lower_level_may_be_repeated(offered, runs, reason):
-    """A simulator that ends, or stands still, does not judge the claim: the plugin waits for the next one."""
+    """A simulator that ends, or stands still, does not decide on the claim: the plugin waits for the next one."""
     claim = Service("claim", CLAIM_INTERFACE, ClaimRequest, ClaimAnswer, lambda request: ClaimAnswer(), timeout=0.01)
     node = SimpleNamespace(name="/simulator", clock=None, running=lambda: runs)
     RosMiddleware(node).serve("lower_level", [claim], Inbox().submit)

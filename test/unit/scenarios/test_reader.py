@@ -120,7 +120,7 @@ def test_what_is_no_scenario_is_refused(read, text):
         read(text)
 
 
-def test_several_mistakes_are_told_at_once(read):
+def test_several_mistakes_are_reported_at_once(read):
     text = text_of("vel: 0.1", "vel: fast").replace("type: wait", "type: wiat")
     with pytest.raises(SolferErrors) as caught:
         read(text)

@@ -19,7 +19,7 @@ from solfer.segments.segment import Segment
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.statistics import RuntimeStatistics
 
-SECRET = b"what the robot's user wants to keep"
+SECRET = b"what the robot's user keeps secret"
 
 
 @pytest.fixture

@@ -18,19 +18,19 @@ def test_what_is_declared_is_found():
     wire = XbotWire()
     node, base = wire.node("counter"), wire.node("base")
     CountingNode(node)
-    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, print),), base, Inbox())
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, print),), base, Inbox())
     base.queue("pipe", "nav_msgs/Odometry")
     namespace = Namespace("contract", wire.folder)
     found = {each.topic: each.message for each in declared_topics(namespace, ("known",))}
     assert found == {
         "abacus/count/goal": f"{COUNT}ActionGoal",
         "abacus/count/cancel": GOAL_ID,
-        "base/wanted": "geometry_msgs/Twist",
+        "base/twist": "geometry_msgs/Twist",
     }
     published = {each.topic: each.message for each in published_topics(namespace)}
     assert published["abacus/count/status"] == STATUS and published["abacus/count/result"] == f"{COUNT}ActionResult"
     base.close()
-    assert "base/wanted" not in {each.topic for each in declared_topics(namespace)}
+    assert "base/twist" not in {each.topic for each in declared_topics(namespace)}
     wire.close()
 
 
@@ -39,15 +39,15 @@ def test_segments_are_opened_only_after_a_notification(monkeypatch):
     wire = XbotWire()
     node, other = wire.node("arm"), wire.node("base")
     other.writer("odometry", "nav_msgs/Odometry")
-    node.writer("wanted", "nav_msgs/Odometry")
+    node.writer("desired", "nav_msgs/Odometry")
     opened, attach = [], Segment.attach
     monkeypatch.setattr(Segment, "attach", lambda path, kind: opened.append(path.name) or attach(path, kind))
     assert node.topics().result() == Topics({"odometry": "nav_msgs/Odometry"}, {})
     assert opened
     opened.clear()
     assert node.topics().result() == Topics({"odometry": "nav_msgs/Odometry"}, {}) and not opened
-    queue = other.queue("wanted", "nav_msgs/Odometry")
-    assert node.topics().result().received == {"wanted": "nav_msgs/Odometry"} and opened
+    queue = other.queue("desired", "nav_msgs/Odometry")
+    assert node.topics().result().received == {"desired": "nav_msgs/Odometry"} and opened
     queue.close()
     other.close()
     assert node.topics().result() == Topics({}, {})

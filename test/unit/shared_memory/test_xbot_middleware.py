@@ -341,13 +341,13 @@ def test_topics_lists_all_other_nodes(tmp_path):
     )
     for node in (here, there):
         node.writer("sent", "sensor_msgs/JointState")
-        node.queue("wanted", "solfer/JointCommand")
+        node.queue("desired", "solfer/JointCommand")
     there.reader("velocity_controller/command", "solfer/JointCommand")
     here.reader("mine", "solfer/JointCommand")
     bridge.reader("bridged", "solfer/JointCommand")
     topics = here.topics().result(0)
     assert dict(topics.published) == {"sent": "sensor_msgs/JointState"}
-    assert dict(topics.received) == {name: "solfer/JointCommand" for name in ("velocity_controller/command", "wanted")}
+    assert dict(topics.received) == {name: "solfer/JointCommand" for name in ("velocity_controller/command", "desired")}
     there.close()
     topics = here.topics().result(0)
     assert not topics.published and not topics.received

@@ -43,7 +43,7 @@ def test_no_body_is_nearer(principal):
         assert np.linalg.norm(body - tensor) > distance - 1e-4  # the margin for single precision
 
 
-def test_a_repair_is_told_with_its_numbers(caplog):
+def test_a_repair_is_reported_with_its_numbers(caplog):
     inertias = Inertias("r.urdf")
     for link in "abcdef":
         inertias.physical(link, 1.0, np.diag([0.2, 0.3, 0.53]))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from breaking.bounds import AWAY, Expected, judge, judge_return
+from breaking.bounds import AWAY, Expected, check_motion, check_return
 from breaking.record import Record, Samples
 
 JOINTS = ("arm", "leg", "wheel")
@@ -32,22 +32,22 @@ def robot(ends: bool) -> Samples:
     return Samples(TIMES, positions, velocities, TIMES.copy())
 
 
-def complaint(samples: Samples, expected: Expected) -> str:
+def finding_of(samples: Samples, expected: Expected) -> str:
     """Return the only one."""
-    (found,) = judge(JOINTS, samples, expected).complaints
+    (found,) = check_motion(JOINTS, samples, expected).findings
     return found
 
 
 def test_a_motion_that_goes_on_as_asked():
-    verdict = judge(JOINTS, robot(False), ASKED_FOR)
-    assert not verdict.complaints
+    verdict = check_motion(JOINTS, robot(False), ASKED_FOR)
+    assert not verdict.findings
     assert verdict.excess == pytest.approx(0.0)
     assert verdict.wheel == 0.0  # nothing has to be at rest
 
 
 def test_a_motion_that_ends_with_the_fault():
-    verdict = judge(JOINTS, robot(True), FORGOTTEN)
-    assert not verdict.complaints
+    verdict = check_motion(JOINTS, robot(True), FORGOTTEN)
+    assert not verdict.findings
     assert verdict.away < 0.002
 
 
@@ -56,63 +56,63 @@ def test_a_motion_that_should_have_ended(joint):
     moves, ends = robot(False), robot(True)
     column = JOINTS.index(joint)
     ends.positions[:, column], ends.velocities[:, column] = moves.positions[:, column], moves.velocities[:, column]
-    complaints = judge(JOINTS, ends, FORGOTTEN).complaints
-    assert complaints and all(joint in words for words in complaints)
+    findings = check_motion(JOINTS, ends, FORGOTTEN).findings
+    assert findings and all(joint in words for words in findings)
 
 
 def test_wheels_that_drive_off_again():
     samples = robot(True)
     samples.velocities[(samples.times > 3.0) & (samples.times < 3.2), 2] = 0.06
-    assert "a wheel without commands turned at 0.06 rad/s, 1.50 s after" in complaint(samples, FORGOTTEN)
-    assert not judge(JOINTS, samples, ASKED_FOR).complaints
+    assert "a wheel without commands turned at 0.06 rad/s, 1.50 s after" in finding_of(samples, FORGOTTEN)
+    assert not check_motion(JOINTS, samples, ASKED_FOR).findings
 
 
 def test_wheels_that_take_too_long_to_rest():
     samples = robot(True)
     samples.velocities[(samples.times > END) & (samples.times < END + 1.3), 2] = 0.1
-    assert "a wheel without commands" in complaint(samples, FORGOTTEN)
+    assert "a wheel without commands" in finding_of(samples, FORGOTTEN)
 
 
 @pytest.mark.parametrize("speed", [ASKED + 0.2, -0.2])
 def test_wheels_beyond_what_is_asked_for(speed):
     samples = robot(False)
     samples.velocities[500, 2] = speed
-    assert "a wheel turned 0.20 rad/s faster than asked for" in complaint(samples, ASKED_FOR)
+    assert "a wheel turned 0.20 rad/s faster than asked for" in finding_of(samples, ASKED_FOR)
 
 
 def test_a_joint_that_is_thrown():
     samples = robot(False)
     samples.velocities[400, 1] = -2.5
-    assert complaint(samples, ASKED_FOR).startswith("leg moved at 2.50 rad/s")
+    assert finding_of(samples, ASKED_FOR).startswith("leg moved at 2.50 rad/s")
 
 
 def test_a_joint_that_leaves_its_path():
     samples = robot(False)
     samples.positions[700, 1] = AWAY + 0.01
-    assert complaint(samples, ASKED_FOR).startswith("leg 0.060 rad off its path")
+    assert finding_of(samples, ASKED_FOR).startswith("leg 0.060 rad off its path")
 
 
 def test_joints_may_swing_farther_while_wheels_brake():
     samples = robot(True)
     samples.positions[TIMES.searchsorted(END + 0.2), 1] = AWAY + 0.005
-    assert not judge(JOINTS, samples, FORGOTTEN).complaints
+    assert not check_motion(JOINTS, samples, FORGOTTEN).findings
     samples.positions[TIMES.searchsorted(END + 0.2), 1] = AWAY + 0.02
-    assert complaint(samples, FORGOTTEN).startswith("leg 0.070 rad while wheels brake")
+    assert finding_of(samples, FORGOTTEN).startswith("leg 0.070 rad while wheels brake")
 
 
 def test_a_slow_machine_makes_no_joint_too_fast():
     samples = robot(False)
     samples.velocities[400:600, 0] = 2.5
     slow = samples._replace(arrivals=2.0 * samples.arrivals)
-    assert judge(JOINTS, samples, ASKED_FOR).complaints
-    assert not judge(JOINTS, slow, ASKED_FOR).complaints
+    assert check_motion(JOINTS, samples, ASKED_FOR).findings
+    assert not check_motion(JOINTS, slow, ASKED_FOR).findings
 
 
 def test_a_return_that_nobody_asked_for():
     samples = robot(False)
-    assert not judge_return(JOINTS, samples, WHEELS, END, ASKED).complaints
+    assert not check_return(JOINTS, samples, WHEELS, END, ASKED).findings
     samples.velocities[-1] = 0.0, 2.5, ASKED + 0.2
-    speed, wheel = judge_return(JOINTS, samples, WHEELS, END, ASKED).complaints
+    speed, wheel = check_return(JOINTS, samples, WHEELS, END, ASKED).findings
     assert speed.startswith("leg moved at 2.50 rad/s") and wheel.startswith("a wheel turned 0.20 rad/s faster")
 
 

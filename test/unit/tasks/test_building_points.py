@@ -156,7 +156,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("task", "text"), REFUSED.items(), ids=REFUSED)
-def test_what_is_no_point_is_told(build, task, text):
+def test_what_is_no_point_is_refused(build, task, text):
     with pytest.raises(SolferError) as error:
         build(task)
     assert f"{error.value.what}|{error.value.expected}" == text

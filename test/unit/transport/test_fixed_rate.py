@@ -54,7 +54,7 @@ def test_a_late_wake_up_leaves_out_whole_periods():
     assert [skipped for _, _, skipped in begins] == [0, 0, 3, 0]
 
 
-def test_a_lag_is_made_up_where_that_is_wanted():
+def test_a_lag_is_made_up_where_that_is_requested():
     loop, begins = run(Clock(), 8, {1: 4.5 * PERIOD}, catch_up=5 * PERIOD)
     assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, 5.5, 5.5, 5.5, 5.5, 6, 7]
     assert loop.skipped == 0

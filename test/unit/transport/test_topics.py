@@ -44,9 +44,9 @@ def wire(request):
 def test_each_message_comes_in_its_order(wire, interface):
     (first, *others), kind = VALUES[interface], KINDS[interface]
     got, inbox, waiting = [], Inbox(), [first, None, *others]
-    bind("base", (TopicIn("wanted", interface, kind, got.append),), wire.middleware, inbox)
+    bind("base", (TopicIn("twist", interface, kind, got.append),), wire.middleware, inbox)
     sender = wire.node("sender")
-    topic = TopicOut("/base/wanted", interface, kind, lambda: waiting.pop(0))
+    topic = TopicOut("/base/twist", interface, kind, lambda: waiting.pop(0))
     (publish,) = bind("stick", (topic,), sender, Inbox())
     while waiting:
         publish()
@@ -87,8 +87,8 @@ def test_each_sender_has_a_clock_of_its_own(one, two, caplog):
     """Both send at the same time, and both count; a stamp that goes back does not, unless they stay back for 0.2 s."""
     wire, inbox, got, waiting = MemoryWire(), Inbox(), [], []
     interface = "geometry_msgs/TwistStamped"
-    bind("base", (TopicIn("wanted", interface, TwistStamped, got.append, ordered=True),), wire.middleware, inbox)
-    out = TopicOut("/base/wanted", interface, TwistStamped, waiting.pop)
+    bind("base", (TopicIn("twist", interface, TwistStamped, got.append, ordered=True),), wire.middleware, inbox)
+    out = TopicOut("/base/twist", interface, TwistStamped, waiting.pop)
     publish = {name: bind(name, (out,), wire.node(name), Inbox())[0] for name in ("stick", "other")}
 
     def counts(sender, stamp):
@@ -110,8 +110,8 @@ def test_each_sender_has_a_clock_of_its_own(one, two, caplog):
 
 def test_nothing_is_handed_over_while_refused(wire):
     got, inbox = [], Inbox("it waits")
-    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, got.append),), wire.middleware, inbox)
-    topic = TopicOut("/base/wanted", "geometry_msgs/Twist", Twist, lambda: TWIST)
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, got.append),), wire.middleware, inbox)
+    topic = TopicOut("/base/twist", "geometry_msgs/Twist", Twist, lambda: TWIST)
     (publish,) = bind("stick", (topic,), wire.node("sender"), Inbox())
     publish()
     inbox.apply()
@@ -128,12 +128,12 @@ def test_a_handler_that_refuses_is_logged(wire, caplog):
         raise ComponentError("a twist of the wrong kind", expected="another one")
 
     inbox = Inbox()
-    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, refuse),), wire.middleware, inbox)
-    topic = TopicOut("/base/wanted", "geometry_msgs/Twist", Twist, lambda: TWIST)
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, refuse),), wire.middleware, inbox)
+    topic = TopicOut("/base/twist", "geometry_msgs/Twist", Twist, lambda: TWIST)
     (publish,) = bind("stick", (topic,), wire.node("sender"), Inbox())
     publish()
     inbox.apply()
-    assert "base/wanted" in caplog.text and "of sender" in caplog.text and "wrong kind" in caplog.text
+    assert "base/twist" in caplog.text and "of sender" in caplog.text and "wrong kind" in caplog.text
 
 
 def test_another_class_than_declared_is_refused():
@@ -151,13 +151,13 @@ def test_messages_of_pipes_alone_cannot_be_declared():
 
 def test_a_topic_has_one_interface():
     wire = MemoryWire()
-    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, print),), wire.middleware, Inbox())
-    other = TopicOut("/base/wanted", "geometry_msgs/TwistStamped", TwistStamped, print)
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, print),), wire.middleware, Inbox())
+    other = TopicOut("/base/twist", "geometry_msgs/TwistStamped", TwistStamped, print)
     with pytest.raises(MiddlewareError, match="carries geometry_msgs/Twist"):
         bind("stick", (other,), wire.middleware, Inbox())
 
 
 def test_a_name_is_declared_once():
-    topics = [TopicIn("wanted", "geometry_msgs/Twist", Twist, print)] * 2
-    with pytest.raises(ComponentError, match="'base/wanted' is declared twice"):
+    topics = [TopicIn("twist", "geometry_msgs/Twist", Twist, print)] * 2
+    with pytest.raises(ComponentError, match="'base/twist' is declared twice"):
         bind("base", topics, MemoryWire().middleware, Inbox())

@@ -20,14 +20,8 @@ from solfer.replay.replay import Replay
 from solfer.replay.rows import RecordedRows
 from solfer.robot.description.shipped import RobotFiles
 
-UNUSUAL = 5
-"""First cycles with a trace, in which Python itself makes what it keeps."""
-
 MEASURED_CYCLES = 200
 """Most cycles that are run after the start."""
-
-FEWEST = 40
-"""Least number of cycles in which a recorded plugin has to run."""
 
 
 class CycleMeter:
@@ -46,7 +40,8 @@ class CycleMeter:
     def __init__(self, plugin: Plugin, cycles: int):
         self._plugin = plugin
         self._meter = LineMeter(Ownership(sys.modules[type(plugin.component).__module__]))
-        part = (cycles - UNUSUAL) // 4
+        settling = 5  # first cycles with a trace, in which Python itself makes what it keeps
+        part = (cycles - settling) // 4
         self.warm = 2 * part
         self.kept = part
         self.traced = part
@@ -57,7 +52,7 @@ class CycleMeter:
             ended: partial(self._meter.end, __file__),
         }
         self._traced_from = ended
-        self._counted_from = ended + UNUSUAL
+        self._counted_from = ended + settling
         self._ran = 0
 
     @property
@@ -160,6 +155,7 @@ def _enough(rows: RecordedRows) -> int:
         RecordingError: There are too few.
     """
     ran = int(rows.running.sum())
-    if ran < FEWEST:
-        raise RecordingError(f"'{rows.plugin}' runs in {ran} cycles", where=rows.where, expected=f"at least {FEWEST}")
+    least = 40
+    if ran < least:
+        raise RecordingError(f"'{rows.plugin}' runs in {ran} cycles", where=rows.where, expected=f"at least {least}")
     return min(MEASURED_CYCLES, ran - 2)  # the cycle of a start is not like others

@@ -32,8 +32,6 @@ _set_trace.argtypes = (_EVENT, ctypes.py_object)
 _set_trace.restype = None
 
 Key = tuple[CodeType, int]
-OUTSIDE_FRAME, IGNORED_FRAMES = None, ()
-"""What the stack has for the caller of the work, and for stand-ins with all that they call."""
 
 
 @dataclass
@@ -72,10 +70,16 @@ class LineMeter:
         lines: What each line takes that allocates.
     """
 
+    _OUTSIDE = None
+    """What the stack has for the caller of the work."""
+
+    _IGNORED = ()
+    """What it has for stand-ins, with all that they call."""
+
     def __init__(self, whose: Ownership):
         self.lines: dict[tuple[str, int], LineCost] = {}
         self._whose, self._before = whose, tracemalloc.Snapshot((), 0)
-        self._stack: list[Any] = [OUTSIDE_FRAME]
+        self._stack: list[Any] = [self._OUTSIDE]
         self._ended: FrameType | None = None
         self._base = 0
         self._own = 0
@@ -88,7 +92,7 @@ class LineMeter:
         """Do some work, and count what its lines take, if it `counts`."""
         tracemalloc.start()
         self._counts = counts
-        self._stack[:] = [OUTSIDE_FRAME]
+        self._stack[:] = [self._OUTSIDE]
         self._base = 0
         _set_trace(self._callback, None)
         try:
@@ -134,8 +138,8 @@ class LineMeter:
         elif event in (CALL, LINE):
             owner = self._whose.of(frame.f_code.co_filename)
             if event == CALL:
-                stack.append(IGNORED_FRAMES if key is IGNORED_FRAMES or owner is CodeOwner.STAND_IN else key)
-            if owner is CodeOwner.LINES and stack[-1] is not IGNORED_FRAMES:
+                stack.append(self._IGNORED if key is self._IGNORED or owner is CodeOwner.STAND_IN else key)
+            if owner is CodeOwner.LINES and stack[-1] is not self._IGNORED:
                 stack[-1] = frame.f_code, frame.f_lineno
         # what Python frees of a function that has ended would hide what its caller takes: it stays until the next event
         self._ended = frame if event == RETURN else None

@@ -9,8 +9,6 @@ from types import ModuleType
 import solfer
 
 SOLFER = Path(__file__).parents[2]
-STAND_INS = ("cli", "middleware", "replay", "simulation")
-"""Rooms that stand around a plugin here, and not where it works."""
 
 
 class CodeOwner(IntEnum):
@@ -37,7 +35,9 @@ class Ownership:
     def __init__(self, component: ModuleType):
         self._component = _home(component)
         self._libraries = {f"{Path(path)}/" for path in (*sysconfig.get_paths().values(), *_installed()) if path}
-        self._stand_ins = tuple(f"{SOLFER / room}/" for room in STAND_INS)
+        # rooms that stand around a plugin here, and not where it works
+        rooms = ("cli", "middleware", "replay", "simulation")
+        self._stand_ins = tuple(f"{SOLFER / room}/" for room in rooms)
         self._known: dict[str, CodeOwner] = {}
 
     def of(self, file: str) -> CodeOwner:

@@ -14,8 +14,6 @@ from solfer.config import CheckReport, Configuration
 from solfer.errors import ConfigError
 from solfer.plugins.generation.unbuilt import importable_beside
 
-HEAD = ("line", "function", "times", "bytes", "kept", "because of")
-
 
 def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
     """Measure the plugins of -n and print which lines allocate; returns whether their components are the reason.
@@ -30,7 +28,8 @@ def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
         costs = [cost for cost in meter.lines if cost.times or _keeps(cost, meter)]
         what = f"{options.recording}" if options.recording else "the simulated robot"
         print(f"{configuration.name}: {meter.traced} cycles on {what}, after {meter.warm + meter.kept} others")
-        for line in aligned([HEAD, *_table(costs, meter)], "  ") if costs else ("no line allocates",):
+        head = ("line", "function", "times", "bytes", "kept", "because of")
+        for line in aligned([head, *_table(costs, meter)], "  ") if costs else ("no line allocates",):
             print(line)
         found = found or any(
             cost.blamed and (cost.times >= OFTEN * meter.traced or _keeps(cost, meter)) for cost in costs

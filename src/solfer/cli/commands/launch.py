@@ -19,11 +19,8 @@ from solfer.errors import ConfigError, MissingDependency, SolferError, SolferErr
 SWITCHES = ("control", "gui", "lockstep", "rviz", "view")
 """Arguments that are read without regard to case, as roslaunch does."""
 
-ROBOT = "centauro"
-"""Default of the launch files."""
-
-RVIZ, VIEW_LAUNCH = "rviz.launch", "view.launch"
-"""The launch files that start RViz and the page in the browser, which others include."""
+RVIZ = "rviz.launch"
+"""The launch file that starts RViz, which others include."""
 
 FILE_ARGUMENTS = {
     "config": "a configuration",
@@ -33,9 +30,6 @@ FILE_ARGUMENTS = {
     "srdf": "an SRDF",
 }
 """Arguments that are files, and which."""
-
-NAMESPACE = re.compile(r"[A-Za-z]\w*", re.ASCII)
-"""Names of ROS, where a namespace is one of ROS, too, and empty by default."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,10 +52,11 @@ def run(options: argparse.Namespace) -> int:
             where=RVIZ,
             expected="RViz, in Debian the package `rviz` (apt-get install rviz), or rviz:=false",
         )
-    if options.file.name == VIEW_LAUNCH and find_spec("viser") is None:
+    page = "view.launch"
+    if options.file.name == page and find_spec("viser") is None:
         raise MissingDependency(
             "there is no module 'viser'",
-            where=VIEW_LAUNCH,
+            where=page,
             expected="pip install -r requirements-view.txt, or view:=false",
         )
     given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file)))
@@ -162,7 +157,7 @@ def check(known: Mapping[str, str], given: Mapping[str, str], launch: str) -> li
             errors.append(
                 SolferError(f"there is no file '{value}'", where=f"{launch}, {name}", expected=FILE_ARGUMENTS[name])
             )
-        elif name == "namespace" and not known[name] and value and not NAMESPACE.fullmatch(value):
+        elif name == "namespace" and not known[name] and value and not re.fullmatch(r"[A-Za-z]\w*", value, re.ASCII):
             expected = "a letter, then letters, digits and underscores"
             errors.append(SolferError(f"'{value}' is no namespace", where=f"{launch}, namespace", expected=expected))
     used = {name: value for name, value in given.items() if name in known and value}
@@ -179,7 +174,7 @@ def _of_the_robot(given: Mapping[str, str], launch: str) -> list[SolferError]:
     from solfer.simulation.world.world import find_world, read_world
 
     def check_robot() -> None:
-        name = given.get("robot", ROBOT)
+        name = given.get("robot", "centauro")  # the default of the launch files
         files = robot_of(name)[1] if launch == RVIZ else robot_named(name)
         if "state" in given and files.srdf is not None:
             states = Semantics.from_file(files.srdf, Description.from_file(files.urdf)).states

@@ -10,12 +10,12 @@ import argparse
 from solfer.cli.options import add_robot_files, add_search_paths, add_system
 
 DESCRIBED = ("joints", "links", "groups", "states")
-LISTED_KINDS = (*DESCRIBED, "maps", "pipes", "plugins", "configs", "declarations")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
-    parser.add_argument("kind", metavar="KIND", choices=LISTED_KINDS, help=f"one of {', '.join(LISTED_KINDS)}")
+    kinds = (*DESCRIBED, "maps", "pipes", "plugins", "configs", "declarations")
+    parser.add_argument("kind", metavar="KIND", choices=kinds, help=f"one of {', '.join(kinds)}")
     parser.add_argument("file", metavar="FILE", nargs="?", help="main configuration")
     parser.add_argument("-n", dest="name", metavar="NAME", help="plugin configuration in FILE")
     parser.add_argument("--robot", metavar="NAME", help="a shipped robot, such as `centauro`")

@@ -9,23 +9,18 @@ from html import escape
 
 from solfer.cli.diagram.network import Arrow, End, Kind, Network, PluginBox
 
-BLUE = "#cfe2f7"
-GREEN = "#d3ecc8"
 PINK = "#f8d3d8"
-YELLOW = "#fff0b8"
-PURPLE = "#e4daf5"
 LINE_COLOR = "#3b4a5a"
-GREY = "#68778a"
-FONTS = "Helvetica,Arial,sans-serif"
 
 
 def dot_text(network: Network) -> str:
     """Write a network in DOT, laid out from the sensors on the left to the lower level on the right."""
+    fonts = "Helvetica,Arial,sans-serif"
     lines = [
         "digraph solfer {",
-        f'  graph [rankdir=LR, bgcolor=white, fontname="{FONTS}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
-        f'  node [shape=plain, fontname="{FONTS}", fontsize=11, color="{LINE_COLOR}"];',
-        f'  edge [fontname="{FONTS}", fontsize=10, color="{LINE_COLOR}", fontcolor="{LINE_COLOR}", arrowsize=0.8];',
+        f'  graph [rankdir=LR, bgcolor=white, fontname="{fonts}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
+        f'  node [shape=plain, fontname="{fonts}", fontsize=11, color="{LINE_COLOR}"];',
+        f'  edge [fontname="{fonts}", fontsize=10, color="{LINE_COLOR}", fontcolor="{LINE_COLOR}", arrowsize=0.8];',
         *_plugins(network),
         *_third_parties(network),
         *(f"  {_edge(arrow)}" for arrow in network.arrows),
@@ -36,9 +31,10 @@ def dot_text(network: Network) -> str:
 
 def _plugins(network: Network) -> Iterator[str]:
     boxes = {plugin.name: plugin for plugin in network.plugins}
+    purple = "#e4daf5"
     for number, (name, groups) in enumerate(network.shared.items()):
         yield f"  subgraph cluster_{number} {{"
-        yield _area(f"shared plugin {name}", PURPLE)
+        yield _area(f"shared plugin {name}", purple)
         for count, members in enumerate(groups):
             yield f"  subgraph cluster_{number}_{count} {{"
             yield _area(_robot(boxes[members[0]]), PINK)
@@ -58,21 +54,23 @@ def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
     rows = [_row(f"<B>{escape(plugin.name)}</B>"), _row(_small(kind))]
     if own_robot:
         rows.append(_row(escape(_robot(plugin)), PINK))
-    rows.append(_row(escape(plugin.component), GREEN))
+    rows.append(_row(escape(plugin.component), "#d3ecc8"))  # green
     rows += [_row(_small(f"{one.kind} {one.name}")) for one in plugin.declared]
-    return f"{_name(End(Kind.PLUGIN, plugin.name))} [label=<{_table(rows, BLUE)}>];"
+    blue = "#cfe2f7"
+    return f"{_name(End(Kind.PLUGIN, plugin.name))} [label=<{_table(rows, blue)}>];"
 
 
 def _third_parties(network: Network) -> Iterator[str]:
     """Write yellow boxes: sensors at one end, the lower level at the other, and topics outside of the picture."""
     system = {"SM": "simulation", "HW": "hardware"}.get(network.system, network.system)
+    yellow = "#fff0b8"
     for kind, rank in ((Kind.SENSORS, "source"), (Kind.LOWER_LEVEL, "sink")):
         for end in network.ends(kind):
             rows = [_row(f"<B>{kind.value}</B>"), _row(_small(system))]
-            yield f"  {{ rank={rank}; {_name(end)} [label=<{_table(rows, YELLOW)}>]; }}"
+            yield f"  {{ rank={rank}; {_name(end)} [label=<{_table(rows, yellow)}>]; }}"
     for end in network.ends(Kind.TOPIC):
         rows = [_row(f"<B>{escape(end.name)}</B>"), _row(_small("topic"))]
-        yield f"  {_name(end)} [label=<{_table(rows, YELLOW)}>];"
+        yield f"  {_name(end)} [label=<{_table(rows, yellow)}>];"
 
 
 def _edge(arrow: Arrow) -> str:
@@ -95,7 +93,8 @@ def _row(text: str, colour: str = "") -> str:
 
 
 def _small(text: str) -> str:
-    return f'<FONT POINT-SIZE="9" COLOR="{GREY}">{escape(text)}</FONT>'
+    grey = "#68778a"
+    return f'<FONT POINT-SIZE="9" COLOR="{grey}">{escape(text)}</FONT>'
 
 
 def _robot(plugin: PluginBox) -> str:

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from solfer.errors import ConfigError, MissingDependency, SolferError
 
-FORMATS = ("svg", "png", "dot")
-
 
 def draw(dot: str, path: Path) -> None:
     """Write a picture in the format that the ending of `path` names.
@@ -22,8 +20,9 @@ def draw(dot: str, path: Path) -> None:
         SolferError: Graphviz fails, or the file cannot be written.
     """
     form = path.suffix.lstrip(".").lower()
-    if form not in FORMATS:
-        endings = ", ".join(f".{each}" for each in FORMATS)
+    formats = ("svg", "png", "dot")
+    if form not in formats:
+        endings = ", ".join(f".{each}" for each in formats)
         raise ConfigError(f"'{path}' is not a picture that can be drawn", expected=f"a file with the ending {endings}")
     content = dot.encode() if form == "dot" else _rendered(dot, form)
     try:

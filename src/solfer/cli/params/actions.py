@@ -20,8 +20,6 @@ from solfer.transport.parameters import (
     SetParameters,
 )
 
-TITLES = ("name", "value", "unit", "range", "default", "description")
-
 
 @dataclass(frozen=True)
 class _Parameter:
@@ -51,7 +49,8 @@ def show(options: argparse.Namespace, caller: Caller) -> None:
         rows = [(each.name, each.value, each.unit, each.range, each.default, each.description)
                 for each in _parameters(caller, plugin)]  # fmt: skip
         print(plugin)
-        for line in aligned((TITLES, *rows), indent="  "):
+        titles = ("name", "value", "unit", "range", "default", "description")
+        for line in aligned((titles, *rows), indent="  "):
             print(line)
 
 

@@ -114,17 +114,13 @@ def _size(count: float) -> str:
     return f"{count:.3g} GB"
 
 
-URDF = "robot.urdf"
-"""Name of the attachment, behind that of the plugin."""
-
-
 def limits_of(recording: Recording, plugin: str) -> dict[str, tuple[float, float]]:
     """Return the least and the largest position of each joint of a plugin's attached URDF; none without one.
 
     Raises:
         ModelError: The attachment is no URDF.
     """
-    name = f"{plugin}/{URDF}"
+    name = f"{plugin}/robot.urdf"
     if name not in recording.attachments:
         return {}
     try:

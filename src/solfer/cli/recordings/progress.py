@@ -12,9 +12,6 @@ DELAY = 1.0
 PERIOD = 0.1
 """Period in which it is shown [s]."""
 
-WIDTH = 40
-"""Width of the bar in characters."""
-
 
 def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
     """Yield items, and show on the terminal's stderr how many of `total` there were.
@@ -24,6 +21,7 @@ def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
         total: How many there will be.
         unit: What they are.
     """
+    width = 40  # of the bar, in characters
     following = time.monotonic() + DELAY
     shown = False
     count = 0
@@ -32,12 +30,12 @@ def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
         if time.monotonic() >= following and sys.stderr.isatty():
             following = time.monotonic() + PERIOD
             shown = True
-            full = WIDTH * count // max(1, total)
+            full = width * count // max(1, total)
             print(
-                f"\r[{'#' * full}{'.' * (WIDTH - full)}] {count} of {total} {unit}",
+                f"\r[{'#' * full}{'.' * (width - full)}] {count} of {total} {unit}",
                 end="",
                 file=sys.stderr,
                 flush=True,
             )
     if shown:
-        print(f"\r{' ' * (WIDTH + 40)}\r", end="", file=sys.stderr, flush=True)
+        print(f"\r{' ' * (width + 40)}\r", end="", file=sys.stderr, flush=True)

@@ -23,9 +23,6 @@ from solfer.replay.replay import Replay, make
 from solfer.replay.rows import LIFE, RecordedRows
 from solfer.robot.description.shipped import RobotFiles, robot_files
 
-TABLE_LINES = 20
-"""Most lines of the table."""
-
 
 def replayed(options: argparse.Namespace) -> tuple[Replay, ReplayDifferences]:
     """Replay what the options name.
@@ -103,13 +100,14 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
     first = found.different[0]
     yield f"differs first: {first.column} of {first.channel} in cycle {first.cycle}, at {first.time:.3f} s"
     head = ("number", "channel", "first cycle", "at [s]", "largest")
+    most = 20
     lines = [
         (each.column, each.channel, str(each.cycle), f"{each.time:.3f}", f"{each.largest:.3g} {each.unit}".rstrip())
-        for each in found.different[:TABLE_LINES]
+        for each in found.different[:most]
     ]
     yield from aligned([head, *lines], "  ")
-    if len(found.different) > TABLE_LINES:
-        yield f"  ... and {len(found.different) - TABLE_LINES} more"
+    if len(found.different) > most:
+        yield f"  ... and {len(found.different) - most} more"
     unrepeated = list(replay.unrepeated_inputs())
     for text in unrepeated:
         yield f"cannot be repeated: {text}"

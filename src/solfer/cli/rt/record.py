@@ -25,7 +25,6 @@ POLL_PERIOD = 0.1
 """Period at which new rows are polled [s]."""
 
 SECONDS = Number(0.01, 86400.0, "seconds")
-WAIT_SECONDS = Number(0.1, 86400.0, "seconds", zero=True)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,8 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-n", dest="plugins", action="append", default=[], metavar="PLUGIN", help="plugin to record; may be repeated"
     )
+    seconds = Number(0.1, 86400.0, "seconds", zero=True)
     parser.add_argument(
-        "--wait", type=WAIT_SECONDS, default=0.0, metavar="N", help="wait up to N seconds for -n (default: 0)"
+        "--wait", type=seconds, default=0.0, metavar="N", help="wait up to N seconds for -n (default: 0)"
     )
     add_file(parser)
 

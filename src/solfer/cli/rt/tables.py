@@ -7,10 +7,6 @@ from solfer.telemetry.statistics import COMPUTED
 from solfer.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
 COLUMN_WIDTH = 8
-LEGEND = (
-    "overhead: a cycle without its components; lateness: from the deadline to the beginning of a cycle",
-    "p50 and p99 are of {since}, max is since the start; left out: periods, by what took longest then",
-)
 
 
 def overview(layer: LayerSummary, since: str) -> Iterator[str]:
@@ -23,8 +19,8 @@ def overview(layer: LayerSummary, since: str) -> Iterator[str]:
     yield ""
     yield from aligned(times(layer))
     yield ""
-    for line in LEGEND:
-        yield line.format(since=since)
+    yield "overhead: a cycle without its components; lateness: from the deadline to the beginning of a cycle"
+    yield f"p50 and p99 are of {since}, max is since the start; left out: periods, by what took longest then"
 
 
 def heading(layer: LayerSummary) -> Iterator[str]:

@@ -89,11 +89,6 @@ TIP_STACK = """\
           - [tip, posture]
 """
 
-_QUOTES = {'"': "&quot;"}
-
-FOOT_HEIGHT_RATIO = 0.1
-"""Links that are no higher than this part of the base's height above the lowest one are feet."""
-
 
 class RobotSkeleton(Skeleton):
     """The package of a new robot, whose URDF and SRDF stay where they are.
@@ -124,9 +119,10 @@ class RobotSkeleton(Skeleton):
         if srdf is not None:
             Semantics.from_file(srdf, description)
         seen = self._seen_from_bundle(urdf, name)
+        quotes = {'"': "&quot;"}
         self._words = {
             "@URDF@": scalar(seen),
-            "@URDF_FILE@": escape(seen, _QUOTES),
+            "@URDF_FILE@": escape(seen, quotes),
             "@FLOATING@": "true" if kinematics.base is not None else "false",
         }
         feet = feet_of(kinematics)
@@ -145,7 +141,7 @@ class RobotSkeleton(Skeleton):
         self._words["@TASKS_MODULE@"] = MODULE.format(**module) if feet or tip else ""
         seen = "" if srdf is None else self._seen_from_bundle(srdf, name)
         for word, line in SRDF_LINES.items():
-            self._words[word] = line.format(srdf=scalar(seen), file=escape(seen, _QUOTES)) if seen else ""
+            self._words[word] = line.format(srdf=scalar(seen), file=escape(seen, quotes)) if seen else ""
         self._words |= {"@NAME@": name, "@PACKAGE@": self.package}
 
     def write(self) -> None:
@@ -165,7 +161,7 @@ def feet_of(kinematics: Kinematics) -> list[str]:
     kinematics.update(neutral_posture(kinematics))
     heights = {link: kinematics.position(link)[2] for link in description.subtree(base)}
     lowest = min(heights.values())
-    highest = lowest + FOOT_HEIGHT_RATIO * (heights[base] - lowest)
+    highest = lowest + 0.1 * (heights[base] - lowest)  # of a foot
     # of links that are fixed to each other the lowest one counts
     tips = {_last_joint(description, link): link for link in sorted(heights, key=lambda each: -heights[each])}
     inner = {_last_joint(description, joint.parent) for joint in description.moving_joints}

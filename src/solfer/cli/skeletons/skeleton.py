@@ -9,9 +9,6 @@ from pathlib import Path
 
 from solfer.errors import ConfigError, SolferError
 
-PACKAGE_NAME = re.compile(r"[a-z][a-z0-9_]*")
-PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./-]*")
-_YAML_WORDS = ("true", "false", "null", "yes", "no", "on", "off", "y", "n")
 ANOTHER = "another name, or --package DIR"
 
 
@@ -62,7 +59,8 @@ class Skeleton:
 
 def scalar(text: str) -> str:
     """Write a text that may hold anything, such as the name of a link, as a scalar of YAML."""
-    if PLAIN.fullmatch(text) and text.lower() not in _YAML_WORDS:
+    words = ("true", "false", "null", "yes", "no", "on", "off", "y", "n")  # no strings in YAML
+    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_./-]*", text) and text.lower() not in words:
         return text
     quoted = json.dumps(text, ensure_ascii=False)
     return "".join(each if each.isprintable() else f"\\U{ord(each):08x}" for each in quoted)
@@ -74,6 +72,6 @@ def _filled(text: str, words: Mapping[str, str]) -> str:
 
 
 def _check(name: str, kind: str) -> None:
-    if PACKAGE_NAME.fullmatch(name) is None or keyword.iskeyword(name):
+    if re.fullmatch(r"[a-z][a-z0-9_]*", name) is None or keyword.iskeyword(name):
         expected = "a small letter, then small letters, digits and underscores, and not a keyword of Python"
         raise ConfigError(f"'{name}' cannot be the name of a {kind}", expected=expected)

@@ -17,12 +17,6 @@ from solfer.study.report import write_map, write_report
 from solfer.study.run import carry_out as carry_out_one
 from solfer.study.search import search
 
-PACE = 1.5
-"""Simulated seconds that one processor makes in a second, roughly, for the estimate of the hours."""
-
-RUNS_SHOWN_COUNT = 20
-"""Most runs that `--dry` lists."""
-
 
 def carry_out(options: argparse.Namespace) -> int:
     """Carry out a study, and write its table; the exit code is 1 where a run failed."""
@@ -46,14 +40,14 @@ def dry(options: argparse.Namespace) -> int:
     record = study.record
     count = len(plan.runs) if record.search is None else record.search.trials
     rows = [("run", "seed", *study.names)]
-    rows += [
-        (str(run.index), str(run.seed), *map(str, run.variations.values())) for run in plan.runs[:RUNS_SHOWN_COUNT]
-    ]
+    shown = 20
+    rows += [(str(run.index), str(run.seed), *map(str, run.variations.values())) for run in plan.runs[:shown]]
     for line in aligned(rows):
         print(line)
-    if len(plan.runs) > RUNS_SHOWN_COUNT:
-        print(f"... and {len(plan.runs) - RUNS_SHOWN_COUNT} more")
-    hours = count * (record.duration + record.settle) / PACE / 3600.0
+    if len(plan.runs) > shown:
+        print(f"... and {len(plan.runs) - shown} more")
+    factor = 1.5  # real-time factor of one processor, roughly
+    hours = count * (record.duration + record.settle) / factor / 3600.0
     print(f"{count} runs of {record.duration + record.settle:g} s at most, about {hours:.2g} processor hours")
     return 0
 

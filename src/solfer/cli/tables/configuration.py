@@ -14,8 +14,6 @@ from solfer.robot.names import FEEDBACK_MAP as FEEDBACK_MAP
 from solfer.robot.names import LOWER_LEVEL_MAP, controller_map
 
 Row = tuple[str, ...]
-MAX_NAMED = 3
-"""Number of configurations that are named beside a pipe; more are only counted."""
 
 
 def configs(options: argparse.Namespace) -> Iterator[Row]:
@@ -54,7 +52,7 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
         names = users[key]
         yield (
             *_pipe(record),
-            f"used by {', '.join(names) if len(names) <= MAX_NAMED else f'{len(names)} configurations'}",
+            f"used by {', '.join(names) if len(names) <= 3 else f'{len(names)} configurations'}",
         )
     if options.name is None:
         yield from ((name, direction, "used by nothing") for direction, name in _unused(report, records))

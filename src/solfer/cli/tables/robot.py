@@ -7,8 +7,6 @@ from solfer.model.urdf.description import Description
 from solfer.model.urdf.elements import JointInfo
 
 Row = tuple[str, ...]
-MEMBERS_SHOWN_COUNT = 4
-"""Number of members of a group or a state that are named."""
 
 
 def joints(description: Description, semantics: Semantics) -> Iterator[Row]:
@@ -60,5 +58,5 @@ def _count(members: Collection[str], noun: str) -> str:
 
 
 def _first(members: Sequence[str]) -> str:
-    more = ["..."] if len(members) > MEMBERS_SHOWN_COUNT else []
-    return ", ".join([*members[:MEMBERS_SHOWN_COUNT], *more])
+    more = ["..."] if len(members) > 4 else []
+    return ", ".join([*members[:4], *more])

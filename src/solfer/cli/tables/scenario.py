@@ -6,8 +6,6 @@ import numpy as np
 
 from solfer.scenarios import Player, Scenario
 
-HEAD = ("step", "verb", "begin s", "takes s", "x m", "y m", "z m", "heading rad", "way m", "vertices m")
-
 
 class ScenarioTrace:
     """A scenario, played to its end.
@@ -45,7 +43,7 @@ class ScenarioTrace:
 
     def rows(self) -> Iterator[tuple[str, ...]]:
         """Yield the head, and a row for each step: what it is, where the base is at its end, and how far all moves."""
-        yield HEAD
+        yield ("step", "verb", "begin s", "takes s", "x m", "y m", "z m", "heading rad", "way m", "vertices m")
         begin = 0
         distance = self.distance
         for number, (step, count) in enumerate(zip(self.scenario.pattern, self.scenario.periods, strict=True), 1):

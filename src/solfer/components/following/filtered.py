@@ -8,9 +8,6 @@ from solfer.numerics.reference_filter import ReferenceFilter
 from solfer.points import Constant
 from solfer.tasks import Task
 
-TAKEOVERS = 5
-"""Cycles in which a task that is to stay where it is takes its place over, until it is at rest there."""
-
 
 class FilteredReference:
     """One reference of a filter.
@@ -102,10 +99,13 @@ class HeldPlace:
         is_held: Whether it follows the place.
     """
 
+    _TAKEOVERS = 5
+    """Cycles in which a task takes its place over, until it is at rest there."""
+
     def __init__(self, task: Task, reference: Constant):
         self._task = task
         self._reference = reference
-        self._takeovers = TAKEOVERS
+        self._takeovers = self._TAKEOVERS
         self.is_held = False
 
     def hold(self) -> None:
@@ -120,4 +120,4 @@ class HeldPlace:
 
     def take_again(self) -> None:
         """Take over the place again, if the task is held."""
-        self._takeovers = TAKEOVERS
+        self._takeovers = self._TAKEOVERS

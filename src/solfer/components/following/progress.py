@@ -6,16 +6,15 @@ import numpy as np
 
 from solfer.components.following.quantity import PoseNumbers
 
-CHECK, CHECKS = 0.02, 5
-"""Time between two looks at whether a task still comes nearer to its reference [s], and how many it may not."""
+CHECK_PERIOD = 0.02
+"""Time between two checks whether a task still comes nearer to its reference [s]."""
 
-CREEP, GROWTH = 1e-3, 0.2
-"""Share of the rate that its gain requests below which it does not: the rest would take a thousand times as long. It
-grows by the factor e in each time of the second number [s] that the reference has been at rest: what an arm gains by
-swinging on gets less and less, and it comes to rest in any case."""
+CREEP_RATIO = 1e-3
+"""Ratio to the rate that its gain requests below which it does not: the rest would take a thousand times as long."""
 
-GROWN = math.exp(CHECK / GROWTH)
-"""Growth of that share from one look to the next."""
+CREEP_GROWTH = math.exp(CHECK_PERIOD / 0.2)
+"""Growth of that ratio from one check to the next, by the factor e in 0.2 s that the reference has been at rest: what
+an arm gains by swinging on gets less and less, and it comes to rest in any case."""
 
 
 class Residual:
@@ -73,8 +72,8 @@ class TaskProgress:
         self.stays = False
         self.is_unreachable = False
         self._is_reported = False
-        self._checks = round(CHECK / period)
-        self._creep = CREEP
+        self._checks = round(CHECK_PERIOD / period)
+        self._creep = CREEP_RATIO
         self._last = math.inf
         self._cycles = 0
         self._looks = 0
@@ -90,11 +89,11 @@ class TaskProgress:
         if self._cycles < self._checks:
             return
         self._cycles = 0
-        is_creeping = abs(distance - self._last) < self._creep * self.gain * distance * CHECK
-        self._creep = min(self._creep * GROWN, 1.0)
+        is_creeping = abs(distance - self._last) < self._creep * self.gain * distance * CHECK_PERIOD
+        self._creep = min(self._creep * CREEP_GROWTH, 1.0)
         self._looks = self._looks + 1 if is_creeping else 0
         self._last = distance
-        self.stays = self._looks >= CHECKS
+        self.stays = self._looks >= 5
 
     def come_to_rest(self, is_beyond: bool) -> bool:
         """Note whether the task has come to rest beyond its tolerances; return whether to report it, once."""
@@ -114,7 +113,7 @@ class TaskProgress:
         """Begin with a reference that moves."""
         self.look_again()
         self.is_unreachable = False
-        self._creep = CREEP
+        self._creep = CREEP_RATIO
 
     def forget(self) -> None:
         """Begin with another reference."""

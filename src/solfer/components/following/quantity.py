@@ -12,8 +12,6 @@ from solfer.numerics.rotations import is_unit, quaternion_product
 from solfer.points import Constant
 from solfer.points.space import ORIENTATION, POSE
 
-QUANTITY_EMPTY = slice(0, 0)
-
 
 @dataclass(frozen=True)
 class PoseNumbers:
@@ -38,12 +36,13 @@ class PoseNumbers:
         """Return those of a reference."""
         quantity = quantity_of(reference)
         is_turn = quantity == "orientation"
+        empty = slice(0, 0)
         return cls(
             quantity,
             3 if is_turn else 0,
             QUANTITIES[quantity],
-            place=QUANTITY_EMPTY if is_turn else slice(3),
-            turn=QUANTITY_EMPTY if quantity == "position" else slice(-3, None),
+            place=empty if is_turn else slice(3),
+            turn=empty if quantity == "position" else slice(-3, None),
         )
 
     @property

@@ -21,9 +21,6 @@ from solfer.interfaces.task_references import (
     pose_of,
 )
 
-REFERENCE_RATE = 20.0
-"""Messages with references in a second [Hz]."""
-
 
 class ReferenceInterface:
     """Declarations of a component whose tasks have references.
@@ -42,7 +39,9 @@ class ReferenceInterface:
 
     def connect(self, period: float) -> None:
         """Publish references at their rate, in control cycles of `period` [s]."""
-        self._countdown = self._interval = max(round(1.0 / (period * REFERENCE_RATE)), 1)
+        rate = 20.0  # [Hz]
+        self._interval = max(round(1.0 / (period * rate)), 1)
+        self._countdown = self._interval
 
     def reset(self) -> None:
         """Forget what was requested."""

@@ -29,9 +29,6 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
-FOLLOWING = ("position", "orientation", "pose", "center_of_mass", "look_at")
-"""What others may give references to: tasks on these points."""
-
 
 class ReferenceSet:
     """References of all tasks of a component, which composes them.
@@ -121,10 +118,11 @@ class ReferenceSet:
         targets: dict[str, TaskReference] = {}
         postures: list[GeneratedPosture] = []
         errors: list[SolferError] = []
+        following = ("position", "orientation", "pose", "center_of_mass", "look_at")  # points that references may move
         for name, reference in stack.references.items():
             task = record_of(record, name)
             try:
-                if task.point in FOLLOWING:
+                if task.point in following:
                     generator = self._generator(name, task, reference)
                     frame = task.relative or WORLD
                     targets[name] = TaskReference(name, stack.tasks[name], reference, frame=frame, generator=generator)

@@ -19,13 +19,6 @@ small."""
 FORCE_WEIGHT = 1e-5
 """Weight of the square of each force in units of a contact's part of the weight: forces are distributed."""
 
-_REASONS = {
-    INFEASIBLE: "contradicts the others",
-    GAVE_UP: "takes too many steps",
-    INACCURATE: "depends on others almost",
-    NOT_FINITE: "is not finite",
-}
-
 
 class Elimination(NamedTuple):
     """What the kernel writes when it eliminates what the e equalities fix, in its order; see `kernel`.
@@ -85,6 +78,13 @@ class WholeBodyProblem:
         bounds: See above.
         steps: Steps of the solver in the last `solve`.
     """
+
+    _REASONS = {
+        INFEASIBLE: "contradicts the others",
+        GAVE_UP: "takes too many steps",
+        INACCURATE: "depends on others almost",
+        NOT_FINITE: "is not finite",
+    }
 
     def __init__(self, robot: Robot, ground: Ground, bounds: AccelerationBounds, torque_limits: np.ndarray):
         size = robot.size
@@ -194,4 +194,4 @@ class WholeBodyProblem:
     def violated(self) -> str:
         """The constraint that the last `solve` could not keep beside the others, and why."""
         name = "" if self._outcome == NOT_FINITE else self._constraints.farthest()
-        return f"{name or 'what contacts hold'} {_REASONS[self._outcome]}"
+        return f"{name or 'what contacts hold'} {self._REASONS[self._outcome]}"

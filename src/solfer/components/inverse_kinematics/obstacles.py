@@ -6,15 +6,6 @@ from solfer.model.state import State
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.tasks import Task
 
-AT_LIMIT = 5e-3
-"""Distance to the end of a range at which a joint counts as there [rad, m]."""
-
-OBSTACLE_PRESSURE = 0.01
-"""Part of its largest pull from which an error presses a joint against the end of its range."""
-
-ACROSS = 0.35
-"""Part of the largest pull below which joints move a point mostly across the way that is left; 0.58 in the mean."""
-
 
 def obstacles(task: Task, command: State, bounds: VelocityBounds, moved: np.ndarray) -> str:
     """Describe what keeps a task from its reference, and what to try.
@@ -33,8 +24,10 @@ def obstacles(task: Task, command: State, bounds: VelocityBounds, moved: np.ndar
     length = float(np.linalg.norm(error))
     pull = jacobian.T @ error
     reach = np.linalg.norm(jacobian, axis=0) * length
-    is_low = (command.position - bounds.lower_position < AT_LIMIT) & (pull < -OBSTACLE_PRESSURE * reach)
-    is_high = (bounds.upper_position - command.position < AT_LIMIT) & (pull > OBSTACLE_PRESSURE * reach)
+    near = 5e-3  # [rad, m] from the end of a range, at which a joint counts as there
+    pressing = 0.01 * reach  # from here on, the error presses a joint against the end of its range
+    is_low = (command.position - bounds.lower_position < near) & (pull < -pressing)
+    is_high = (bounds.upper_position - command.position < near) & (pull > pressing)
     ends = [(dof, "lower", bounds.lower_position) for dof in moved if is_low[dof]]
     ends += [(dof, "upper", bounds.upper_position) for dof in moved if is_high[dof]]
     free = [dof for dof in moved if not is_low[dof] and not is_high[dof]]
@@ -43,7 +36,8 @@ def obstacles(task: Task, command: State, bounds: VelocityBounds, moved: np.ndar
     if ends:
         found += [f"{command.dofs[dof]} is at its {side} limit ({limits[dof]:.4g})" for dof, side, limits in ends]
         tries.append("another posture to begin from")
-    if np.linalg.norm(pull[free]) <= ACROSS * float(np.linalg.norm(jacobian[:, free])) * length:
+    across = 0.35  # of the largest pull, below which joints move a point mostly across the way left; the mean is 0.58
+    if np.linalg.norm(pull[free]) <= across * float(np.linalg.norm(jacobian[:, free])) * length:
         found.append("it is near a singularity: the other joints move the point across the way that is left")
         tries.append("a reference that is nearer, or beside the stretched or folded limb")
     elif not ends:

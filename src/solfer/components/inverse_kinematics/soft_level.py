@@ -8,12 +8,6 @@ import numpy as np
 from solfer.components.following.task_reference import TaskReference
 from solfer.tasks import Task
 
-NEGLIGIBLE = 1e-3
-"""Share of the square of its own damping below which a level is not damped any more."""
-
-DAMPING_SHARE, DAMPING_SHARE_FAR = 0.1, 1e-4
-"""Share of an added damping D^2 far above the second number [m2] that a task without a reference of others gets."""
-
 
 class SoftLevel:
     """A level of tasks that comes to rest where its references cannot be reached.
@@ -61,8 +55,9 @@ class SoftLevel:
         if not self._length:
             return
         added = self._length * distance
-        if added > NEGLIGIBLE * self._least:
-            others = added * (DAMPING_SHARE_FAR + DAMPING_SHARE * added) / (DAMPING_SHARE_FAR + added)
+        if added > 1e-3 * self._least:  # else the damping is negligible beside the least that the level has
+            # without a reference of others: all of a small damping, a tenth of one far above 1e-4 m2
+            others = added * (1e-4 + 0.1 * added) / (1e-4 + added)
             for task, damping, target in self._dampings:
                 is_held = target is not None and target.is_held
                 part = others if target is None else added

@@ -9,9 +9,6 @@ from solfer.config import LIVE, NameOf, Record
 from solfer.config.tasks.original import OriginalStackTags, hands
 from solfer.config.tasks.stack import StackRecord
 
-ORIGINAL_STEP = 0.01
-"""Most that the original moves a reference in one cycle [m]."""
-
 _ORIGINAL = "; with the original's tags "
 
 
@@ -101,4 +98,5 @@ class InverseKinematicsTags(FollowingTags, OriginalStackTags):
         """Return how the reference of a task moves, in a control cycle of `period` [s]."""
         if task in self.motions or self.motion is not None or self.stack is not None:
             return super().motion_of(task, period)
-        return MotionRecord(speed=ORIGINAL_STEP / period, acceleration=None, feed_forward=False)
+        step = 0.01  # [m] most that the original moves a reference in one cycle
+        return MotionRecord(speed=step / period, acceleration=None, feed_forward=False)

@@ -15,12 +15,6 @@ from solfer.interfaces.declaration import LiveParameter, TopicIn, TopicOut
 from solfer.interfaces.support import SupportMargins
 from solfer.robot import Robot
 
-WHEEL_SIZES = ("margins", "workspaces")
-"""Tags of distances of each wheel."""
-
-SHAPING = ("margin_gain", "workspace_gain", "horizon", "recovery", "reactive_margin")
-"""Tags of how these are kept."""
-
 
 class SupportShaping(WheeledMotion):
     """Drives as `wheeled_motion` does, and keeps the balance inside the support polygon and wheels near their hips.
@@ -43,6 +37,12 @@ class SupportShaping(WheeledMotion):
     """
 
     Tags = SupportShapingTags
+
+    _WHEEL_SIZES = ("margins", "workspaces")
+    """Tags of distances of each wheel."""
+
+    _SHAPING = ("margin_gain", "workspace_gain", "horizon", "recovery", "reactive_margin")
+    """Tags of how these are kept."""
 
     def __init__(self, robot: Robot, tags: SupportShapingTags, name: str = "support_shaping"):
         super().__init__(robot, tags, name)
@@ -68,8 +68,8 @@ class SupportShaping(WheeledMotion):
         """Offer margins, workspaces and how they are kept, beside what `WheeledMotion` offers."""
         return (
             *super().live_parameters(),
-            *(LiveParameter((key,), self._take_sizes, self._sizes_of) for key in WHEEL_SIZES),
-            *(LiveParameter((key,), self._take_shaping, self._shaping_of) for key in SHAPING),
+            *(LiveParameter((key,), self._take_sizes, self._sizes_of) for key in self._WHEEL_SIZES),
+            *(LiveParameter((key,), self._take_shaping, self._shaping_of) for key in self._SHAPING),
             LiveParameter(("warn_below",)),
         )
 
@@ -79,19 +79,19 @@ class SupportShaping(WheeledMotion):
         self.shaping.governor.speed = float(numbers[LIMITS.index("vertex_speed")])
 
     def _sizes_of(self, tags: SupportShapingTags) -> list[tuple[float, ...]]:
-        return [tags.each(key, len(self.wheels.links)) for key in WHEEL_SIZES]
+        return [tags.each(key, len(self.wheels.links)) for key in self._WHEEL_SIZES]
 
     def _shaping_of(self, tags: SupportShapingTags) -> list[float]:
-        return [getattr(tags, key) for key in SHAPING]
+        return [getattr(tags, key) for key in self._SHAPING]
 
     def _take_sizes(self, numbers: np.ndarray) -> None:
-        """Go on with other numbers of `WHEEL_SIZES`, shape (2, count) [m]."""
+        """Go on with other numbers of `_WHEEL_SIZES`, shape (2, count) [m]."""
         self.shaping.governor.limits[:] = numbers
         if self.original is not None:
             self.original.program.limits[:] = numbers
 
     def _take_shaping(self, numbers: np.ndarray) -> None:
-        """Go on with other numbers of `SHAPING`."""
+        """Go on with other numbers of `_SHAPING`."""
         values = numbers.tolist()
         gains = values[:2]
         horizon, recovery, self.shaping.reaction.margin = values[2:]

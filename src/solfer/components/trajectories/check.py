@@ -9,9 +9,6 @@ from solfer.interfaces.trajectories import JointTolerance, JointTrajectory, Traj
 from solfer.numerics.rotations import whole_revolutions
 from solfer.numerics.via_points import ViaPoints
 
-_SLACK = 1e-6
-"""Slack of limits, for numbers that were printed and read again."""
-
 
 class StaleTrajectory(ComponentError):
     """A trajectory whose last point has passed already, elsewhere than where the joints are."""
@@ -27,6 +24,9 @@ class TrajectoryCheck:
         speed: Their velocity limits [rad/s, m/s].
         turns: Revolution of those that are continuous, 0 of the others [rad].
     """
+
+    _SLACK = 1e-6
+    """Slack of limits, for numbers that were printed and read again."""
 
     def __init__(
         self, joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray, turns: np.ndarray
@@ -111,7 +111,7 @@ class TrajectoryCheck:
         if not left.any():
             last = rows[0]
             reached = last is not None and np.abs(last[-1] - measured).max() <= 1e-2  # [rad, m]
-            if not reached or np.abs(velocity).max() > _SLACK:
+            if not reached or np.abs(velocity).max() > self._SLACK:
                 raise StaleTrajectory(
                     f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
                     expected="a point in the future, or joints that are there already, at rest",
@@ -126,7 +126,7 @@ class TrajectoryCheck:
                 "points without positions, or with accelerations and without velocities",
                 expected="positions; with velocities; with both and accelerations",
             )
-        if velocities is not None and np.abs(velocities[-1]).max() > _SLACK:
+        if velocities is not None and np.abs(velocities[-1]).max() > self._SLACK:
             index = int(np.abs(velocities[-1]).argmax())
             raise ComponentError(
                 f"joint '{trajectory.joint_names[index]}' moves at {velocities[-1, index]:.6g} rad/s at the last point",
@@ -204,9 +204,10 @@ class TrajectoryCheck:
         lowest, highest, fastest = motion.extremes()
         lower = np.minimum(self._lower[places], start)
         upper = np.maximum(self._upper[places], start)
-        self._require(places, lowest, lambda value, index: value >= lower[index] - _SLACK, what="position", unit="rad")
-        self._require(places, highest, lambda value, index: value <= upper[index] + _SLACK, what="position", unit="rad")
-        limits = self._speed[places] * (1.0 + _SLACK)
+        slack = self._SLACK
+        self._require(places, lowest, lambda value, index: value >= lower[index] - slack, what="position", unit="rad")
+        self._require(places, highest, lambda value, index: value <= upper[index] + slack, what="position", unit="rad")
+        limits = self._speed[places] * (1.0 + slack)
         self._require(places, fastest, lambda value, index: value <= limits[index], what="speed", unit="rad/s")
 
     def _require(

@@ -46,9 +46,6 @@ LIMITS = (
 )
 """Tags of limits that change together: speeds, accelerations, corrections, margins."""
 
-NEARLY_AT_REST = 0.02
-"""Pace below which the log says what holds a motion."""
-
 
 class WheeledMotion(Component):
     """Drives on steered wheels at the ends of legs: base and support polygon follow references.
@@ -254,9 +251,10 @@ class WheeledMotion(Component):
         last = self.tasks.descent.last
         guard = self._guard
         pace = self.references.pace
-        if guard.update(pace, last >= 0, step) and self._pace.held < NEARLY_AT_REST:
+        rest = 0.02  # pace below which the log says what holds a motion
+        if guard.update(pace, last >= 0, step) and self._pace.held < rest:
             guard.warn(self.name, f"joint '{self.model.dofs[last]}' is at its bound")
-        elif pace < NEARLY_AT_REST and self._pace.waits_for_base():
+        elif pace < rest and self._pace.waits_for_base():
             guard.warn(self.name, "the base does not follow its reference")
 
     def move_world(self, move: PlanarMove) -> None:

@@ -18,12 +18,6 @@ from solfer.pipes.state_feedback_pipe import Reception, StateFeedbackPipe
 from solfer.transport.endpoints import Reader
 from solfer.transport.messages import Message
 
-BASE_INDICES = np.arange(6)
-"""DoFs of a floating base: x y z rx ry rz."""
-
-SENSOR_FIELDS = (("position", "orientation", "orientation"), ("velocity", "angular", "angular velocity"))
-"""Fields, what each needs of a sensor, and its name."""
-
 STEEP = math.radians(75.0)
 """|ry| above which a warning is logged: the chart of the base is near its singularity [rad]."""
 
@@ -72,7 +66,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         reception: Reception,
     ):
         used = slice(0 if sensor.located else 3, 6)
-        super().__init__(name, reader, state, fields=fields, dofs=BASE_INDICES[used], reception=reception)
+        dofs = np.arange(6)[used]  # of x y z rx ry rz
+        super().__init__(name, reader, state, fields=fields, dofs=dofs, reception=reception)
         # imported here: its compiler takes a while to load
         from solfer.numerics.twist_transport import (
             CONTINUOUS,
@@ -115,7 +110,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         self._reading.read(message)
         if not self._reading.lacks:
             return
-        for field, quantity, text in SENSOR_FIELDS:
+        needs = (("position", "orientation", "orientation"), ("velocity", "angular", "angular velocity"))
+        for field, quantity, text in needs:
             if quantity in self._reading.lacks and any(each.field == field for each in self.state_fields):
                 raise PipeError(
                     f"the sensor measures no {text}", expected=f"a sensor that does, or interface: {{{field}: false}}"

@@ -19,9 +19,6 @@ from solfer.numerics.rotations import (
 from solfer.transport.inexact import InexactOrientations
 from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
 
-BODY_TOP_SPEED, FASTEST_TURN = 50.0, 60.0
-"""Velocities that no legged or wheeled robot has [m/s, rad/s]; gyroscopes end at 35 rad/s (2000 degrees/s)."""
-
 NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
 """In place of an orientation that is not measured."""
 
@@ -86,12 +83,15 @@ class BodyReading(abc.ABC):
         if not math.isfinite(sum(numbers)):  # the sum is finite only if each is
             raise NotFinite("a position or a velocity that is not a finite number")
         vx, vy, vz, wx, wy, wz = numbers[7:]
-        if not -FASTEST_TURN < min(wx, wy, wz) <= max(wx, wy, wz) < FASTEST_TURN:
+        # no legged or wheeled robot is as fast; gyroscopes end at 35 rad/s (2000 degrees/s)
+        top_rate = 60.0  # [rad/s]
+        top_speed = 50.0  # [m/s]
+        if not -top_rate < min(wx, wy, wz) <= max(wx, wy, wz) < top_rate:
             rate = max(abs(wx), abs(wy), abs(wz))
-            raise PipeError(f"an angular velocity of {rate:.3g} rad/s", expected=f"{FASTEST_TURN:g} rad/s at most")
-        if not -BODY_TOP_SPEED < min(vx, vy, vz) <= max(vx, vy, vz) < BODY_TOP_SPEED:
+            raise PipeError(f"an angular velocity of {rate:.3g} rad/s", expected=f"{top_rate:g} rad/s at most")
+        if not -top_speed < min(vx, vy, vz) <= max(vx, vy, vz) < top_speed:
             speed = max(abs(vx), abs(vy), abs(vz))
-            raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{BODY_TOP_SPEED:g} m/s at most")
+            raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{top_speed:g} m/s at most")
 
     def check_body(self, message: Message) -> None:  # noqa: B027 most messages name no body
         """Check that a message describes this body.

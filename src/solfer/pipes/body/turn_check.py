@@ -6,9 +6,6 @@ import numpy as np
 
 from solfer.errors import Contradiction
 
-LEAPS, CONTRADICTS, TURN_SKEW, SPIKES, UNSCALED = 1, 2, 3, 4, 5
-"""Results of the compiled check, see `solfer.numerics.checks.orientations.check_rotation`."""
-
 UNMEASURED = np.zeros(3)
 """Specific force of a link without an accelerometer [m/s^2]."""
 
@@ -56,20 +53,21 @@ class TurnCheck:
             Contradiction: The link cannot have turned like this.
         """
         result, angle = self._check(values, has_own_axes, force, arrival, stamp, self._before)
-        if result == LEAPS:
+        # see `solfer.numerics.checks.orientations.check_rotation`
+        if result == 1:
             raise Contradiction(f"the tilt leaps by {angle:.3g} rad", expected="a sensor that is fixed to its link")
-        if result == CONTRADICTS:
+        if result == 2:
             raise Contradiction(
                 f"the orientation turns by {angle:.3g} rad, and otherwise by the turn rates",
                 expected="one sensor, with axes and signs of REP 103",
             )
-        if result == TURN_SKEW:
+        if result == 3:
             raise Contradiction(
                 f"the vertical of the orientation is {angle:.3g} rad from the mean of the accelerometer",
                 expected="one sensor, with axes and signs of REP 103",
             )
-        if result == SPIKES:
+        if result == 4:
             raise Contradiction(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")
-        if result == UNSCALED:
+        if result == 5:
             return f"the accelerometer measures {angle:.3g} m/s^2 on average (expected: 9.81 at rest, in m/s^2)"
         return ""

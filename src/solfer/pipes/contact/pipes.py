@@ -17,8 +17,6 @@ from solfer.robot import Robot
 from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
 from solfer.transport.messages import Message
 
-WORLD = "world"
-
 
 @dataclass(frozen=True)
 class CarriedContacts:
@@ -37,7 +35,7 @@ class CarriedContacts:
     @property
     def format(self) -> PointFormat:
         """Format of the messages."""
-        return PointFormat(self.contacts[0].link if self.fixed else WORLD, self.names)
+        return PointFormat(self.contacts[0].link if self.fixed else "world", self.names)
 
     def port(self) -> Port:
         """Make a port for the wrenches."""

@@ -18,9 +18,6 @@ from solfer.pipes.state_field import interface_of
 from solfer.robot.names import LOWER_LEVEL_MAPS, controller_map
 from solfer.transport.messages import ANY_INTERFACE, GAINS, JOINT_FIELDS, JOINT_MESSAGES
 
-VELOCITY_FIELDS = ("velocity",)
-"""Fields that a velocity controller takes."""
-
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
     """Make a pipe from a topic to DoFs of a State; see `factory.feedback`."""
@@ -130,7 +127,7 @@ def _state(record: FeedbackRecord | ControllerRecord, context: PipeContext, fiel
 
 def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
     """Check that a controller of the lower level takes all fields of its pipe."""
-    taken = VELOCITY_FIELDS if record.type == "velocity" else JOINT_FIELDS
+    taken = ("velocity",) if record.type == "velocity" else JOINT_FIELDS
     for field in fields:
         if field not in taken:
             raise PipeError(

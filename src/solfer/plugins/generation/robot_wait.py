@@ -7,8 +7,11 @@ from solfer.config import Configuration
 from solfer.errors import UnknownName, nearest
 from solfer.transport import Middleware
 
-ROBOT_POLL_PERIOD, ROBOT_REPEAT_PERIOD = 0.2, 10.0
-"""Time between two looks, and between two messages about the same [s]."""
+ROBOT_POLL_PERIOD = 0.2
+"""Time between two looks [s]."""
+
+ROBOT_REPEAT_PERIOD = 10.0
+"""Time between two messages about the same [s]."""
 
 logger = logging.getLogger(__name__)
 

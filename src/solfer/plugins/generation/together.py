@@ -20,12 +20,6 @@ from solfer.plugins.sharing.robots import Sharing
 from solfer.plugins.sharing.space import SharedSpace, SharedTopic
 from solfer.transport import Middleware
 
-ONE_COMMANDS = (
-    "one of them alone, or one that publishes to the other, such as `shared: {controller: [lower_body]}` in the "
-    "configuration of one that a shared plugin lists"
-)
-"""What a user can do about two plugins that start together and command the same joints."""
-
 
 @dataclass(frozen=True)
 class Members:
@@ -100,7 +94,11 @@ class SharedGenerator:
             for each, plugin in zip(self._listed, plugins, strict=True)
             if plugin is not None and (start is None or each.name in start)
         ]
-        self._note(find_conflicts(claims, ONE_COMMANDS))
+        expected = (
+            "one of them alone, or one that publishes to the other, such as `shared: {controller: [lower_body]}` in "
+            "the configuration of one that a shared plugin lists"
+        )
+        self._note(find_conflicts(claims, expected))
         return plugins
 
     def _make_spaces(self) -> dict[str, SharedSpace]:

@@ -20,9 +20,6 @@ logger = logging.getLogger(__name__)
 
 COMPONENT = Stage.COMPONENT
 
-ENDED = (PluginState.STOPPING, PluginState.STOPPED, PluginState.CLOSED, *FAILED_STATES)
-"""States of a plugin that others cannot rely on."""
-
 NOTHING: Mapping[str, Sequence[str]] = {}
 
 
@@ -56,6 +53,9 @@ class PluginSet:
     Raises:
         MiddlewareError: There is no plugin, two have one name, or their rates differ.
     """
+
+    _ENDED = (PluginState.STOPPING, PluginState.STOPPED, PluginState.CLOSED, *FAILED_STATES)
+    """States of a plugin that others cannot rely on."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class PluginSet:
         else:
             self.failures.setdefault(managed.name, managed.failure)
         self.changed(index, managed)
-        if managed.state in ENDED:
+        if managed.state in self._ENDED:
             for other in self._needed_by[managed.name]:
                 if other.active:
                     other.stop(f"it requires '{managed.name}', which is {managed.state.name.lower()}")

@@ -12,9 +12,6 @@ from solfer.pipes.state_field import interface_of
 from solfer.throttle import Throttle
 from solfer.transport.messages import GAINS, LARGEST_GAIN
 
-NOT_FINITE = "not finite"
-"""Key of the count of values that were NaN or infinite."""
-
 
 class CommandGate:
     """Checks and limits the commands of one pipe to the lower level, in place.
@@ -28,7 +25,7 @@ class CommandGate:
         upper: The Robot's upper limits.
 
     Attributes:
-        kinds: What it counts: `NOT_FINITE`, and each field.
+        kinds: What it counts: values that were NaN or infinite, and those beyond the limits of each field.
     """
 
     def __init__(self, owner: str, pipe: JointCommandPipe, lower: State, upper: State):
@@ -38,7 +35,7 @@ class CommandGate:
         self._inside = inside
         self._owner = owner
         self._pipe = pipe
-        self.kinds = (NOT_FINITE, *(field for field, _ in pipe.fields))
+        self.kinds = ("not finite", *(field for field, _ in pipe.fields))
         self._counts = memoryview(bytearray(8 * len(self.kinds))).cast("q")
         self._throttle = Throttle(logging.getLogger(__name__))
         bounds = [_bounds(field, pipe.dofs, lower, upper=upper) for field, _ in pipe.fields]

@@ -6,9 +6,6 @@ import numpy as np
 
 from solfer.pipes import JointCommandPipe
 
-LARGEST_DEFLECTION = 0.2
-"""Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
-
 
 class SentJoints:
     """Commands in joint space: the numbers to send, and those sent last.
@@ -22,6 +19,9 @@ class SentJoints:
         is_sent: Whether anything was sent since the start.
         distance: Sum over all cycles of the largest commanded step of a joint [rad, m].
     """
+
+    _LARGEST_DEFLECTION = 0.2
+    """Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
 
     def __init__(self, pipes: Sequence[JointCommandPipe], moves: Callable[[JointCommandPipe], bool], period: float):
         # imported here: its compiler takes a while to load
@@ -37,7 +37,7 @@ class SentJoints:
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
         ]
-        self._reach = [np.full(dofs.shape, LARGEST_DEFLECTION) for dofs, _ in self._positions]
+        self._reach = [np.full(dofs.shape, self._LARGEST_DEFLECTION) for dofs, _ in self._positions]
         self._velocities = [values for pipe in pipes for field, values in pipe.fields if field == "velocity"]
         self._are_followed = False
         self.is_sent = False
@@ -62,7 +62,7 @@ class SentJoints:
         for (dofs, sent), reach in zip(self._positions, self._reach, strict=True):
             # it may yield a little more while its plugin waits: beyond that another robot is there, or something
             # moved it
-            np.minimum(np.abs(sent - position[dofs]) + 0.05, LARGEST_DEFLECTION, out=reach)
+            np.minimum(np.abs(sent - position[dofs]) + 0.05, self._LARGEST_DEFLECTION, out=reach)
 
     def forget(self) -> None:
         """Forget what joints follow: others move them now, or the robot is in another state."""

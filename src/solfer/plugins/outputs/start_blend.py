@@ -12,14 +12,8 @@ from solfer.robot import Robot
 
 logger = logging.getLogger(__name__)
 
-BLEND_SPEED_SHARE = 0.2
-"""Part of its speed limit at which a joint moves, at most, from the measured to the commanded position at a start."""
-
 SHORTEST = 0.5
 """Default of the shortest time of blending in [s]."""
-
-PEAK = 15.0 / 8.0
-"""Largest speed of the minimum-jerk profile, in distances per duration."""
 
 
 class StartBlend:
@@ -34,8 +28,8 @@ class StartBlend:
     begin where the lower level has them without a command.
 
     T follows from the first commands. Where they are the positions at the start, without velocity and effort, it is
-    zero: nothing is changed. Else it is the longest time that a joint needs for its way at BLEND_SPEED_SHARE of its
-    speed limit.
+    zero: nothing is changed. Else it is the longest time that a joint needs for its way at a fifth of its speed
+    limit.
 
     Args:
         owner: Name of the plugin, for messages.
@@ -63,8 +57,9 @@ class StartBlend:
         self.shortest = shortest
         known = {"position": measured, "effort": np.zeros(robot.size, dtype=bool) if efforts is None else efforts}
         self._position = robot.state.position
+        kinds = {"position": _Positions, "velocity": _Field, "effort": _Efforts}
         self._fields = [
-            _FIELDS.get(field, _Gains)(field, values, pipe, robot, known.get(field))
+            kinds.get(field, _Gains)(field, values, pipe, robot, known.get(field))
             for pipe in pipes
             for field, values in pipe.fields
         ]
@@ -161,8 +156,9 @@ class _Positions(_Limited):
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
         super().__init__(name, values, pipe, robot=robot, known=known)
-        speed = BLEND_SPEED_SHARE * robot.upper_limits.velocity[pipe.dofs]
-        self._pace = np.divide(PEAK, speed, out=np.zeros(len(speed)), where=speed > 0.0)
+        speed = 0.2 * robot.upper_limits.velocity[pipe.dofs]
+        peak = 15.0 / 8.0  # largest speed of the minimum-jerk profile, in distances per duration
+        self._pace = np.divide(peak, speed, out=np.zeros(len(speed)), where=speed > 0.0)
 
     def begin(self, position: np.ndarray) -> None:
         """See `_Field.begin`."""
@@ -203,6 +199,3 @@ class _Gains(_Field):
         """See `_Field.begin`."""
         np.copyto(self._start, self._standing)
         super().begin(position)
-
-
-_FIELDS = {"position": _Positions, "velocity": _Field, "effort": _Efforts}

@@ -17,9 +17,6 @@ logger = logging.getLogger(__name__)
 REQUEST_PATIENCE = 5.0
 """Longest wait for an answer [s]."""
 
-LOAD = "/load_gains"
-"""Service of a controller that loads gains, where a pipe does not name it."""
-
 
 class StartRequest(NamedTuple):
     """A request.
@@ -87,7 +84,8 @@ def requests_of(records: Sequence[ControllerRecord], gains: TextRecord | None) -
         if given is not None and (record.load_service is not None or record.has_springs):
             request = FileRequest(str(given.location))
             what = f"load {given.location}"
-            yield StartRequest(_service(record, record.load_service or LOAD), LOAD_GAINS, request, what=what)
+            service = _service(record, record.load_service or "/load_gains")
+            yield StartRequest(service, LOAD_GAINS, request, what=what)
 
 
 def _service(record: ControllerRecord, service: str) -> str:

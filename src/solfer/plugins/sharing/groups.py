@@ -16,12 +16,6 @@ from solfer.robot.names import FEEDBACK_MAP, UNACTUATED
 Number = tuple[str, str, str]
 """A number of a Robot that pipes write: State, interface, and DoF; or the wrench of a contact."""
 
-_GROUP_OWN = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout", "history")
-"""Tags of a feedback that concern its plugin alone."""
-
-_EXTENT = ("dofs", "interface", "limits", "contact", "names")
-"""Tags of a feedback that choose some of what its source sends."""
-
 
 def robot_groups(
     configurations: Sequence[Configuration], together: Sequence[str] | None = None
@@ -81,7 +75,9 @@ def origin(record: FeedbackRecord, configuration: Configuration) -> dict[str, An
         record: The feedback.
         configuration: Its plugin's.
     """
-    own = {key: value for key, value in vars(record).items() if key not in (*_GROUP_OWN, *_EXTENT)}
+    of_plugin = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout", "history")
+    of_part = ("dofs", "interface", "limits", "contact", "names")  # they choose some of what its source sends
+    own = {key: value for key, value in vars(record).items() if key not in (*of_plugin, *of_part)}
     return own | {
         "source": _plain(record.source),
         "message": record.travels_as,
@@ -216,10 +212,9 @@ def conflicts(
 
 def _two_sources(number: Number, first: tuple[FeedbackRecord, str], second: tuple[FeedbackRecord, str]) -> PipeError:
     function, interface, dof = number
+    sides = {"state": "measured ", "motor": "motor side's "}
     (other, owner), (record, plugin) = first, second
-    what = (
-        f"the wrench of contact '{dof}'" if function == "contact" else f"the {_SIDES[function]}{interface} of '{dof}'"
-    )
+    what = f"the wrench of contact '{dof}'" if function == "contact" else f"the {sides[function]}{interface} of '{dof}'"
     same = _plain(other.source) == _plain(record.source)
     difference = "with other settings from the same topic" if same else f"from '{_plain(record.source)}'"
     return PipeError(
@@ -229,9 +224,6 @@ def _two_sources(number: Number, first: tuple[FeedbackRecord, str], second: tupl
         expected=f"one source for both, as in {other.where('source')}, or one plugin with model_change that receives "
         "either of them",
     )
-
-
-_SIDES = {"state": "measured ", "motor": "motor side's "}
 
 
 def _description(configuration: Configuration) -> dict[str, Any]:

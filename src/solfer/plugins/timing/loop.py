@@ -31,9 +31,6 @@ REPORT_PERIOD = 1.0
 WRITE = Stage.WRITE
 STOPPING = PluginState.STOPPING
 
-NOTICEABLE = 0.02
-"""Shortest delay with a warning [s]; shorter ones, frequent on a shared machine, are only counted."""
-
 
 class CycleRecorder(Protocol):
     """A recorder of the cycles of a loop."""
@@ -189,7 +186,7 @@ class PluginLoop:
         """Run one cycle, which begins `late` [s] after its deadline, or after those of the `skipped` periods."""
         plugins = self.plugins
         delay = skipped / plugins.rate
-        if delay >= NOTICEABLE:
+        if delay >= 0.02:  # [s] shorter ones, frequent on a shared machine, are only counted
             self._late.warning("late", "%s is %.0f ms late", self._names(), 1e3 * delay)
         begin = monotonic_ns()
         plugins.cycle()

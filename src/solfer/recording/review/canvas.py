@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = (".pdf", ".png")
 LINE_POINTS = 2000  # points of a line; more are neither seen nor quickly drawn
 FONT_SIZE = 8.0
 
@@ -118,11 +117,12 @@ def check_suffix(path: Path) -> None:
     Raises:
         RecordingError: The suffix is neither .pdf nor .png.
     """
-    if path.suffix not in SUFFIXES:
+    suffixes = (".pdf", ".png")
+    if path.suffix not in suffixes:
         raise RecordingError(
             f"pictures of the kind '{path.suffix}'",
             where=str(path),
-            expected=f"a file that ends with {' or '.join(SUFFIXES)}",
+            expected=f"a file that ends with {' or '.join(suffixes)}",
         )
 
 

@@ -19,7 +19,6 @@ DELAY = 2
 NEUTRAL = np.array([1.0, 0.0, 0.0])
 """The law of a joint that does the same."""
 
-HUBER = 1.345  # residuals beyond so many standard deviations count less (Huber 1964): 95 % efficient for Gaussian ones
 BLOCK = 0.15
 """Least duration of a block [s]: longer than what the smoothing ties together."""
 
@@ -73,10 +72,12 @@ def fit(
     slope = curve.derivative()
     if GAIN in free:
         values[GAIN] = _first_gain(curve(times), second)
+    # standard deviations beyond which residuals count less (Huber 1964): 95 % efficient for Gaussian ones
+    huber = 1.345
     for _ in range(12):
         rows, residual = _linear(curve, slope, times, second=second, values=values)
         scale = max(noise, 1.4826 * float(np.median(np.abs(residual))))
-        weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
+        weights = 1.0 / np.maximum(1.0, np.abs(residual) / (huber * scale))
         bread = np.linalg.inv((rows[chosen] * weights) @ rows[chosen].T)
         step = bread @ (rows[chosen] @ (weights * residual))
         values[chosen] += step
@@ -84,7 +85,7 @@ def fit(
         if np.all(np.abs(step) < 1e-5):
             break
     rows, residual = _linear(curve, slope, times, second=second, values=values)
-    weights = 1.0 / np.maximum(1.0, np.abs(residual) / (HUBER * scale))
+    weights = 1.0 / np.maximum(1.0, np.abs(residual) / (huber * scale))
     limits = np.full(3, np.inf)
     quantile = -float(ndtri(0.5 * CHANCE))  # of the normal distribution
     least = quantile * density * np.sqrt(np.diag(bread))

@@ -12,14 +12,8 @@ from scipy.signal import correlate, correlation_lags, savgol_coeffs
 from solfer.errors import RecordingError, UnknownName
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
 
-FEEDBACK = "/feedback/"
-"""Part of the names of the channels of feedback."""
-
 POSITION = "/position"
 """End of the names of channels of positions."""
-
-AGE = "/age"
-"""End of the names of channels of ages."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +70,7 @@ def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = (
             raise UnknownName("plugin", name, recording.plugins, where=where)
     found: dict[str, JointMotion] = {}
     for channel in recording.channels.values():
-        plugin, feedback, _ = channel.name.partition(FEEDBACK)
+        plugin, feedback, _ = channel.name.partition("/feedback/")
         if (
             feedback
             and channel.kind == JOINTS_KIND
@@ -95,7 +89,7 @@ def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = (
 def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
     """Return the motion of each joint of a channel; one without measurements is left out."""
     times = channel.times
-    age = recording.channels.get(channel.name.removesuffix(POSITION) + AGE)
+    age = recording.channels.get(channel.name.removesuffix(POSITION) + "/age")
     if age is not None and np.array_equal(age.times, times):
         times = times - age.values[:, 0]
     keep = np.isfinite(times)

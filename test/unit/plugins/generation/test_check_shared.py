@@ -21,19 +21,19 @@ from solfer.robot.description.shipped import robot_files
 
 
 @dataclass(frozen=True)
-class Told:
+class Force:
     """geometry_msgs/Vector3Stamped."""
 
     header: Header = field(default_factory=Header)
     vector: Vector = field(default_factory=Vector)
 
 
-class Telling(Component):
+class Publishing(Component):
     """Declares topics of its own."""
 
     def topics(self):
         """Publish one below its name."""
-        return (TopicOut("told", "geometry_msgs/Vector3Stamped", Told, Told),)
+        return (TopicOut("force", "geometry_msgs/Vector3Stamped", Force, Force),)
 
 
 class Shouting(Component):
@@ -41,7 +41,7 @@ class Shouting(Component):
 
     def topics(self):
         """Publish it."""
-        return (TopicOut("/told", "geometry_msgs/Vector3Stamped", Told, Told),)
+        return (TopicOut("/force", "geometry_msgs/Vector3Stamped", Force, Force),)
 
 
 def shared_tree(folder, *plugins, **changes):
@@ -50,11 +50,11 @@ def shared_tree(folder, *plugins, **changes):
     for name, text in (("cart.urdf", URDF), ("cart.srdf", SRDF)):
         (folder / name).write_text(text)
     changed["ros"]["source"] = {"urdf": {"file": "cart.urdf"}, "srdf": {"file": "cart.srdf"}}
-    changed["feedback"]["wanted"] = {
+    changed["feedback"]["desired"] = {
         "space": "JOINT", "dofs": JOINTS, "interface": {"position": True}, "function": "reference"
     }  # fmt: skip
-    changed["ros"]["feedback"]["wanted"] = {"source": "left", "message": "solfer/JointCommand"}
-    changed["robot"]["following"] = changed["robot"]["jointed"] | {"feedback": {"list": ["joints", "wanted"]}}
+    changed["ros"]["feedback"]["desired"] = {"source": "left", "message": "solfer/JointCommand"}
+    changed["robot"]["following"] = changed["robot"]["jointed"] | {"feedback": {"list": ["joints", "desired"]}}
     for name, tags in changes.items():
         changed["modules"][name] |= tags
     listed = [f"any::{name}" for name in plugins or ("first", "second")]
@@ -92,13 +92,13 @@ def two_publishers(changed):
 def two_declared(changed):
     changed["modules"]["first"]["class"] = f"{__name__}:Shouting"
     changed["modules"]["second"]["controller"] = ["left"]
-    changed["ros"]["controller"]["left"]["sink"] = "told"
+    changed["ros"]["controller"]["left"]["sink"] = "force"
 
 
 def another_interface(changed):
     changed["modules"]["first"]["controller"] = ["left"]
     changed["modules"]["second"]["robot"] = "following"
-    changed["feedback"]["wanted"]["interface"] = MOVING
+    changed["feedback"]["desired"]["interface"] = MOVING
 
 
 def another_map(changed):
@@ -142,11 +142,11 @@ def unknown_class(changed):
 
 
 LEFT, RIGHT = "mwoibn.ros.controller.left.sink", "mwoibn.ros.controller.right.sink"
-DESIRED, ENTRY = "mwoibn.ros.feedback.wanted.source", "mwoibn.modules.shared.plugins[0]: "
+DESIRED, ENTRY = "mwoibn.ros.feedback.desired.source", "mwoibn.modules.shared.plugins[0]: "
 SECOND = "mwoibn.modules.second."
 MISTAKES = {
     two_publishers: (f"{RIGHT}: ", LEFT, "both publish the topic 'left'"),
-    two_declared: ("mwoibn.modules.first: ", LEFT, "both publish the topic 'told'"),
+    two_declared: ("mwoibn.modules.first: ", LEFT, "both publish the topic 'force'"),
     another_interface: (f"{DESIRED}: ", LEFT, "'velocity' is not sent, only position"),
     another_map: (f"{DESIRED}: ", LEFT, "does not fit what 'first' sends (left"),
     another_order: (f"{DESIRED}: ", LEFT, "does not fit what 'second' sends (left"),
@@ -248,7 +248,7 @@ def test_the_same_configuration_twice_starts(folder):
     assert [plugin.outputs.controllers[0][0].writer.topic for plugin in (first, again)] == ["left", "left_2"]
     assert second.feedbacks[1].reader.channel.publication.component == "first"
     assert check_file(file).errors == check_layer(in_layer(folder, changed)).errors == ()
-    changed["ros"]["feedback"]["wanted"]["source"] = "left_2"
+    changed["ros"]["feedback"]["desired"]["source"] = "left_2"
     (*_, second) = start(written(folder, changed))
     assert second.feedbacks[1].reader.channel.publication.component == "first_2"
     assert not check_file(file).warnings
@@ -262,9 +262,9 @@ def test_topics_with_a_slash_keep_their_names(folder):
 
 
 def test_declared_topics_follow_the_name(folder):
-    changed = shared_tree(folder, "first", "first", first={"class": f"{__name__}:Telling"})
+    changed = shared_tree(folder, "first", "first", first={"class": f"{__name__}:Publishing"})
     file = written(folder, changed)
     assert check_file(file).errors == ()
     loaded, bus = load_shared(file), Bus()
     members = generate_shared(loaded.plugins, lambda each: MemoryMiddleware(bus, each.module.name), Registry())
-    assert [topic for topic, _ in members.spaces["shared"].channels] == ["first/told", "first_2/told"]
+    assert [topic for topic, _ in members.spaces["shared"].channels] == ["first/force", "first_2/force"]

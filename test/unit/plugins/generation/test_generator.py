@@ -22,7 +22,7 @@ from solfer.plugins.generation.generator import log_start
 from solfer.plugins.plugin import Plugin, PluginState
 from solfer.robot.description.shipped import robot_files
 
-HEARD = "heard", "sensor_msgs/JointState"
+DESIRED = "desired", "sensor_msgs/JointState"
 FEEDBACK, CONTROLLER = "main/mwoibn/feedback/", "main/mwoibn/controller/"
 
 
@@ -62,16 +62,16 @@ def test_commands_begin_at_what_is_measured(tmp_path):
 
 
 def test_an_idle_plugin_publishes_and_commands_nothing(tmp_path):
-    pipes = {MODULES + "sets/controller": ["arm_controller", "heard"]}
+    pipes = {MODULES + "sets/controller": ["arm_controller", "desired"]}
     plugin, others = made(tmp_path, **{MODULES + "sets/mode": "idle"}, **pipes)
     ear = MemoryMiddleware(others.bus, "ear")
-    commands, heard = (ear.queue(*end) for end in (("arm_controller/command", "solfer/JointCommand"), HEARD))
+    commands, desired = (ear.queue(*end) for end in (("arm_controller/command", "solfer/JointCommand"), DESIRED))
     for k in range(1, 30):
         others.bus.run_until(others.bus.time + 1.0 / plugin.rate)
         others.publish(k)
         plugin.cycle()
     assert plugin.life is PluginState.RUNNING and not commands.drain() and plugin.outputs.commanding == ()
-    assert heard.drain()
+    assert desired.drain()
 
 
 def test_warnings_of_tags_are_logged_at_the_start(repository, monkeypatch, caplog):
@@ -106,14 +106,16 @@ def test_a_check_finds_what_a_start_refuses(repository, monkeypatch):
 
 @pytest.mark.slow
 def test_who_hears_of_a_plugin_is_looked_for(tmp_path, caplog):
-    plugin, others = made(tmp_path, **{MODULES + "sets/controller": ["arm_controller", "heard"]})
+    plugin, others = made(tmp_path, **{MODULES + "sets/controller": ["arm_controller", "desired"]})
     for k in range(1, 80):
         others.bus.run_until(others.bus.time + 0.1)
         others.publish(k)
         plugin.cycle()
         plugin.peers.look()
     (explanation,) = [text for text in caplog.messages if "no subscriber" in text]
-    assert explanation.startswith("sets: no subscriber on heard (controller 'heard', ") and "main.yaml:" in explanation
+    assert (
+        explanation.startswith("sets: no subscriber on desired (controller 'desired', ") and "main.yaml:" in explanation
+    )
 
 
 def test_documents_of_a_run_are_those_of_its_robot(tmp_path):

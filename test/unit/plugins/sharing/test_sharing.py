@@ -21,7 +21,7 @@ def moving(index, generator):
 
 
 def seen(folder, changed, together, names=NAMES, cycles=60):
-    """Return what each plugin saw and wanted, and the fleet."""
+    """Return what each plugin received and commanded, and the fleet."""
     fleet, generator = Fleet(folder, changed, names, together), np.random.default_rng(3)
     fleet.cycle(**still())
     for index in range(cycles):
@@ -38,8 +38,10 @@ def test_each_sees_what_it_sees_alone(tmp_path, estimator):
         tags = {"class": "support.plugins.fleet:Estimator", "model_change": True, "controller": ["base"]}
         changed["modules"]["first"] |= tags
         changed["modules"]["second"]["robot"] = changed["modules"]["third"]["robot"] = "based"
-    (alone, wanted_alone, apart), (shared, wanted, fleet) = (seen(tmp_path, changed, each) for each in (False, True))
-    assert shared == alone and wanted == wanted_alone and len(set(wanted)) == 3
+    (alone, commanded_alone, apart), (shared, commanded, fleet) = (
+        seen(tmp_path, changed, each) for each in (False, True)
+    )
+    assert shared == alone and commanded == commanded_alone and len(set(commanded)) == 3
     assert min(map(len, shared)) >= 60
     first, *others = (plugin.robot for plugin in fleet.plugins)
     assert all(first.shares_measurement(other) for other in others)

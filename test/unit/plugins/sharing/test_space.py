@@ -25,7 +25,7 @@ def bus():
 
 @pytest.fixture
 def space():
-    return SharedSpace([SharedTopic("first", "wanted", JOINTS, "a.yaml:1:1"), SharedTopic("second", "force", VECTOR)])
+    return SharedSpace([SharedTopic("first", "desired", JOINTS, "a.yaml:1:1"), SharedTopic("second", "force", VECTOR)])
 
 
 def member(name, space, bus):
@@ -37,8 +37,8 @@ def joints(*position):
 
 
 def test_next_component_has_it_at_once(space, bus):
-    reader = member("second", space, bus).reader("/wanted", JOINTS)
-    writer = member("first", space, bus).writer("wanted", JOINTS)
+    reader = member("second", space, bus).reader("/desired", JOINTS)
+    writer = member("first", space, bus).writer("desired", JOINTS)
     assert reader.read() is MessageStatus.NONE and not reader.update()
     bus.run_until(0.5)
     writer.write(joints(1.0, 2.0))
@@ -51,8 +51,8 @@ def test_next_component_has_it_at_once(space, bus):
 
 
 def test_what_is_received_stays_until_the_next(space, bus):
-    reader = member("second", space, bus).reader("wanted", JOINTS)
-    writer = member("first", space, bus).writer("wanted", JOINTS)
+    reader = member("second", space, bus).reader("desired", JOINTS)
+    writer = member("first", space, bus).writer("desired", JOINTS)
     message = joints(1.0, 2.0)
     writer.prepare(message)
     writer.write(message)
@@ -67,15 +67,15 @@ def test_what_is_received_stays_until_the_next(space, bus):
 
 
 def test_everybody_else_receives_it_as_before(space, bus):
-    outside = MemoryMiddleware(bus, "outside").reader("wanted", JOINTS)
-    member("first", space, bus).writer("wanted", JOINTS).write(joints(1.0, 2.0))
+    outside = MemoryMiddleware(bus, "outside").reader("desired", JOINTS)
+    member("first", space, bus).writer("desired", JOINTS).write(joints(1.0, 2.0))
     assert outside.read() is MessageStatus.NEW and outside.message.sender == "node"
     assert_array_equal(outside.message.position, (1.0, 2.0))
 
 
 def test_others_on_a_shared_topic_do_not_count(space, bus):
-    reader = member("second", space, bus).reader("wanted", JOINTS)
-    MemoryMiddleware(bus, "outside").writer("wanted", JOINTS).write(joints(9.0, 9.0))
+    reader = member("second", space, bus).reader("desired", JOINTS)
+    MemoryMiddleware(bus, "outside").writer("desired", JOINTS).write(joints(9.0, 9.0))
     assert reader.read() is MessageStatus.NONE
 
 
@@ -89,8 +89,8 @@ def test_topics_of_others_come_from_the_middleware(space, bus):
 def test_nobody_receives_its_own(space, bus, separately):
     """A member that reads and writes a topic sees others only, and its own messages do not make it NEW."""
     this = member("first", space, bus)
-    reader, writer = this.reader("wanted", JOINTS), this.writer("wanted", JOINTS)
-    outside = MemoryMiddleware(bus, "outside").writer("wanted", JOINTS)
+    reader, writer = this.reader("desired", JOINTS), this.writer("desired", JOINTS)
+    outside = MemoryMiddleware(bus, "outside").writer("desired", JOINTS)
 
     def read():
         if not separately:
@@ -121,9 +121,9 @@ def test_two_publishers_of_a_topic_are_refused():
 
 
 def test_order_of_joints_is_known_before_messages(space, bus):
-    writer = member("first", space, bus).writer("wanted", JOINTS)
+    writer = member("first", space, bus).writer("desired", JOINTS)
     writer.prepare(joints(0.0, 0.0))
-    assert member("second", space, bus).joint_order("wanted", JOINTS, 1.0) == ("a", "b")
+    assert member("second", space, bus).joint_order("desired", JOINTS, 1.0) == ("a", "b")
     assert bus.time == 0.0
 
 
@@ -158,9 +158,9 @@ def test_what_is_not_shared_goes_on_unchanged(space, bus, monkeypatch, method, q
 
 
 def test_every_message_of_others_is_kept(space, bus):
-    reader = member("first", space, bus).reader("wanted", JOINTS, 2)
-    own = member("first", space, bus).writer("wanted", JOINTS)
-    outside = MemoryMiddleware(bus, "outside").writer("wanted", JOINTS)
+    reader = member("first", space, bus).reader("desired", JOINTS, 2)
+    own = member("first", space, bus).writer("desired", JOINTS)
+    outside = MemoryMiddleware(bus, "outside").writer("desired", JOINTS)
     for value in (1.0, 2.0, 3.0):
         outside.write(joints(value, value))
         own.write(joints(0.0, 0.0))
@@ -171,7 +171,7 @@ def test_every_message_of_others_is_kept(space, bus):
 
 
 def test_what_a_component_publishes_once_a_cycle_is_read_once(space, bus):
-    reader = member("second", space, bus).reader("wanted", JOINTS, 2)
+    reader = member("second", space, bus).reader("desired", JOINTS, 2)
     assert reader.read_next() is None
-    member("first", space, bus).writer("wanted", JOINTS).write(joints(1.0, 2.0))
+    member("first", space, bus).writer("desired", JOINTS).write(joints(1.0, 2.0))
     assert reader.read_next().name == "first" and reader.read_next() is None

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from solfer.cli.options import Number
 
-SECONDS = Number(0.0, 1e9, "seconds")
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
@@ -26,9 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     forms.add_argument("--csv", metavar="FOLDER", type=Path, help="a CSV file for each channel")
     forms.add_argument("--npz", metavar="OUT.npz", type=Path, help="arrays for NumPy's `load`")
     forms.add_argument("--bag", metavar="OUT.bag", type=Path, help="a ROS 1 bag for `rosbag play`")
+    seconds = Number(0.0, 1e9, "seconds")
     for action in (cut, export):
-        action.add_argument("--from", dest="begin", type=SECONDS, metavar="SECONDS", help="leave out what is earlier")
-        action.add_argument("--to", dest="end", type=SECONDS, metavar="SECONDS", help="leave out what is later")
+        action.add_argument("--from", dest="begin", type=seconds, metavar="SECONDS", help="leave out what is earlier")
+        action.add_argument("--to", dest="end", type=seconds, metavar="SECONDS", help="leave out what is later")
         action.add_argument(
             "-c", dest="columns", metavar="COLUMN", action="append", default=[], help="only this; repeat it for several"
         )

@@ -14,8 +14,6 @@ from rospy.impl.tcpros_base import TCPROSTransportProtocol
 
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_LENGTH
 
-CHUNK = 65536  # bytes that are thrown away at once
-
 RATE_TIMEOUT = 1.0
 """Longest time that a request waits until the rate allows it [s]."""
 
@@ -118,9 +116,10 @@ def _skip(buffer: BytesIO, sock: Any, size: int) -> None:
     buffer.seek(0)
     buffer.truncate(0)
     buffer.write(rest)
-    scratch = bytearray(min(max(left, 0), CHUNK))
+    most = 65536  # bytes that are thrown away at once
+    scratch = bytearray(min(max(left, 0), most))
     while left > 0:
-        got = sock.recv_into(scratch, min(left, CHUNK))
+        got = sock.recv_into(scratch, min(left, most))
         if not got:
             raise TransportTerminated("the sender has ended in the middle of a message")
         left -= got

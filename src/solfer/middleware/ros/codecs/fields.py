@@ -15,8 +15,6 @@ from solfer.middleware.ros.codecs.interfaces import message_class
 from solfer.middleware.ros.codecs.packed_message import MESSAGE_HEADER, PackedMessage
 from solfer.transport.messages import FieldsMessage
 
-_TIMES = {"time": genpy.Time, "duration": genpy.Duration}
-
 
 class FieldsCodec(Codec):
     """A message of any type; its header is stamped, and so are those without a stamp of the messages in its lists.
@@ -113,8 +111,10 @@ def _to_ros(kind: str, value: Any) -> Any:
     element, bracket, _ = kind.partition("[")
     if bracket:
         return bytes(value) if element in ("uint8", "char") else [_to_ros(element, each) for each in value]
-    if kind in _TIMES:
-        return _TIMES[kind].from_sec(value)
+    if kind == "time":
+        return genpy.Time.from_sec(value)
+    if kind == "duration":
+        return genpy.Duration.from_sec(value)
     return value if "/" not in kind else _filled(message_class(kind), value)
 
 

@@ -9,11 +9,7 @@ from rospy.rostime import get_rostime, is_wallclock
 MESSAGE_LENGTH = struct.Struct("<I")
 MESSAGE_HEADER = struct.Struct("<IIII")
 """Sequence number, seconds, nanoseconds, and length of the frame's name that follows."""
-SEQUENCE_OFFSET = MESSAGE_LENGTH.size
-"""Where the sequence number stands, behind the length of the whole message [B]."""
 
-STAMP_OFFSET = MESSAGE_LENGTH.size + 4
-"""Where the stamp stands [B]."""
 TIME = struct.Struct("<II")
 NANOSECONDS = 1_000_000_000
 """Nanoseconds of a second."""
@@ -64,11 +60,11 @@ class PackedMessage:
     def number(self, number: int) -> None:
         """Set the sequence number of the header."""
         if self._stamped:
-            MESSAGE_LENGTH.pack_into(self.bytes, SEQUENCE_OFFSET, number & 0xFFFFFFFF)
+            MESSAGE_LENGTH.pack_into(self.bytes, 4, number & 0xFFFFFFFF)  # behind the length of the message
 
     def stamp(self, measured: float = 0.0) -> None:
         """Set the stamp of the header to when its numbers were measured [s], if that is known, else to the present."""
-        TIME.pack_into(self.bytes, STAMP_OFFSET, *stamp_of(measured))
+        TIME.pack_into(self.bytes, 8, *stamp_of(measured))  # behind the sequence number
 
     def numbers(self, offset: int, count: int) -> np.ndarray:
         """Return the `count` floats at `offset` of the body, a live view, shape (count,)."""
