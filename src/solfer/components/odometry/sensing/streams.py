@@ -103,8 +103,7 @@ class Streams:
 
     def __init__(self, robot: Robot, offset: float = 0.0):
         self._robot = robot
-        self._joints: SensorHistory | None = None
-        self._imu: SensorHistory | None = None
+        self._histories: tuple[SensorHistory, SensorHistory] | None = None  # of joints and IMU
         self.elapsed = self.ahead = 0.0
         self.measured = True
         self.silence = SensorSilence()
@@ -121,20 +120,20 @@ class Streams:
     @property
     def synchronizes(self) -> bool:
         """Whether there are histories of both."""
-        return self._joints is not None and self._imu is not None
+        return self._histories is not None
 
     def start(self) -> None:
         """Begin with what the State has; pipes and their histories exist by now."""
-        self._joints, self._imu = (
-            SensorHistory.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6))
-        )
+        joints = SensorHistory.find(self._robot, range(6, self._robot.size))
+        imu = SensorHistory.find(self._robot, range(3, 6))
+        self._histories = None if joints is None or imu is None else (joints, imu)
         self._time = self._begin = math.nan
         self._waited = self.ahead = 0.0
         self.silence.start()
         self._measurements.start()
         self._samples.start()
-        if self._joints is not None and self._imu is not None:
-            self._receive(self._joints, self._imu)
+        if self._histories is not None:
+            self._receive(*self._histories)
             waiting = self._measurements.waiting
             if waiting.count:
                 self._time = waiting.newest
@@ -150,14 +149,14 @@ class Streams:
         newest = self._measurements.newest
         newest[0] = state.position[6:]
         newest[1] = state.velocity[6:]
-        if self._joints is not None and self._imu is not None:
+        if self._histories is not None:
             self._waited = self._waited + passed if self._measurements.waiting.count else 0.0
             self.silence.passed += passed
-            self._receive(self._joints, self._imu)
+            self._receive(*self._histories)
 
     def next(self) -> bool:
         """Write the next measurement into the State; return whether there was one."""
-        if self._joints is None or self._imu is None:
+        if self._histories is None:
             return self._next_of_cycle()
         measurements = self._measurements
         waiting = measurements.waiting
@@ -181,7 +180,7 @@ class Streams:
 
     def finish(self) -> None:
         """Write the newest joints into the State again, after the last measurement of a cycle."""
-        if self._joints is None or self._imu is None or math.isnan(self._time):
+        if self._histories is None or math.isnan(self._time):
             return
         state = self._robot.state
         state.position[6:], state.velocity[6:] = self._measurements.newest
@@ -216,7 +215,7 @@ class Streams:
         self._waited = self.ahead = 0.0
         return True
 
-    def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:
+    def _receive(self, joints: SensorHistory, imu: SensorHistory) -> None:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
         begin = -math.inf if math.isnan(self._begin) else self._begin
         after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
