@@ -419,6 +419,21 @@ def test_positions_that_repeat_before_they_are_reached_are_a_stream(make, caplog
     assert x + 0.2 * PERIOD * 100 - references.position[0] > 0.3 * left > 0.01
 
 
+def test_vertices_end_with_the_base_whose_stream_has_ended(make):
+    """Those that were sent again and again at one place stay where they are then, and wheels rest."""
+    component = make()
+    references = component.references
+    x, y = references.position[:2].tolist()
+    vertices = references.vertices * (1.0, 0.9, 1.0)
+    for index in range(100):
+        guide(component, (x + 0.2 * PERIOD * index, y, 0.0), vertices)
+    cycle(component, 300)
+    left = np.abs(vertices - references.vertices).max()
+    cycle(component, 100)
+    assert left == np.abs(vertices - references.vertices).max() > 3e-3
+    assert not references.velocity.any() and not references.vertex_velocity.any()
+
+
 def test_a_position_that_jumps_is_named_and_ignored(make, caplog):
     component = make()
     begin = component.references.position.copy()

@@ -38,11 +38,13 @@ class Stream:
 
     Attributes:
         is_followed: Whether references go to the last one.
+        is_stream: Whether the last one came soon after the one before.
         is_moving: Whether more of them are expected: the last ones moved, and the references have not arrived since.
         age: Time since the last one [s].
     """
 
     is_followed: bool = False
+    is_stream: bool = False
     is_moving: bool = False
     age: float = math.inf
 
@@ -59,9 +61,15 @@ class Stream:
             left: How far references are from the one before [m or rad].
         """
         goes_on = step > 0.0 or (self.is_moving and left > 1e-3)  # a sender may wait for the pace
-        self.is_moving = self.is_followed and self.age <= STREAM_TIMEOUT and goes_on
+        self.is_stream = self.is_followed and self.age <= STREAM_TIMEOUT
+        self.is_moving = self.is_stream and goes_on
         self.age = 0.0
         self.is_followed = True
+
+    def end(self) -> bool:
+        """End with another one of the same sender, if this one has ceased as well; return whether it has."""
+        self.is_moving = self.is_moving or (self.is_stream and self.age > STREAM_TIMEOUT)
+        return self.is_abandoned
 
 
 class Targets:
@@ -195,16 +203,21 @@ class Targets:
         # how high a wheel on the ground is, the ground says
         np.copyto(errors[2:, 2], 0.0, where=~references.lifted)
         moving = references.velocity, references.angular, references.vertex_velocity
-        if self._base.is_abandoned:
+        base_ends = self._base.is_abandoned
+        vertices_end = self._vertices.is_abandoned
+        if base_ends != vertices_end:
+            base_ends = self._base.end()
+            vertices_end = self._vertices.end()
+        if base_ends:
             errors[:2] = 0.0
-        if self._vertices.is_abandoned:
+        if vertices_end:
             errors[2:] = 0.0
         first = 0 if self._base.is_followed else 2
         last = 2 + self._vertices.is_followed * self._count
         self.ratio = approach(errors, self._limits, *moving, first, last, LEAD, passed)
-        for stream, rates in ((self._base, moving[:2]), (self._vertices, moving[2:])):
+        for stream, ends, rates in ((self._base, base_ends, moving[:2]), (self._vertices, vertices_end, moving[2:])):
             stream.age += passed
-            if stream.is_abandoned and not any(rate.any() for rate in rates):
+            if ends and not any(rate.any() for rate in rates):
                 stream.is_followed = False
                 self.ratio = 1.0
 
