@@ -40,6 +40,7 @@ class MockHardware:
 
     Attributes:
         simulation: The robot as it really is.
+        delay: Time between a measurement and its arrival outside [s].
 
     Raises:
         UnknownName: An encoder of a joint that the robot does not have.
@@ -55,9 +56,10 @@ class MockHardware:
         followers: StepHook | None = None,
     ):
         self.simulation = simulation
+        self.delay = record.delay.measurement
         encoders = Encoders(record.joints, simulation.body.joints, record.where("joints"))
         owners = (LOWER_LEVEL, *simulation.lower_level.controllers)
-        measurement = steps_of(record.delay.measurement, record.where("delay", "measurement"))
+        measurement = steps_of(self.delay, record.where("delay", "measurement"))
         command = steps_of(record.delay.command, record.where("delay", "command"))
         truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
         self._wiring = Wiring(middleware, encoders, owners, measurement=measurement, command=command, truth=truth)
