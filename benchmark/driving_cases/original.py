@@ -199,7 +199,7 @@ class OriginalLaw:
         caster = np.array([self._caster(carrier)[0] for carrier in self._carriers])
         caster -= CIRCLE * np.floor((caster + CELL) / CIRCLE)
         self.desired = Desired(np.zeros(3), np.zeros(3), np.zeros((len(LEGS), 3)), camber, caster)
-        self._before, self._before_rows = (place.copy(), self._heading), np.zeros((2, robot.size))
+        self._before, self._before_rows = (place.copy(), abs(self._heading)), np.zeros((2, robot.size))
         self._is_first = True
 
     def update(self) -> np.ndarray:
@@ -238,8 +238,9 @@ class OriginalLaw:
         linear, angular = base[:3], base[3:]
         wish, base_velocity = self.desired, complex(*self.desired.velocity[:2])
         late, to_world = self._before[0], Rotation.from_rotvec(heading * NORMAL)
-        step = complex(*(place - late)[:2]) * np.exp(-1j * heading) / self._period
-        rate = math.remainder(heading - self._before[1], 2.0 * math.pi) / self._period
+        steered = abs(heading)  # the angle of a quaternion, which has no sign
+        step = complex(*(place - late)[:2]) * np.exp(-1j * steered) / self._period
+        rate = math.remainder(steered - self._before[1], 2.0 * math.pi) / self._period
         desired = Rotation.from_rotvec(self._heading * NORMAL) * self._tilt
         turn = desired * Rotation.from_matrix(rotation).inv()
         errors = {"BASE": np.append(turn.as_quat(canonical=True)[:3], self._place - place)}
@@ -252,9 +253,9 @@ class OriginalLaw:
             offset = to_world.apply(self._footprint[index])
             error = complex(*(offset - point + late)[:2])
             seen = 0j if self._is_first else error * np.exp(-1j * heading)
-            velocity = base_velocity * np.exp(-1j * heading) + 1j * wish.angular[2] * arm
+            velocity = base_velocity * np.exp(-1j * steered) + 1j * wish.angular[2] * arm
             velocity += complex(*wish.vertex_velocity[index, :2])
-            aim = self.steering[index].update(velocity, seen, abs(step + 1j * rate * seen)) + heading
+            aim = self.steering[index].update(velocity, seen, abs(step + 1j * rate * seen)) + steered
             rows["CONSTRAINTS"].append(material if self._has_contacts else 0.0 * material)
             rows["STEERING"].append(heading_row)
             angle = math.atan2(forward[1], forward[0])
@@ -269,7 +270,7 @@ class OriginalLaw:
                 found[task].append(soft(desired[index], value, 2.0))
                 desired[index] = value + found[task][-1]
                 rows[task].append(row)
-        self._before, self._before_rows, self._is_first = (place.copy(), heading), linear[:2].copy(), False
+        self._before, self._before_rows, self._is_first = (place.copy(), steered), linear[:2].copy(), False
         errors["CONSTRAINTS"] = np.zeros(3 * len(self._wheels))
         errors |= {task: np.array(values) for task, values in found.items() if values}
         return errors, {task: np.vstack(each) for task, each in rows.items()}

@@ -32,6 +32,7 @@ MOTIONS = {
     "circle, 0.2 m/s": velocity(0.2, rate=0.4, turn=0.4),
     "circle, 0.5 m/s": velocity(0.5, rate=0.5, turn=0.5),
     "turn, 0.5 rad/s": velocity(0.0, turn=0.5),
+    "beyond half a turn": velocity(0.1, rate=0.8, turn=0.8),
     "turning velocity, 0.05 m/s": velocity(0.05, rate=0.6),
     "turning velocity, 0.2 m/s": velocity(0.2, rate=1.2),
     "turning velocity, 0.5 m/s": velocity(0.5, rate=-1.2),
@@ -110,13 +111,23 @@ def test_fast_motions_are_those_of_the_equations(component, robots, name):
 
 
 @pytest.mark.slow
-def test_recorded_motions_are_those_of_the_equations(repository, robots):
-    """The equations move the robot as the original program did where it stands, and wheels turn back: 5 s."""
-    recorded = json.loads((repository / "test/data/original_wheels.json").read_text())["0_rest"]
+@pytest.mark.parametrize(
+    ("name", "motion"), [("0_rest", velocity(0.0)), ("d_circle", velocity(0.1, rate=0.2, turn=0.2))]
+)
+def test_recorded_motions_are_those_of_the_equations(repository, robots, name, motion):
+    """The equations move the robot as the original program did.
+
+    It stands, and wheels turn back; or it drives in a circle, beyond half a turn, where the heading changes its sign.
+    """
+    rows = json.loads((repository / "test/data/original_wheels.json").read_text())[name]["rows"]
     shipped = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
     law = part("driving_cases.original").OriginalLaw(robots[0], shipped, PERIOD, is_centred=True)
-    positions = [law.update() for _ in range(recorded["rows"][-1][0] + 1)]
-    for row, expected in recorded["rows"]:
+    positions = []
+    for cycle in range(rows[-1][0] + 1):
+        base, law.desired.angular[2], _ = motion(cycle * PERIOD)
+        law.desired.velocity[:2] = base.real, base.imag
+        positions.append(law.update())
+    for row, expected in rows:
         assert_allclose(positions[row][:LOWER], expected, rtol=0.0, atol=CLOSE)
 
 

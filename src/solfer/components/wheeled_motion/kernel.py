@@ -150,6 +150,13 @@ def _steer(start):
     motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
     numbers = vector_at(memory.numbers, 4)
     heading = vector_at(memory.base, 1)[0]
+    cx = center[0] - pose[0]
+    cy = center[1] - pose[1]
+    sx = math.cos(heading) * cx + math.sin(heading) * cy
+    sy = math.cos(heading) * cy - math.sin(heading) * cx
+    if law.across == 0.0:
+        # where it steers, the original program has lost the sign of the heading: the angle of a quaternion has none
+        heading = abs(_wrapped(heading, 2.0 * math.pi))
     period = law.period
     ratio = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMIT_RATIO]
     yaw_rate = ratio * matrix_at(memory.motion, 3, 3)[ANGULAR][2]
@@ -163,10 +170,6 @@ def _steer(start):
     my = (cos * dy - sin * dx) / period
     rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
     before[0], before[1], before[2] = pose[0], pose[1], heading
-    cx = center[0] - pose[0]
-    cy = center[1] - pose[1]
-    sx = cos * cx + sin * cy
-    sy = cos * cy - sin * cx
     for index in range(count):
         wheel = wheels[index]
         px = places[index, 0] - sx

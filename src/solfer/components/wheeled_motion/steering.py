@@ -1,5 +1,7 @@
 """Desired directions of wheels: by the desired motion of the base, and by the errors of the vertices."""
 
+import math
+
 import numpy as np
 
 from solfer.components.wheeled_motion.kernel import LAW, TUNED, WHEEL_DTYPE
@@ -21,7 +23,8 @@ class Steering:
     Without it, two directions are merged, each low-passed the more, the slower what points there is: that of the wheel
     in the desired motion of the base, about its instantaneous centre of rotation, and that of its vertex' error. Each
     is turned by half a revolution, and its speed changes sign, where it is farther from the last direction of the wheel
-    than a quarter of a revolution and 10 degrees. In the original program it is called `reactif`.
+    than a quarter of a revolution and 10 degrees. In the original program it is called `reactif`. As there, the heading
+    has no sign, and to the right of the x-axis of the world a wheel is steered as if the base were to the left of it.
 
     Args:
         tuning: Gains and margins.
@@ -85,6 +88,8 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
+        if not self.law["across"]:
+            heading = abs(math.remainder(heading, 2.0 * math.pi))
         self.before[:2] = place
         self.before[2] = heading
         self.wheels["rotation_left"] = 0.0
