@@ -20,7 +20,7 @@ ALARMS = (
     "from the mean of the accelerometer",
     "an angular velocity of",
     "no number has changed",
-    "does not follow",
+    "' does not follow '",
     "a specific force of",
     "the accelerometer measures",
     "arrivals count instead",
