@@ -275,13 +275,13 @@ SILENT = {
     "nothing": (500, lambda _: None),
     "a part of a request": (500, lambda those: [each.sendall(b"GET / HTTP/1.1\r\nHost:") for each in those]),
     "half-closed": (200, lambda those: [each.shutdown(socket.SHUT_WR) for each in those]),
-    "slow": (200, one_byte_each),
+    "slow": (100, one_byte_each),
 }
 
 
 @pytest.mark.parametrize("kind", SILENT)
 def test_silent_connections_keep_no_page_out(served, kind):
-    """More than wait for the server at once: the page is served beside them, and their files are free later."""
+    """As many as a web page or a program opens: the page is served beside them, and their files are free later."""
     files = served.files()
     count, work = SILENT[kind]
     with ExitStack() as stack, served.undisturbed():
