@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from numba import carray, from_dtype, njit, types
+from numba import carray, njit, types
 from numba.extending import intrinsic
 
 
@@ -60,53 +60,3 @@ def matrix_at(start, rows, columns):
 def indices_at(start, size):
     """Return the whole numbers at an address, shape (size,)."""
     return carray(integers(start), (size,))
-
-
-@njit
-def flags_at(start, size):
-    """Return the truth values at an address, shape (size,)."""
-    return carray(booleans(start), (size,))
-
-
-def record_at(kind: np.dtype) -> Any:
-    """Make the function that returns the record of a kind at an address; see `Memory`."""
-    records = records_at(kind)
-
-    @njit
-    def record(start):
-        return records(start, 1)[0]
-
-    return record
-
-
-def records_at(kind: np.dtype) -> Any:
-    """Make the function that returns the records of a kind at an address, shape (count,)."""
-    pointer = pointer_to(from_dtype(kind))
-
-    @njit
-    def records(start, count):
-        return carray(pointer(start), (count,))
-
-    return records
-
-
-class Memory:
-    """A record of numbers and of addresses of arrays, which a compiled loop gets as one number; it keeps them alive.
-
-    Args:
-        kind: The record: of float64 numbers, and of int64 numbers, which may be addresses.
-        fields: Numbers, and arrays that are contiguous and stay where they are; what is left out is 0.
-
-    Attributes:
-        record: The record, of which numbers may be changed, shape ().
-        address: Its address.
-    """
-
-    def __init__(self, kind: np.dtype, **fields: Any):
-        self.record, self._arrays = np.zeros((), kind), tuple(fields.values())
-        for name, value in fields.items():
-            if isinstance(value, np.ndarray):
-                assert value.flags.c_contiguous, name
-                assert value.dtype.names or value.dtype in (np.float64, np.int64, np.bool_), name
-            self.record[name] = address(value) if isinstance(value, np.ndarray) else value
-        self.address = address(self.record)

@@ -2,51 +2,52 @@
 
 from pathlib import Path
 
-import numpy as np
-
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
-from solfer.numerics.pointers import indices_at, record_at, release_fence
+from solfer.numerics.pointers import indices_at, release_fence
 from solfer.segments.header import CACHE_LINE
 from solfer.segments.slot import NEWEST, STAMP_WORD, STATE_WORD
 from solfer.telemetry import histograms
 
-ROW_RING = np.dtype(
-    [
-        # addresses of the arrays and their sizes, in memory of their own, and how many there are
-        *((name, np.int64) for name in ("arrays", "sizes", "pieces")),
-        # the ring: its memory and its words, how many rows it holds, the words from one to the next
-        *((name, np.int64) for name in ("words", "size", "count", "stride")),
-        ("number", np.int64),
-    ]
+ROW_RING = Layout(
+    "RowRing",
+    # addresses of the arrays, and their sizes
+    pieces=int,
+    arrays=(int, "pieces"),
+    sizes=(int, "pieces"),
+    # the ring: its words, how many rows it holds, and the words from one to the next
+    size=int,
+    words=(int, "size"),
+    count=int,
+    stride=int,
+    number=(int, 1),
 )
-"""What `append` reads, and the number of the row that it wrote last; see `solfer.numerics.pointers.Memory`."""
+"""What `append` reads, and the number of the row that it wrote last."""
 
 _bucket_of = part(histograms.bucket_of)
-_ring_at = record_at(ROW_RING)
+_ring_at = ROW_RING.at
 
 
 def _append(address, stamp):
     """Publish the arrays as they are now as the next row; in the order that `Slots` protects."""
     ring = _ring_at(address)
-    words = indices_at(ring.words, ring.size)
-    arrays = indices_at(ring.arrays, ring.pieces)
-    sizes = indices_at(ring.sizes, ring.pieces)
-    number = ring.number + 1
+    words = ring.words
+    number = ring.number[0] + 1
     slot = CACHE_LINE // 8 + (number % ring.count) * ring.stride
     words[slot + STATE_WORD] = 2 * number - 1
     words[slot + STAMP_WORD] = stamp
     release_fence()
     place = slot + CACHE_LINE // 8
     for piece in range(ring.pieces):
-        array = indices_at(arrays[piece], sizes[piece])
-        for index in range(sizes[piece]):
+        array = indices_at(ring.arrays[piece], ring.sizes[piece])
+        for index in range(len(array)):
             words[place + index] = array[index]
-        place += sizes[piece]
+        place += len(array)
     release_fence()
     words[slot + STATE_WORD] = 2 * number
     release_fence()
     words[NEWEST] = number
-    ring.number = number
+    ring.number[0] = number
 
 
 def _count_durations(rows, times, always):

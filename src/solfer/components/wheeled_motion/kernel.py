@@ -7,8 +7,8 @@ import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
 from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, REST_ERROR, merge, nearest
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
-from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
 REST_DISTANCE = 2.5e-3
 """Error of a vertex that its wheel rests with, where no motion is desired [m]."""
@@ -54,41 +54,75 @@ WHEEL_DTYPE = np.dtype(
 [rad, m/s]; whether it rests, 1 or less as its error persists, how far it has to turn [rad], the desired direction of
 its contact point, and the rate of that direction [rad/s]."""
 
-WHEELS_DTYPE = np.dtype(
-    [
-        *((name, np.int64) for name in ("count", "dofs", "rows")),
-        # addresses of the steering: its law, states of the wheels, place and heading of the last cycle, and these rows
-        *((name, np.int64) for name in ("law", "wheels", "before", "steered")),
-        # of the vertices: places, errors, offsets, directions, which are lifted; heading of the base
-        *((name, np.int64) for name in ("places", "errors", "offsets", "directions", "lifted", "base")),
-        # of the references
-        *((name, np.int64) for name in ("numbers", "motion", "velocities", "orientation")),
-        *((name, np.int64) for name in ("desired_camber", "desired_caster")),
-        # of the points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
-        *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
-        # of the joints: which of them steer, measured positions, commanded ones, velocities, and ends of
-        # their ranges; 0: they have none
-        *((name, np.int64) for name in ("turning_dofs", "measured", "position", "velocity", "lower", "upper")),
-        # first rows of the tasks; -1: there is no such task
-        *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
-        # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
-        # rates by which errors go away, and desired rates
-        *(
-            (name, np.int64)
-            for name in ("steering_rows", "aims", "largest_errors", "error", "gain", "rates", "away", "forward")
-        ),
-        *((name, np.float64) for name in ("half", "furthest")),
-        # largest speeds and accelerations of corrections, and largest speeds of corrections and motions together
-        *((f"{name}_correction", np.float64) for name in ("base", "turn", "vertex")),
-        *((f"{name}_acceleration", np.float64) for name in ("base", "turn", "vertex")),
-        *((f"{name}_speed", np.float64) for name in ("base", "turn")),
-    ]
+WHEELS = Layout(
+    "Wheels",
+    count=int,
+    dofs=int,
+    rows=int,
+    # the steering: its law, the wheels, place and heading of the base in the last cycle, and the rows `ANGLES` to
+    # `MEASURED`
+    law=LAW,
+    wheels=(WHEEL_DTYPE, "count"),
+    before=(float, 3),
+    steered=(float, 4, "count"),
+    # vertices, seen from the heading of the base
+    places=(float, "count", 3),
+    errors=(float, "count", 3),
+    offsets=(float, "3 * count"),
+    directions=(float, "count", 2),
+    lifted=(bool, "count"),
+    base=(float, 3),  # heading and place
+    # references: the numbers `PACE` to `WAITS`, and the rows `VELOCITY` to `PLACE`
+    numbers=(float, 4),
+    motion=(float, 3, 3),
+    velocities=(float, 2, "count", 3),
+    orientations=(float, 2, 4),
+    desired_camber=(float, "count"),
+    desired_caster=(float, "count"),
+    # points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
+    pose=(float, 7),
+    center=(float, 2),
+    place=(float, 3),
+    camber=(float, "count"),
+    caster=(float, "count"),
+    # joints: those that steer, where they are, where they are commanded, and the ends of their ranges
+    turning_dofs=(int, "count"),
+    measured=(float, "dofs"),
+    position=(float, "dofs"),
+    velocity=(float, "dofs"),
+    has_ranges=int,
+    lower=(float, "dofs"),
+    upper=(float, "dofs"),
+    # first rows of the tasks; -1: there is no such task
+    of_base=int,
+    of_vertices=int,
+    of_steering=int,
+    of_camber=int,
+    of_caster=int,
+    # tasks: rates by which errors go away, desired ones, and both
+    steering_rows=(float, "count", "dofs"),
+    aims=(float, "count"),
+    largest_errors=(float, 3),
+    error=(float, "rows"),
+    gain=(float, "rows"),
+    away=(float, "rows"),
+    forward=(float, "rows"),
+    rates=(float, "rows"),
+    half=float,
+    furthest=float,
+    # largest speeds and accelerations of corrections, and largest speeds of corrections and motions together
+    base_correction=float,
+    turn_correction=float,
+    vertex_correction=float,
+    base_acceleration=float,
+    turn_acceleration=float,
+    vertex_acceleration=float,
+    base_speed=float,
+    turn_speed=float,
 )
-"""What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
+"""What the functions for wheels read and write."""
 
-_wheels_at = record_at(WHEELS_DTYPE)
-_law_at = record_at(LAW)
-_states_at = records_at(WHEEL_DTYPE)
+_wheels_at = WHEELS.at
 
 
 @part
@@ -133,33 +167,24 @@ def _keep(wheel, law, wx, wy, ex, ey):
 
 def _steer(start):
     """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
-    memory = _wheels_at(start)
-    count = memory.count
-    dofs = memory.dofs
-    law = _law_at(memory.law)
-    wheels = _states_at(memory.wheels, count)
-    before = vector_at(memory.before, 3)
-    steered = matrix_at(memory.steered, 4, count)
-    places = matrix_at(memory.places, count, 3)
-    errors = matrix_at(memory.errors, count, 3)
-    velocities = matrix_at(memory.velocities, count, 3)
-    directions = matrix_at(memory.directions, count, 2)
-    lifted = flags_at(memory.lifted, count)
-    pose = vector_at(memory.pose, 7)
-    center = vector_at(memory.center, 2)
-    motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
-    numbers = vector_at(memory.numbers, 4)
-    heading = vector_at(memory.base, 1)[0]
-    cx = center[0] - pose[0]
-    cy = center[1] - pose[1]
+    block = _wheels_at(start)
+    law = block.law
+    before = block.before
+    steered = block.steered
+    velocities = block.velocities[0]
+    pose = block.pose
+    motion = block.motion[VELOCITY]
+    heading = block.base[0]
+    cx = block.center[0] - pose[0]
+    cy = block.center[1] - pose[1]
     sx = math.cos(heading) * cx + math.sin(heading) * cy
     sy = math.cos(heading) * cy - math.sin(heading) * cx
     if law.across == 0.0:
         # where it steers, the original program has lost the sign of the heading: the angle of a quaternion has none
         heading = abs(_wrapped(heading, 2.0 * math.pi))
     period = law.period
-    ratio = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMIT_RATIO]
-    yaw_rate = ratio * matrix_at(memory.motion, 3, 3)[ANGULAR][2]
+    ratio = 0.0 if block.numbers[WAITS] != 0.0 else block.numbers[LIMIT_RATIO]
+    yaw_rate = ratio * block.motion[ANGULAR, 2]
     cos = math.cos(heading)
     sin = math.sin(heading)
     vx = ratio * (cos * motion[0] + sin * motion[1])
@@ -170,12 +195,12 @@ def _steer(start):
     my = (cos * dy - sin * dx) / period
     rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
     before[0], before[1], before[2] = pose[0], pose[1], heading
-    for index in range(count):
-        wheel = wheels[index]
-        px = places[index, 0] - sx
-        py = places[index, 1] - sy
-        ex = errors[index, 0]
-        ey = errors[index, 1]
+    for index in range(block.count):
+        wheel = block.wheels[index]
+        px = block.places[index, 0] - sx
+        py = block.places[index, 1] - sy
+        ex = block.errors[index, 0]
+        ey = block.errors[index, 1]
         wx = vx - py * yaw_rate + ratio * velocities[index, 0]
         wy = vy + px * yaw_rate + ratio * velocities[index, 1]
         if law.across != 0.0:
@@ -183,14 +208,14 @@ def _steer(start):
         else:
             merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
         steered[SPEEDS, index] = math.hypot(wx, wy)
-        steered[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
-        if lifted[index]:
+        steered[MEASURED, index] = math.atan2(block.directions[index, 1], block.directions[index, 0])
+        if block.lifted[index]:
             # it points where it does, and nothing waits for it
             angle = steered[MEASURED, index] - heading
             wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
             wheel.motion_speed = wheel.error_speed = wheel.rate = steered[SPEEDS, index] = 0.0
-            if memory.of_steering >= 0:
-                vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
+            if block.of_steering >= 0:
+                block.steering_rows[index, :] = 0.0
         steered[ANGLES, index], steered[AIMS, index] = wheel.angle + heading, wheel.aim
 
 
@@ -224,34 +249,39 @@ def _find_soft(angles, desired, half, most, error):
 
 
 @part
-def _choose_rotations(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
+def _choose_rotations(block, angles):
     """Write desired directions of wheels, by the shorter rotation whose end is within the range of the steering joint.
 
     The way goes from where the joint is measured, as the wheel is; its commanded position may be elsewhere, and has to
-    be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its
+    be within its range after some cycles, whatever moves it. A wheel that has begun to turn keeps its
     way unless another one is much better, also where both are equal.
     """
-    for index in range(len(angles)):
-        dof = turning[index]
-        rotation_left = wheels[index].rotation_left
-        row = rows[index, dof]
-        place = measured[dof]
-        rotation_left += _wrapped(desired[index] - angles[index] - rotation_left, HALF_REVOLUTION)
-        further = position[dof] + velocity[dof] * ahead
+    most = block.largest_errors[0]
+    ahead = LEAD_CYCLES * block.law.period
+    for index in range(block.count):
+        dof = block.turning_dofs[index]
+        lower = block.lower[dof]
+        upper = block.upper[dof]
+        rotation_left = block.wheels[index].rotation_left
+        row = block.steering_rows[index, dof]
+        place = block.measured[dof]
+        rotation_left += _wrapped(block.aims[index] - angles[index] - rotation_left, HALF_REVOLUTION)
+        position = block.position[dof]
+        further = position + block.velocity[dof] * ahead
         end = place + rotation_left * row
-        is_inside = lower[dof] < end < upper[dof]
-        is_next_inside = lower[dof] < further < upper[dof]
+        is_inside = lower < end < upper
+        is_next_inside = lower < further < upper
         # what leaves the range shows which of the two others is the way back
-        toward = (further - position[dof]) * row if is_inside and not is_next_inside else rotation_left
+        toward = (further - position) * row if is_inside and not is_next_inside else rotation_left
         other = rotation_left - math.copysign(HALF_REVOLUTION, toward)
         other_end = place + other * row
         is_inside = is_inside and is_next_inside
         is_long = abs(rotation_left) > HALF_REVOLUTION / 2.0 + EXTRA_ANGLE
-        if (is_long or not is_inside) and lower[dof] + END_MARGIN < other_end < upper[dof] - END_MARGIN:
+        if (is_long or not is_inside) and lower + END_MARGIN < other_end < upper - END_MARGIN:
             rotation_left = other
-        wheels[index].rotation_left = rotation_left
+        block.wheels[index].rotation_left = rotation_left
         # half a revolution away is not to be taken for no way at all
-        desired[index] = angles[index] + min(max(rotation_left, -most), most)
+        block.aims[index] = angles[index] + min(max(rotation_left, -most), most)
 
 
 def _find_errors(start):
@@ -260,49 +290,25 @@ def _find_errors(start):
     Those of base, vertices, steering, camber, and caster; aims of the steering are the angles of `steered`, with
     joints that have ranges the ones within them, and references of camber and caster follow where they are too far.
     """
-    memory = _wheels_at(start)
-    count = memory.count
-    dofs = memory.dofs
-    half = memory.half
-    error = vector_at(memory.error, memory.rows)
-    largest_errors = vector_at(memory.largest_errors, 3)
-    if memory.of_base >= 0:
-        _find_base(
-            vector_at(memory.place, 3),
-            vector_at(memory.pose, 7),
-            matrix_at(memory.motion, 3, 3)[PLACE],
-            vector_at(memory.orientation, 4),
-            error[memory.of_base :],
-        )
-    if memory.of_vertices >= 0:
-        offsets = vector_at(memory.offsets, 3 * count)
-        for index in range(3 * count):
-            error[memory.of_vertices + index] = -offsets[index]
-    if memory.of_steering >= 0:
-        steered = matrix_at(memory.steered, 4, count)
-        desired = vector_at(memory.aims, count)
-        desired[:] = steered[ANGLES]
-        if memory.lower:
-            rows = matrix_at(memory.steering_rows, count, dofs)
-            lower = vector_at(memory.lower, dofs)
-            upper = vector_at(memory.upper, dofs)
-            turning = indices_at(memory.turning_dofs, count)
-            position = vector_at(memory.position, dofs)
-            velocity = vector_at(memory.velocity, dofs)
-            ahead = LEAD_CYCLES * _law_at(memory.law).period
-            wheels = _states_at(memory.wheels, count)
-            angles = steered[MEASURED]
-            given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
-            _choose_rotations(*given, lower, upper, largest_errors[0], ahead)
-        _find_soft(steered[MEASURED], desired, half, largest_errors[0], error[memory.of_steering :])
-    if memory.of_camber >= 0:
-        angles = vector_at(memory.camber, count)
-        desired = vector_at(memory.desired_camber, count)
-        _find_soft(angles, desired, half, largest_errors[1], error[memory.of_camber :])
-    if memory.of_caster >= 0:
-        angles = vector_at(memory.caster, count)
-        desired = vector_at(memory.desired_caster, count)
-        _find_soft(angles, desired, half, largest_errors[2], error[memory.of_caster :])
+    block = _wheels_at(start)
+    half = block.half
+    error = block.error
+    largest_errors = block.largest_errors
+    if block.of_base >= 0:
+        _find_base(block.place, block.pose, block.motion[PLACE], block.orientations[0], error[block.of_base :])
+    if block.of_vertices >= 0:
+        for index in range(3 * block.count):
+            error[block.of_vertices + index] = -block.offsets[index]
+    if block.of_steering >= 0:
+        angles = block.steered[MEASURED]
+        block.aims[:] = block.steered[ANGLES]
+        if block.has_ranges:
+            _choose_rotations(block, angles)
+        _find_soft(angles, block.aims, half, largest_errors[0], error[block.of_steering :])
+    if block.of_camber >= 0:
+        _find_soft(block.camber, block.desired_camber, half, largest_errors[1], error[block.of_camber :])
+    if block.of_caster >= 0:
+        _find_soft(block.caster, block.desired_caster, half, largest_errors[2], error[block.of_caster :])
 
 
 def _find_soft_alone(angles, desired, half, most, error):
@@ -311,26 +317,25 @@ def _find_soft_alone(angles, desired, half, most, error):
 
 
 @part
-def _feed_forward(memory, forward):
+def _feed_forward(block):
     """Write the desired rates of base, steering and vertices."""
-    count = memory.count
-    turning = matrix_at(memory.motion, 3, 3)[ANGULAR]
-    if memory.of_base >= 0:
-        motion = matrix_at(memory.motion, 3, 3)[VELOCITY]
+    count = block.count
+    forward = block.forward
+    turning = block.motion[ANGULAR]
+    if block.of_base >= 0:
+        motion = block.motion[VELOCITY]
         for k in range(3):
-            forward[memory.of_base + k], forward[memory.of_base + 3 + k] = turning[k], motion[k]
-    if memory.of_steering >= 0:
+            forward[block.of_base + k], forward[block.of_base + 3 + k] = turning[k], motion[k]
+    if block.of_steering >= 0:
         for index in range(count):
-            forward[memory.of_steering + index] = turning[2]
-    if memory.of_vertices < 0:
+            forward[block.of_steering + index] = turning[2]
+    if block.of_vertices < 0:
         return
-    velocities = matrix_at(memory.velocities, count, 3)
-    directions = matrix_at(memory.directions, count, 2)
-    lifted = flags_at(memory.lifted, count)
-    of_vertices = memory.of_vertices
-    heading = vector_at(memory.base, 1)[0]
-    cos = math.cos(heading)
-    sin = math.sin(heading)
+    velocities = block.velocities[0]
+    directions = block.directions
+    of_vertices = block.of_vertices
+    cos = math.cos(block.base[0])
+    sin = math.sin(block.base[0])
     for index in range(count):
         vx = velocities[index, 0]
         vy = velocities[index, 1]
@@ -338,7 +343,7 @@ def _feed_forward(memory, forward):
         fy = directions[index, 1]
         wx = cos * vx - sin * vy
         wy = sin * vx + cos * vy
-        is_free = lifted[index]
+        is_free = block.lifted[index]
         forward[of_vertices + index] = fx * wx + fy * wy
         forward[of_vertices + count + index] = fx * wy - fy * wx if is_free else 0.0
         forward[of_vertices + 2 * count + index] = velocities[index, 2] if is_free else 0.0
@@ -368,50 +373,47 @@ def _shorten(rates, first, most):
 
 
 @part
-def _turn_ahead(memory, rates, gain, pace):
+def _turn_ahead(block, pace):
     """Let wheels turn as fast as the desired directions do, and no faster than an error may turn them.
 
     A wheel that is far from its direction goes there as fast as it may: its way may be the longer one. None is to turn
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
-    wheels = _states_at(memory.wheels, memory.count)
-    largest_error = vector_at(memory.largest_errors, 1)[0]
-    error = vector_at(memory.error, memory.rows)
-    with_base = pace * matrix_at(memory.motion, 3, 3)[ANGULAR][2]
-    for index in range(memory.count):
-        row = memory.of_steering + index
-        if abs(error[row]) < (1.0 - 1e-9) * largest_error:
-            limit = largest_error * gain[row]
-            rates[row] = min(max(rates[row] + wheels[index].rate, -limit), limit)
-        if memory.lower:
-            lower, upper = _room(memory, index)
+    largest_error = block.largest_errors[0]
+    rates = block.rates
+    with_base = pace * block.motion[ANGULAR, 2]
+    for index in range(block.count):
+        row = block.of_steering + index
+        if abs(block.error[row]) < (1.0 - 1e-9) * largest_error:
+            limit = largest_error * block.gain[row]
+            rates[row] = min(max(rates[row] + block.wheels[index].rate, -limit), limit)
+        if block.has_ranges:
+            lower, upper = _room(block, index)
             rates[row] = min(max(rates[row], lower + with_base), upper + with_base)
 
 
 @part
-def _room(memory, index):
+def _room(block, index):
     """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
-    dof = indices_at(memory.turning_dofs, memory.count)[index]
-    rate = 1.0 / _law_at(memory.law).period
-    lower = vector_at(memory.lower, memory.dofs)[dof]
-    upper = vector_at(memory.upper, memory.dofs)[dof]
-    place = vector_at(memory.position, memory.dofs)[dof]
-    by = rate * matrix_at(memory.steering_rows, memory.count, memory.dofs)[index, dof]
-    first = by * min(lower - place, 0.0)
-    second = by * max(upper - place, 0.0)
+    dof = block.turning_dofs[index]
+    rate = 1.0 / block.law.period
+    place = block.position[dof]
+    by = rate * block.steering_rows[index, dof]
+    first = by * min(block.lower[dof] - place, 0.0)
+    second = by * max(block.upper[dof] - place, 0.0)
     return min(first, second), max(first, second)
 
 
 @part
-def _find_far(memory, error):
+def _find_far(block):
     """Return the first row of the base's place, or of a vertex, whose error is larger than it may be; -1: none is."""
-    if memory.of_base >= 0:
-        for k in range(memory.of_base + 3, memory.of_base + 6):
-            if abs(error[k]) > memory.furthest:
+    if block.of_base >= 0:
+        for k in range(block.of_base + 3, block.of_base + 6):
+            if abs(block.error[k]) > block.furthest:
                 return k
-    if memory.of_vertices >= 0:
-        for k in range(memory.of_vertices, memory.of_vertices + 3 * memory.count):
-            if abs(error[k]) > memory.furthest:
+    if block.of_vertices >= 0:
+        for k in range(block.of_vertices, block.of_vertices + 3 * block.count):
+            if abs(block.error[k]) > block.furthest:
                 return k
     return -1
 
@@ -424,39 +426,35 @@ def _find_rates(start, is_paced, feeds_forward):
     Returns:
         Row of the base or of a vertex that is farther from its reference than it may be, with a pace; -1: none is.
     """
-    memory = _wheels_at(start)
-    size = memory.rows
-    rates = vector_at(memory.rates, size)
-    gain = vector_at(memory.gain, size)
-    error = vector_at(memory.error, size)
-    for k in range(size):
-        rates[k] = gain[k] * error[k]
+    block = _wheels_at(start)
+    rates = block.rates
+    for k in range(block.rows):
+        rates[k] = block.gain[k] * block.error[k]
     if is_paced:
-        away = vector_at(memory.away, size)
-        period = _law_at(memory.law).period
-        if memory.of_base >= 0:
-            turn_rise = period * memory.turn_acceleration
-            base_rise = period * memory.base_acceleration
+        away = block.away
+        period = block.law.period
+        if block.of_base >= 0:
+            turn_rise = period * block.turn_acceleration
+            base_rise = period * block.base_acceleration
             # a gyroscope with a wrong scale or sign cannot turn the robot much faster than commanded
-            turn_most = memory.turn_correction
-            turn_most = min(turn_most, 0.15 * turn_most + 0.1 * abs(matrix_at(memory.motion, 3, 3)[ANGULAR][2]))
-            _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
-            _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
-        if memory.of_vertices >= 0:
-            vertex_rise = period * memory.vertex_acceleration
-            _correct(rates, away, memory.of_vertices, 3 * memory.count, memory.vertex_correction, vertex_rise)
+            turn_most = block.turn_correction
+            turn_most = min(turn_most, 0.15 * turn_most + 0.1 * abs(block.motion[ANGULAR, 2]))
+            _correct(rates, away, block.of_base, 3, turn_most, turn_rise)
+            _correct(rates, away, block.of_base + 3, 3, block.base_correction, base_rise)
+        if block.of_vertices >= 0:
+            vertex_rise = period * block.vertex_acceleration
+            _correct(rates, away, block.of_vertices, 3 * block.count, block.vertex_correction, vertex_rise)
     if feeds_forward:
-        forward = vector_at(memory.forward, size)
-        pace = vector_at(memory.numbers, 4)[PACE]
-        _feed_forward(memory, forward)
-        for k in range(size):
-            rates[k] += pace * forward[k]
-        if is_paced and memory.of_base >= 0:
-            _shorten(rates, memory.of_base, memory.turn_speed)
-            _shorten(rates, memory.of_base + 3, memory.base_speed)
-        if is_paced and memory.of_steering >= 0:
-            _turn_ahead(memory, rates, gain, pace)
-    return _find_far(memory, error) if is_paced else -1
+        pace = block.numbers[PACE]
+        _feed_forward(block)
+        for k in range(block.rows):
+            rates[k] += pace * block.forward[k]
+        if is_paced and block.of_base >= 0:
+            _shorten(rates, block.of_base, block.turn_speed)
+            _shorten(rates, block.of_base + 3, block.base_speed)
+        if is_paced and block.of_steering >= 0:
+            _turn_ahead(block, pace)
+    return _find_far(block) if is_paced else -1
 
 
 def _move(columns, rates, period, velocity, position):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
-from solfer.components.wheeled_motion.kernel import WHEELS_DTYPE, find_errors, find_rates, steer
+from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, steer
 from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, ROUNDED_PI
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
@@ -24,7 +24,7 @@ from solfer.components.wheeled_motion.tags import (
 )
 from solfer.components.wheeled_motion.wheels import DrivenWheels, rows_of
 from solfer.errors import ComponentError
-from solfer.numerics.pointers import Memory
+from solfer.numerics.blocks import Block
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -90,8 +90,8 @@ class DrivingTasks:
         offsets = wheels.offsets
         points = wheels.points
         first = {name: rows.start for name, rows in self.rows.items()}
-        self.numbers = Memory(
-            WHEELS_DTYPE,
+        self.numbers = Block(
+            WHEELS,
             count=len(wheels.links),
             dofs=self._robot.size,
             rows=len(self.gain),
@@ -108,11 +108,11 @@ class DrivingTasks:
             numbers=references.numbers,
             motion=references.motion,
             velocities=references.places,
-            orientation=references.orientations,
+            orientations=references.orientations,
             desired_camber=references.camber,
             desired_caster=references.caster,
             pose=wheels.pose.value,
-            center=wheels.place if tags.base == "center_of_mass" else wheels.pose.value,
+            center=(wheels.place if tags.base == "center_of_mass" else wheels.pose.value)[:2],
             place=wheels.place,
             camber=points[TASK_POINTS[CAMBER]].value,
             caster=points[TASK_POINTS[CASTER]].value,
@@ -120,10 +120,11 @@ class DrivingTasks:
             measured=self._robot.state.position,
             position=joints.position,
             velocity=joints.velocity,
-            lower=self.bounds.lower_position if self._feeds_forward else 0,
-            upper=self.bounds.upper_position if self._feeds_forward else 0,
+            has_ranges=self._feeds_forward,
+            lower=self.bounds.lower_position,
+            upper=self.bounds.upper_position,
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*TASK_POINTS.items(), (STEERING, "steering"))},
-            steering_rows=self.stack.jacobian[self.rows[STEERING]] if STEERING in first else 0,
+            steering_rows=self.stack.jacobian[self.rows[STEERING]] if STEERING in first else None,
             aims=self.aims,
             largest_errors=np.array(
                 [

@@ -2,10 +2,8 @@
 
 import math
 
-import numpy as np
-
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
-from solfer.numerics.pointers import matrix_at, record_at, vector_at
 
 LATERAL_SPEED = 4e-3
 """Speed across a wheel with which its vertex may leave its way [m/s]."""
@@ -18,73 +16,82 @@ VALUE, LIMITED, HELD, LAGS, FOLLOWED, SPEED = range(6)
 that of joints at their bounds, that of a base that lags, that which all of them can follow, and the fastest vertex at
 it [m/s]."""
 
-GOING = np.dtype(
-    [
-        *((name, np.int64) for name in ("count", "state", "steered", "base")),
-        *((name, np.int64) for name in ("numbers", "motion", "vertices", "orientations", "desired", "error")),
-        *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "acceleration", "furthest")),
-    ]
+GOING = Layout(
+    "Going",
+    count=int,
+    state=(float, 6),
+    # rows of what is known of steered wheels, and heading and place of the base
+    steered=(float, 4, "count"),
+    base=(float, 3),
+    # the references, and the vertices that are desired
+    numbers=(float, 4),
+    motion=(float, 3, 3),
+    vertices=(float, 2, "count", 3),
+    orientations=(float, 2, 4),
+    desired=(float, "count", 3),
+    error=(float, 6),  # of the base: rotation, place
+    base_speed=float,
+    turn_speed=float,
+    vertex_speed=float,
+    acceleration=float,  # of a vertex
+    furthest=float,  # distance of the base from its reference
 )
-"""What `advance` reads and writes, see `solfer.numerics.pointers.Memory`: the number of wheels, then addresses of the
-pace's state, what is known of the wheels, and the heading of the base; of the references; of the vertices that are
-desired; and of the errors of the base (rotation, place). Then largest speeds, the largest acceleration of a vertex, and
-the largest distance of the base from its reference."""
+"""What `advance` reads and writes."""
 
-_going_at = record_at(GOING)
+_going_at = GOING.at
 
 DESIRED_X, DESIRED_Y, DESIRED_Z, DESIRED_YAW_RATE, IN_WORLD, AGE, BEFORE = range(7)
 """State of velocities that others send; see `solfer.components.wheeled_motion.drive.Drive`."""
 
 
 @part
-def _limit(memory, state):
+def _limit(block, state):
     """Find the factor that scales what is desired to the limits."""
-    motion = matrix_at(memory.motion, 3, 3)
-    velocity = motion[0]
-    angular = motion[1]
-    vertices = matrix_at(memory.vertices, memory.count, 3)
+    velocity = block.motion[0]
+    angular = block.motion[1]
+    vertices = block.vertices[0]
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-    ratio = memory.base_speed / max(memory.base_speed, speed)
-    ratio = min(ratio, memory.turn_speed / max(memory.turn_speed, abs(angular[2])))
-    for index in range(memory.count):
+    ratio = block.base_speed / max(block.base_speed, speed)
+    ratio = min(ratio, block.turn_speed / max(block.turn_speed, abs(angular[2])))
+    for index in range(block.count):
         speed = math.sqrt(vertices[index, 0] ** 2 + vertices[index, 1] ** 2 + vertices[index, 2] ** 2)
-        ratio = min(ratio, memory.vertex_speed / max(memory.vertex_speed, speed))
+        ratio = min(ratio, block.vertex_speed / max(block.vertex_speed, speed))
     state[LIMITED], state[VALUE] = ratio, ratio * state[FOLLOWED]
 
 
 @part
-def _lag_ratio(memory):
+def _lag_ratio(block):
     """Return the ratio with which a reference goes on that the base does not follow: where others hold, it waits."""
-    error = vector_at(memory.error, 6)
+    error = block.error
     furthest_turn = 0.45  # [rad]
-    distance = math.hypot(error[3], error[4]) / memory.furthest
+    distance = math.hypot(error[3], error[4]) / block.furthest
     angle = 2.0 * abs(error[2]) / furthest_turn
     # it slows down from a third of the largest error on, and rests at two thirds
     return min(max(2.0 - 3.0 * max(distance, angle), 0.0), 1.0)
 
 
 @part
-def _update(memory, state, is_held, most, passed):
+def _update(block, state, is_held, most, passed):
     """Find the ratio with which wheels and joints can follow."""
-    steered = matrix_at(memory.steered, 4, memory.count)
+    steered = block.steered
     aims_row = 1
     speeds_row = 2
     measured_row = 3
-    heading = vector_at(memory.base, 1)[0]
+    heading = block.base[0]
     fastest = 0.0
     across = LATERAL_SPEED
-    for index in range(memory.count):
+    for index in range(block.count):
         speed = steered[speeds_row, index]
         fastest = max(fastest, speed)
         across = max(across, speed * abs(math.sin(steered[aims_row, index] - steered[measured_row, index] + heading)))
     decay_rate = 8.0  # [1/s] where joints are at their bounds; it recovers with 1/s
     change = (-decay_rate if is_held else 1.0) * passed
     state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - decay_rate * passed))
-    state[LAGS] = _lag_ratio(memory)
+    state[LAGS] = _lag_ratio(block)
     ratio = min(LATERAL_SPEED / across, state[HELD], state[LAGS])
     if fastest > 0.0:
         before = state[FOLLOWED]
-        step = memory.acceleration * passed / fastest
+        step = block.acceleration * passed / fastest
         # vertices go on with twice the acceleration, brake with four times, and start with three times
         lower = min(before, state[SPEED] / fastest) - 4.0 * step
         ratio = min(max(ratio, lower), before + 2.0 * step, state[SPEED] / fastest + 3.0 * step)
@@ -142,20 +149,16 @@ def _advance(start, is_paced, is_first, is_held, most, passed):
         most: Largest pace.
         passed: Time for which they go on [s].
     """
-    memory = _going_at(start)
-    count = memory.count
-    numbers = vector_at(memory.numbers, 4)
+    block = _going_at(start)
+    numbers = block.numbers
     if is_paced:
-        state = vector_at(memory.state, 6)
-        _limit(memory, state)
+        state = block.state
+        _limit(block, state)
         if not is_first:
-            _update(memory, state, is_held, most, passed)
+            _update(block, state, is_held, most, passed)
         numbers[LIMIT_RATIO], numbers[PACE] = state[LIMITED], state[VALUE]
-    both = matrix_at(memory.vertices, 2 * count, 3)
-    vertices = both[count:]
-    motion = matrix_at(memory.motion, 3, 3)
-    _step(numbers, motion, both[:count], vertices, matrix_at(memory.orientations, 2, 4), passed)
-    matrix_at(memory.desired, count, 3)[:] = vertices
+    _step(numbers, block.motion, block.vertices[0], block.vertices[1], block.orientations, passed)
+    block.desired[:] = block.vertices[1]
 
 
 def _step_alone(motion, places, orientations, numbers, period):

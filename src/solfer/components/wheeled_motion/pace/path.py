@@ -8,7 +8,7 @@ from solfer.components.wheeled_motion.pace.kernel import FOLLOWED, GOING, HELD, 
 from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.numerics.pointers import Memory
+from solfer.numerics.blocks import Block
 
 
 class PathPace:
@@ -36,7 +36,7 @@ class PathPace:
     def __init__(self, references: References, steering: Steering, offsets: RollingOffsets, error: np.ndarray):
         self.is_found = True
         self._state = np.zeros(6)
-        self._memory = Memory(
+        self._block = Block(
             GOING,
             count=len(references.lifted),
             state=self._state,
@@ -49,7 +49,7 @@ class PathPace:
             desired=offsets.reference,
             error=error,
         )
-        self._address = self._memory.address
+        self._address = self._block.address
         self.start()
 
     def limit(self, speeds: Sequence[float], acceleration: float, furthest: float) -> None:
@@ -60,7 +60,7 @@ class PathPace:
             acceleration: Largest change of a vertex' speed by the pace [m/s2].
             furthest: Largest distance of the base from its reference [m].
         """
-        record = self._memory.record
+        record = self._block.record
         record["base_speed"], record["turn_speed"], record["vertex_speed"] = speeds
         record["acceleration"], record["furthest"] = acceleration, furthest
 

@@ -19,7 +19,7 @@ from solfer.components.wheeled_motion.support.kernel import (
 )
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, VERTICES
-from solfer.numerics.pointers import Memory
+from solfer.numerics.blocks import Block
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
@@ -88,7 +88,7 @@ class MotionGuard:
         ]
         self._watched = [(what, unit) for what, unit, _, _ in watched]
         self._state = np.zeros(STATE_SIZE)
-        self._memory = Memory(
+        self._block = Block(
             GUARD,
             count=len(lifted),
             dofs=len(velocity),
@@ -114,12 +114,12 @@ class MotionGuard:
             turning=turning,
             required_margin=polygon.required_margin,
         )
-        self._address = self._memory.address
+        self._address = self._block.address
 
     def set_required_margin(self, margin: float) -> None:
         """Set the margin that motions leave [m]."""
         self.polygon.required_margin = margin
-        self._memory.record["required_margin"] = margin
+        self._block.record["required_margin"] = margin
 
     @property
     def margin(self) -> float:

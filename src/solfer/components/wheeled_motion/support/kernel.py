@@ -2,10 +2,9 @@
 
 import math
 
-import numpy as np
-
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
-from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
+from solfer.numerics.pointers import matrix_at, vector_at
 
 FIRST, SECOND, INSIDE, NORMAL_X, NORMAL_Y, EDGE_SIZE = range(6)
 """Columns of edges: vertices, distance of the centre of mass, normal to the inside; and how many there are."""
@@ -16,24 +15,39 @@ MARGIN, REASON, AMOUNT, WORST, AGE, STATE_SIZE = range(6)
 NOTHING, POLYGON, FIRST_ROW = range(3)
 """What holds the motion: nothing, the margin, the first of the rows that are watched; joints of legs follow these."""
 
-GUARD = np.dtype(
-    [
-        *((name, np.int64) for name in ("count", "dofs", "rows")),
-        # addresses of the polygon: places and Jacobians of vertices and centre of mass, which are lifted, edges
-        *((name, np.int64) for name in ("points", "lifted", "order", "edges")),
-        # first rows of the tasks; -1: there is no such task. Then addresses of their errors, rates by which errors go
-        # away, desired rates, the way that is held, and joint velocities
-        *((name, np.int64) for name in ("of_base", "of_vertices")),
-        *((name, np.int64) for name in ("error", "away", "forward", "held", "velocity")),
-        # rows that are watched, and their bounds; joints of the legs, and those that steer
-        *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds")),
-        *((name, np.int64) for name in ("leg_count", "legs", "turning_count", "turning")),
-        ("required_margin", np.float64),
-    ]
+GUARD = Layout(
+    "Guard",
+    count=int,
+    dofs=int,
+    rows=int,
+    # the polygon: addresses of place and Jacobian of each vertex and of the centre of mass, and edges
+    points=(int, "count + 1", 2),
+    lifted=(bool, "count"),
+    order=(int, "count"),
+    edges=(float, "count", EDGE_SIZE),
+    required_margin=float,
+    # tasks: first rows, -1: there is none; errors, rates by which they go away, desired rates, and the way that is held
+    of_base=int,
+    of_vertices=int,
+    error=(float, "rows"),
+    away=(float, "rows"),
+    forward=(float, "rows"),
+    held=(float, "rows"),
+    velocity=(float, "dofs"),
+    state=(float, STATE_SIZE),
+    # rows that are watched, and their bounds
+    watched_count=int,
+    watched=(int, "watched_count"),
+    bounds=(float, "watched_count"),
+    # joints of the legs, and those that steer
+    leg_count=int,
+    legs=(int, "leg_count"),
+    turning_count=int,
+    turning=(int, "turning_count"),
 )
-"""What `hold_back` reads and writes, see `solfer.numerics.pointers.Memory`."""
+"""What `hold_back` reads and writes."""
 
-_guard_at = record_at(GUARD)
+_guard_at = GUARD.at
 
 
 @part
@@ -95,11 +109,13 @@ def _along(jacobian, dofs, nx, ny, velocity):
 
 
 @part
-def _rate(memory, points, edge, velocity):
+def _rate(block, edge):
     """Return how fast the centre of mass moves away from an edge [m/s]."""
+    points = block.points
+    velocity = block.velocity
     first = int(edge[FIRST])
     second = int(edge[SECOND])
-    center = memory.count
+    center = block.count
     a = vector_at(points[first, 0], 2)
     b = vector_at(points[second, 0], 2)
     c = vector_at(points[center, 0], 2)
@@ -107,108 +123,104 @@ def _rate(memory, points, edge, velocity):
     ratio = along / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
     nx = edge[NORMAL_X]
     ny = edge[NORMAL_Y]
-    dofs = memory.dofs
+    dofs = block.dofs
     start = _along(points[first, 1], dofs, nx, ny, velocity)
     end = _along(points[second, 1], dofs, nx, ny, velocity)
     return _along(points[center, 1], dofs, nx, ny, velocity) - start - ratio * (end - start)
 
 
 @part
-def _keep_margin(memory, state, velocity):
+def _keep_margin(block):
     """Find the ratio of joint velocities with which the margin does not fall below what is left, and the margin."""
-    points = indices_at(memory.points, 2 * (memory.count + 1)).reshape((memory.count + 1, 2))
-    edges = matrix_at(memory.edges, memory.count, EDGE_SIZE)
-    lifted = flags_at(memory.lifted, memory.count)
-    order = indices_at(memory.order, memory.count)
+    points = block.points
+    edges = block.edges
     ratio = 1.0
     is_short = False
     margin = math.inf
     horizon = 0.25  # [s] in which a motion may use up what is left of the margin
     top_speed = 0.4  # [m/s] that no motion has: edges that are far enough for it do not count
-    for index in range(_find(points, lifted, order, edges)):
+    for index in range(_find(points, block.lifted, block.order, edges)):
         edge = edges[index]
         margin = min(margin, edge[INSIDE])
-        left = edge[INSIDE] - memory.required_margin
+        left = edge[INSIDE] - block.required_margin
         if left > horizon * top_speed:
             continue
-        rate = _rate(memory, points, edge, velocity)
+        rate = _rate(block, edge)
         if left + horizon * ratio * rate < 0.0:
             ratio = max(0.0, -left / (horizon * rate)) if rate < 0.0 else 1.0
             is_short = True
-    state[MARGIN] = margin
+    block.state[MARGIN] = margin
     return ratio, is_short
 
 
 @part
-def _lacks(memory, away, forward):
+def _lacks(block):
     """Whether base and vertices are behind along their desired direction.
 
     It is measured by the rates with which errors would go away along that way. Where the way leads back to where joints
     can follow, it is not held up.
     """
     along = square = 0.0
-    for first, size in ((memory.of_base, 6), (memory.of_vertices, 3 * memory.count)):
+    for first, size in ((block.of_base, 6), (block.of_vertices, 3 * block.count)):
         if first >= 0:
             for k in range(first, first + size):
-                along += away[k] * forward[k]
-                square += forward[k] * forward[k]
+                along += block.away[k] * block.forward[k]
+                square += block.forward[k] * block.forward[k]
     return along > 1e-3 * math.sqrt(square)  # [m/s, rad/s]
 
 
 @part
-def _reason(memory, is_short, margin, speed, velocity):
+def _reason(block, is_short, speed):
     """Return what is beyond its bound most, how far it is, and by which ratio to the bound."""
-    why, amount, worst = (POLYGON, margin, 1.0) if is_short else (NOTHING, 0.0, 1.0)
-    watched = indices_at(memory.watched, memory.watched_count)
-    bounds = vector_at(memory.bounds, memory.watched_count)
-    error = vector_at(memory.error, memory.rows)
-    for index in range(memory.watched_count):
-        size = abs(error[watched[index]])
-        if size > worst * bounds[index]:
+    why, amount, worst = (POLYGON, block.state[MARGIN], 1.0) if is_short else (NOTHING, 0.0, 1.0)
+    for index in range(block.watched_count):
+        size = abs(block.error[block.watched[index]])
+        if size > worst * block.bounds[index]:
             why = FIRST_ROW + index
             amount = size
-            worst = size / bounds[index]
+            worst = size / block.bounds[index]
     if why != NOTHING:
         return why, amount, worst
-    legs = indices_at(memory.legs, memory.leg_count)
+    velocity = block.velocity
     fastest = -1.0
     place = 0
-    for index in range(memory.leg_count):
-        size = abs(velocity[legs[index]])
+    for index in range(block.leg_count):
+        size = abs(velocity[block.legs[index]])
         if size > fastest:
             fastest = size
             place = index
     steering = 0.0
-    turning = indices_at(memory.turning, memory.turning_count)
-    for index in range(memory.turning_count):
-        steering = max(steering, abs(velocity[turning[index]]))
+    for index in range(block.turning_count):
+        steering = max(steering, abs(velocity[block.turning[index]]))
     # a leg is nearly straight whose joint is faster than 0.5 rad/s, 25 rad/m by the speed of the motion, and a quarter
     # of the speed of joints that steer: wheels that tilt and turn move their legs
     if fastest > max(0.5, 25.0 * speed, 0.25 * steering):
-        return FIRST_ROW + memory.watched_count + place, fastest, 1.0
+        return FIRST_ROW + block.watched_count + place, fastest, 1.0
     return NOTHING, 0.0, 0.0
 
 
 @part
-def _guard(memory, state, is_short, forward, pace, velocity, passed):
+def _guard(block, is_short, pace, passed):
     """Whether the motion is held, since it leads where the robot does not get on."""
-    held = vector_at(memory.held, memory.rows)
+    held = block.held
+    forward = block.forward
+    state = block.state
     size = 0.0
     along = 0.0
-    for k in range(memory.rows):
+    for k in range(block.rows):
         size += forward[k] * forward[k]
         along += forward[k] * held[k]
     size = math.sqrt(size)
     if size == 0.0:
         return False
     is_other = along < 0.5 * size  # at an angle of more than 60 degrees to the way that is held
-    why, amount, worst = _reason(memory, is_short, state[MARGIN], pace * size, velocity)
+    why, amount, worst = _reason(block, is_short, pace * size)
     if why != NOTHING and worst > (1.1 * state[WORST] if state[REASON] != NOTHING and is_other else 0.0):
         state[REASON] = why
         state[AMOUNT] = amount
         state[WORST] = worst
         state[AGE] = 0.0
-        for k in range(memory.rows):
+        for k in range(block.rows):
             held[k] = forward[k] / size
         return True
     if state[REASON] == NOTHING:
@@ -228,17 +240,13 @@ def _hold_back(start, pace, is_bound, passed):
         is_bound: Whether a joint is at its bound.
         passed: Time since the cycle before [s].
     """
-    memory = _guard_at(start)
-    state = vector_at(memory.state, STATE_SIZE)
-    velocity = vector_at(memory.velocity, memory.dofs)
-    forward = vector_at(memory.forward, memory.rows)
-    away = vector_at(memory.away, memory.rows)
-    ratio, is_short = _keep_margin(memory, state, velocity)
+    block = _guard_at(start)
+    ratio, is_short = _keep_margin(block)
     if ratio < 1.0:
-        for k in range(memory.dofs):
-            velocity[k] *= ratio
-    is_bound = (is_bound or ratio < 1.0) and _lacks(memory, away, forward)
-    return _guard(memory, state, is_short, forward, pace, velocity, passed) or is_bound
+        for k in range(block.dofs):
+            block.velocity[k] *= ratio
+    is_bound = (is_bound or ratio < 1.0) and _lacks(block)
+    return _guard(block, is_short, pace, passed) or is_bound
 
 
 def _find_alone(points, lifted, order, edges):
