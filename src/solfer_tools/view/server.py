@@ -110,7 +110,7 @@ class PageServer:
         self.viser.stop()
 
     def _guarded(self, serve: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a `serve` that checks each request by `_refusal` first, and receives signs of life."""
+        """Return a `serve` that checks each request by `_is_own` first, and receives signs of life."""
         headers = {  # the page is neither stored nor shown inside of another one, and its address is not passed on
             "Cache-Control": "no-store",
             "Content-Security-Policy": "frame-ancestors 'none'",
@@ -121,14 +121,16 @@ class PageServer:
             self._is_guarded = True
 
             def process(connection: ServerConnection, request: Request) -> Any:
-                refusal = self._refusal(connection, request)
-                if refusal is not None:
-                    return refusal
+                request.path = request.path.partition("?")[0]
+                if not self._is_own(connection, request):
+                    return _empty(http.HTTPStatus.FORBIDDEN)
                 request.path = request.path.removeprefix(f"/{self._token}") or "/"
                 try:
                     response = process_request(connection, request)
                 except OSError:  # a path that no file can have
-                    response = Response(http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"")
+                    response = _empty(http.HTTPStatus.NOT_FOUND)
+                except LookupError:  # of websockets: a header that is there twice
+                    response = _empty(http.HTTPStatus.BAD_REQUEST)
                 if isinstance(response, Response):
                     response.headers.update(headers)
                 return response
@@ -163,28 +165,32 @@ class PageServer:
 
         return guarded
 
-    def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Return the answer to a request that is none of this page's; None: it is one."""
+    def _is_own(self, connection: ServerConnection, request: Request) -> bool:
+        """Return whether a request has the token, and is for this host, from an origin that may make it."""
         hosts = [f"{name}:{connection.local_address[1]}" for name in ("localhost", HOST)]
         origins = [f"http://{host}" for host in hosts]
-        _, token, kind, *_ = [*request.path.partition("?")[0].split("/"), "", ""]
+        _, token, kind, *_ = [*request.path.split("/"), "", ""]
         headers = request.headers
         is_routed = kind in self.routes
         if is_routed:  # Foxglove in the browser, and on the desktop
             origins += ("https://app.foxglove.dev", "file://")
-        own = (
-            secrets.compare_digest(token.encode(), self._token.encode())
+        return (
+            secrets.compare_digest(token.encode(errors="surrogateescape"), self._token.encode())
             and headers.get_all("Host") in [[host] for host in hosts]
             and all(origin in origins for origin in headers.get_all("Origin"))
             and ("Upgrade" not in headers or "Origin" in headers or is_routed)
         )
-        return None if own else Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), b"")
+
+
+def _empty(status: http.HTTPStatus) -> Response:
+    return Response(status, status.phrase, Headers(), b"")
 
 
 class _PageConnection(ServerConnection):
-    """Ends when pings come while their answers are not read: nothing else bounds those."""
+    """Ends when nothing else bounds what is kept: unread answers to pings, or fragments of one message."""
 
     _unread = 0
+    _fragments = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See `ServerConnection.connection_made`."""
@@ -196,8 +202,10 @@ class _PageConnection(ServerConnection):
         """See `ServerConnection.process_event`."""
         if isinstance(event, Frame) and event.opcode is Opcode.PING:
             self._unread = self._unread + 1 if self.transport.get_write_buffer_size() else 0
-            if self._unread > 1000:
-                self.transport.abort()
+        elif isinstance(event, Frame) and event.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
+            self._fragments = 0 if event.fin else self._fragments + 1
+        if max(self._unread, self._fragments) > 1000:
+            self.transport.abort()
         super().process_event(event)
 
 

@@ -4,6 +4,7 @@ import http.client
 import json
 import os
 import re
+import resource
 import socket
 import threading
 import time
@@ -169,6 +170,11 @@ FLOODS = {
     "junk": lambda _: [b"\xc1"],
     "nested": lambda _: [b"\x91" * 60000],
     "pings": lambda _: [125 * b"x"],
+    "pongs": lambda _: [125 * b"x"],
+    "fragments": lambda _: [b""],
+    "keys of dialogs": lambda _: [encoded(_messages.GuiUpdateMessage(f"{60_000 * 'x'}", {"value": True}))],
+    "give it back": lambda page: [update(page, "give it back", True)],
+    "plots": lambda page: [update(page, "column", "centre of mass/z [m]"), update(page, "add", True)],
     "signs of life": lambda _: [b""],
     "Foxglove's junk": lambda _: [b"{", b'{"op": "other"}', 1000 * b"["],
     "Foxglove's parameters": lambda _: [
@@ -178,7 +184,18 @@ FLOODS = {
             ("getParameters", "parameterNames", []),
         )
     ],
+    "Foxglove's subscriptions": lambda _: [
+        json.dumps({"op": op, key: [{"id": 1, "channelId": 1} for _ in range(1000)]}).encode()
+        for op, key in (("subscribe", "subscriptions"), ("unsubscribe", "subscriptionIds"))
+    ],
+    "Foxglove's schemas": lambda _: [
+        json.dumps({"op": "advertise", "channels": [{**CHANNEL, "id": each, "schema": 50_000 * "x"}]}).encode()
+        for each in range(2)
+    ],
 }
+
+CHANNEL = {"topic": "/a", "encoding": "json", "schemaName": "a"}
+OPCODES = {"pings": Opcode.PING, "pongs": Opcode.PONG}
 
 
 @pytest.mark.parametrize("kind", FLOODS)
@@ -193,8 +210,11 @@ def test_a_flood_neither_delays_others_nor_stays(served, kind):
             page = stack.enter_context(attacker(served))
             connection = page._life if kind == "signs of life" else page._connection
             messages = FLOODS[kind](page)
-            opcode = Opcode.PING if kind == "pings" else Opcode.BINARY
+            opcode = OPCODES.get(kind, Opcode.BINARY)
         frames = [Frame(opcode, each).serialize(mask=True) for each in messages]
+        if kind == "fragments":
+            connection.socket.sendall(Frame(opcode, b"", fin=False).serialize(mask=True))
+            frames = [Frame(Opcode.CONT, b"", fin=False).serialize(mask=True)]
         batch = b"".join(frames * max(100_000 // len(b"".join(frames)), 1))
         connection.socket.settimeout(SPAN)
         end = time.monotonic() + SPAN
@@ -243,20 +263,91 @@ def test_pages_that_read_nothing_or_come_and_go(served):
     until(lambda: served.files() <= files, "files that are closed")
 
 
-def test_silent_connections_keep_no_page_out(served):
-    """500 that send nothing, or a part of a request: the page is served beside them, and their files are free later."""
+def one_byte_each(connections):
+    """Send a byte of a request by each of them, ten times within a second."""
+    for byte in b"GET / HTTP":
+        for connection in connections:
+            connection.send(bytes([byte]))
+        time.sleep(0.1)
+
+
+SILENT = {
+    "nothing": (500, lambda _: None),
+    "a part of a request": (500, lambda those: [each.sendall(b"GET / HTTP/1.1\r\nHost:") for each in those]),
+    "half-closed": (200, lambda those: [each.shutdown(socket.SHUT_WR) for each in those]),
+    "slow": (100, one_byte_each),
+}
+
+
+@pytest.mark.parametrize("kind", SILENT)
+def test_silent_connections_keep_no_page_out(served, kind):
+    """As many as a web page or a program opens: the page is served beside them, and their files are free later."""
     files = served.files()
+    count, work = SILENT[kind]
     with ExitStack() as stack, served.undisturbed():
-        for index in range(500):
-            connection = stack.enter_context(socket.create_connection(("127.0.0.1", served.port), timeout=5.0))
-            if index % 2:
-                connection.sendall(b"GET / HTTP/1.1\r\nHost:")
+        address = ("127.0.0.1", served.port)
+        connections = [stack.enter_context(socket.create_connection(address, timeout=5.0)) for _ in range(count)]
+        work(connections)
         begin = time.monotonic()
         request = http.client.HTTPConnection("localhost", served.port, timeout=5.0)
         stack.callback(request.close)
         request.request("GET", "/" + served.address.split("/", 3)[3])
         assert request.getresponse().status == 200 and time.monotonic() - begin < 1.0
     until(lambda: served.files() <= files, "files that are closed")
+
+
+@pytest.mark.soak
+def test_slow_headers_have_an_end(served):
+    """A byte a second for each of 50 connections: they are closed 10 s after they were opened."""
+    files = served.files()
+    with ExitStack() as stack, served.undisturbed():
+        address = ("127.0.0.1", served.port)
+        connections = [stack.enter_context(socket.create_connection(address, timeout=5.0)) for _ in range(50)]
+        begin = time.monotonic()
+        for byte in 20 * b"GET ":
+            with suppress(ConnectionError):
+                for connection in connections:
+                    connection.send(bytes([byte]))
+            time.sleep(1.0)
+            if served.files() <= files:
+                break
+        assert 5.0 < time.monotonic() - begin < 15.0
+
+
+def test_files_that_run_out_keep_new_pages_out(served):
+    """The process may have 20 more files: beside 100 connections its page commands on, later a new one is served."""
+    files = served.files()
+    before = resource.prlimit(served.process.pid, resource.RLIMIT_NOFILE)
+    resource.prlimit(served.process.pid, resource.RLIMIT_NOFILE, (files + 20, before[1]))
+    try:
+        with ExitStack() as stack, served.undisturbed(1.5):
+            for _ in range(100):
+                stack.enter_context(socket.create_connection(("127.0.0.1", served.port), timeout=5.0))
+            time.sleep(0.5)
+        until(lambda: served.files() <= files, "files that are closed")
+    finally:
+        resource.prlimit(served.process.pid, resource.RLIMIT_NOFILE, before)
+    with attacker(served), served.undisturbed():
+        pass
+
+
+def test_only_addresses_of_this_machine_listen(served):
+    """All sockets of the process that take connections or datagrams are in 127.0.0.0/8, Foxglove's included."""
+    folder = Path(f"/proc/{served.process.pid}")
+    links = [os.readlink(each) for each in (folder / "fd").iterdir()]
+    own = {each.removeprefix("socket:[").rstrip("]") for each in links}
+    found = []
+    for kind, states in (("tcp", {"0A"}), ("tcp6", {"0A"}), ("udp", {"07"}), ("udp6", {"07"})):
+        for line in (folder / "net" / kind).read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[9] in own and fields[3] in states:
+                found.append((kind, fields[1][6:8]))
+    assert found == 2 * [("tcp", "7F")]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.connect(("192.0.2.1", 9))  # nothing is sent; it shows the address towards others
+        address = other.getsockname()[0]
+    with pytest.raises(OSError):
+        socket.create_connection((address, served.port), timeout=1.0).close()
 
 
 def test_the_stop_asks_at_once_beside_a_flood(served):

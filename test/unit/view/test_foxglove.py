@@ -2,7 +2,7 @@
 
 import json
 import struct
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ pytest.importorskip("foxglove", reason="needs pip install -r requirements-view.t
 from support.page import opened_page  # noqa: E402
 from support.page_bench import PageBench  # noqa: E402
 from support.unit.upper_body import upper_body  # noqa: E402
-from websockets.exceptions import InvalidStatus  # noqa: E402
+from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 
 from solfer.transport.parameters import SetParameters  # noqa: E402
@@ -100,7 +100,8 @@ def test_parameters_are_read_and_not_changed_without_control(repository):
         client.send(op="getParameters", parameterNames=[], id="all")
         bench.until(lambda: "all" in client.answers)
         assert client.answers["all"] == {"hands.gain": 2.0}
-        client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.0}], id="set")
+        changes = [{"name": "hands.gain", "value": each} for each in (3.0, "3.0", True, [3.0], {"a": 3.0})]
+        client.send(op="setParameters", parameters=changes, id="set")
         bench.until(lambda: "set" in client.answers)
         bench.run(10)
         assert client.answers["set"] == {"hands.gain": 2.0} and not bench.asked
@@ -123,6 +124,68 @@ def test_parameters_change_with_control_while_no_page_commands(repository):
             bench.until(lambda: "late" in client.answers)
             bench.run(10)
         assert len(bench.asked) == 1
+
+
+OTHER_REQUESTS = {
+    "channel with a huge schema": [
+        {
+            "op": "advertise",
+            "channels": [
+                {"id": 1, "topic": "/hands/cmd_vel", "encoding": "json", "schemaName": "a", "schema": 50_000 * "x"}
+            ],
+        },
+        b"\x01" + struct.pack("<I", 1) + b"{}",
+    ],
+    "channel that is not there": [b"\x01" + struct.pack("<I", 99) + b"{}", {"op": "unadvertise", "channelIds": [99]}],
+    "service": [
+        {"op": "advertiseServices", "services": [{"id": 1, "name": "lower_level/emergency_stop", "type": "a"}]},
+        b"\x02" + struct.pack("<III", 1, 1, 4) + b"json{}",
+        b"\x02" + struct.pack("<III", 1, 1, 2**32 - 1),
+    ],
+    "subscriptions to one": [
+        {"op": "subscribe", "subscriptions": [{"id": 1, "channelId": each} for each in (1, 1, 2, 2**64 - 1)]},
+        {"op": "unsubscribe", "subscriptionIds": [1, 1, 99]},
+        {"op": "subscribe", "subscriptions": [{"id": -1, "channelId": "1"}]},
+    ],
+    "files": [
+        {"op": "fetchAsset", "uri": uri, "requestId": number}
+        for number, uri in enumerate(("file:///etc/passwd", "package://../../etc/passwd", "", 1000 * "../"))
+    ],
+    "graph": [{"op": "subscribeConnectionGraph"}, {"op": "subscribeConnectionGraph"}],
+    "parameters to watch": [
+        {"op": op, "parameterNames": names}
+        for names in (
+            [],
+            ["hands.gain", "hands.gain"],
+            [50_000 * "x"],
+            [f"{each}" for each in range(5000)],
+            "hands.gain",
+        )
+        for op in ("subscribeParameterUpdates", "unsubscribeParameterUpdates")
+    ],
+    "time": [b"\x03" + bytes(20), {"op": "playbackControl", "playbackState": 1}],
+    "bytes": [b"", b"\x00", b"\xff" * 1000, b"\x01", b"\x02\x00"],
+    "text": ["", "{", "[]", "null", '{"op": 1}', '{"op": {}}', 30_000 * "[", '{"op": "setParameters"}'],
+}
+
+
+@pytest.mark.parametrize("kind", OTHER_REQUESTS)
+def test_other_requests_change_nothing(repository, caplog, capfd, kind):
+    """They may end their connection; another client has its parameters, and nobody commands."""
+    with served(repository, True) as (bench, client):
+        with (
+            connect(bench.page.foxglove.address, subprotocols=[PROTOCOL]) as other,
+            suppress(ConnectionClosed, TimeoutError),
+        ):
+            for each in OTHER_REQUESTS[kind]:
+                other.send(json.dumps(each) if isinstance(each, dict) else each)
+                bench.run(1)
+            while True:
+                assert "root:" not in str(other.recv(timeout=0.1))
+        client.send(op="getParameters", parameterNames=[], id="all")
+        bench.until(lambda: "all" in client.answers)
+        assert client.answers["all"] == {"hands.gain": 2.0} and not bench.asked and not bench.driven.drain()
+    assert "Traceback" not in caplog.text + "".join(capfd.readouterr()) and len(caplog.records) < 10
 
 
 def test_only_programs_with_the_token_are_served(repository):
@@ -151,15 +214,37 @@ def test_only_programs_with_the_token_are_served(repository):
             assert not client.answers["all"] and not bench.asked
 
 
-@pytest.mark.parametrize("name", ["hands.gain", "other.gain", "..", ""])
+VALUES = (
+    ("AAAA", "byte_array"),
+    ("A", "byte_array"),
+    (3.0, "byte_array"),
+    ("a", "float64"),
+    ("a", "float64_array"),
+    ([1.0, "a", None, [], {}], "float64_array"),
+    ([], "float64"),
+    (True, "float64"),
+    ({"a": {"b": [1e308]}}, None),
+    (10**400, None),
+    ("\0", None),
+    (10_000 * "x", None),
+    (3.0, "unknown"),
+    (3.0, 1),
+    ("nested", None),
+    (None, None),
+)
+
+
+@pytest.mark.parametrize("name", ["hands.gain", "other.gain", "..", "", "hands.gain\\u0000", 1000 * "hands."])
 def test_values_that_are_none_end_nothing(repository, caplog, name):
     """Bytes, bytes that cannot be decoded, nested values, unknown names; then a number counts."""
     nested = 1
     for _ in range(100):
         nested = [nested]
     with served(repository, True) as (bench, client):
-        for value, kind in (("AAAA", "byte_array"), ("A", "byte_array"), (nested, None), (None, None)):
-            client.send(op="setParameters", parameters=[{"name": name, "value": value, "type": kind}])
+        for value, kind in VALUES:
+            value = nested if value == "nested" else value
+            client.send(op="setParameters", parameters=3 * [{"name": name, "value": value, "type": kind}])
+            client._connection.send(f'{{"op":"setParameters","parameters":[{{"name":"{name}","value":1e400}}]}}')
             bench.run(2)
         assert all("\n" not in line for line in caplog.messages)
         bench.asked.clear()

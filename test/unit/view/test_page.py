@@ -1,8 +1,10 @@
 """The page of a robot on a bus, by a page without a browser."""
 
+import socket
 from contextlib import closing
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -144,7 +146,7 @@ def test_the_pad_drives_while_it_is_pressed(bench):
     assert xs[-1] == 0.0 and xs.count(0.0) == 1
 
 
-@pytest.mark.parametrize("way", ["silent", "closed"])
+@pytest.mark.parametrize("way", ["silent", "closed", "half closed", "presses on", "without its life"])
 def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
     bench.run(30)
     command(bench)
@@ -156,10 +158,14 @@ def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
     if way == "closed":
         client.close()
         bench.clients.pop(0)
-    else:
-        client.is_alive = False
+    elif way == "half closed":
+        client._connection.socket.shutdown(socket.SHUT_WR)
+        bench.clients.pop(0)
+    elif way == "without its life":
+        client._life.close()
+    client.is_alive = False
     since = bench.bus.time
-    bench.until(lambda: "no page commands" in bench.content)
+    bench.until(lambda: way == "presses on" and client.hold("ahead") or "no page commands" in bench.content)
     assert bench.bus.time - since < 0.7
     rest = bench.moved.drain()[-1].values
     assert_allclose(rest, [0.5, 0.2, 0.3, *Rotation.from_euler("z", 0.3).as_quat()], atol=1e-9)
@@ -168,6 +174,24 @@ def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
     assert not bench.moved.drain() and not bench.driven.drain()
     bench.clients[-1].click("take control")
     bench.until(lambda: "no page commands" not in bench.content)
+
+
+def test_a_page_that_reloads_commands_no_more(bench):
+    """Also within a second, eight times: what it pressed ends, and others may command."""
+    bench.run(30)
+    for _ in range(8):
+        with opened_page(bench.server.address) as client:
+            bench.clients.insert(0, client)
+            bench.until(lambda: client.is_known and has(bench, "ahead"))  # noqa: B023
+            client.hold("ahead")
+            client.click("take control")
+            client.hold("ahead")
+            bench.run(2)
+        bench.clients.pop(0)
+    bench.until(lambda: "no page commands" in bench.content)
+    bench.run(4)
+    assert bench.driven.drain()[-1].fields["linear"]["x"] == 0.0
+    command(bench)
 
 
 def test_a_reference_is_dragged_in_the_frame_of_its_task(bench):
@@ -219,6 +243,13 @@ def test_a_page_without_control_changes_nothing_of_others(bench):
         bench.until(lambda: "/drag/hands/left" in other.positions)
         assert client.positions.get("/drag/hands/left") == before
         assert_allclose(other.positions["/drag/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
+        for label, content in (("life", "abort"), ("life", "stop"), ("base", ""), ("give it back", True)):
+            other.change(label, content)
+        for label in ("EMERGENCY STOP", "speed [m/s]", "life", "give it back", "ahead"):
+            for frequency in (10.0, 0.0, -1.0, 1e308):
+                other.send(_messages.GuiButtonHoldMessage(other.find(label), frequency))
+        for kind in (_messages.TransformControlsDragStartMessage, _messages.TransformControlsDragEndMessage):
+            other.send(kind("/drag/hands/left"))
     client.hold("ahead")
     bench.run(4)
     assert {message.fields["linear"]["x"] for message in bench.driven.drain()} == {0.1}
@@ -229,8 +260,9 @@ def test_numbers_of_a_page_stay_in_the_range_of_their_slider(bench):
     bench.run(30)
     command(bench)
     client = bench.clients[0]
-    numbers = {1e9: 0.5, -0.5: 0.02, 1e308: 0.5, 2**62: 0.5, np.nan: 0.1, np.inf: 0.1, "1": 0.1, True: 0.1, 0.3: 0.3}
-    for number, expected in numbers.items():
+    numbers = {0.5: (1e9, 1e308, 2**62, 2**64 - 1), 0.02: (-0.5, -0.0, 1e-320, -(2**63)), 0.3: (0.3,)}
+    numbers[0.1] = (np.nan, np.inf, "1", "1e400", b"1", True, None, [0.3], {"value": 0.3}, msgspec.msgpack.Ext(5, b"1"))
+    for number, expected in ((number, expected) for expected, those in numbers.items() for number in those):
         client.change("speed [m/s]", 0.1)
         client.change("speed [m/s]", number)
         client.hold("ahead")
@@ -240,8 +272,68 @@ def test_numbers_of_a_page_stay_in_the_range_of_their_slider(bench):
     drag = _messages.TransformControlsUpdateMessage
     for place in ((1e308, 0.0, 0.0), (np.nan, 0.0, 0.0), (50.0, 0.0, 0.0)):
         client.send(drag("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), place))
+    for quaternion in (
+        (0.0, 0.0, 0.0, 0.0),
+        (1e308, 1e308, 0.0, 0.0),
+        (1e-320, 0.0, 0.0, 0.0),
+        (np.nan, 0.0, 0.0, 1.0),
+    ):
+        client.send(drag("/drag/hands/left", quaternion, (0.6, 0.1, 0.4)))
+        bench.run(2)
     bench.run(4)
     assert not bench.moved.drain()
+
+
+OTHER_VALUES = {
+    "base": ("evil", "", "../hands", "hands\0", 60_000 * "x", 0, ["hands"], None),
+    "column": ("evil", 0, ["centre of mass/z [m]"], 60_000 * "x", None),
+    "life": ("kill", "", "start\0", 0, True, ["abort"]),
+    "take control": ("", 0, 1, None, [True], 60_000 * "x"),
+    "gain [1/s]": ("4", "nan", [4.0], None, True),
+}
+
+
+@pytest.mark.parametrize("label", OTHER_VALUES)
+def test_values_that_an_input_cannot_have_change_nothing(bench, caplog, label):
+    """Of the page that commands; it drives on."""
+    bench.run(30)
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    command(bench)
+    client = bench.clients[0]
+    before = client.gui[client.find(label)].get("value")
+    for value_ in OTHER_VALUES[label]:
+        client.change(label, value_)
+        client.hold("ahead")
+        bench.run(2)
+    assert bench.driven.drain()[-1].fields["linear"]["x"] == 0.1 and not bench.asked
+    assert bench.clients[1].gui[bench.clients[1].find(label)].get("value") == before
+    assert len(caplog.records) < 5 and "\n" not in "".join(caplog.messages)
+
+
+def test_messages_for_what_is_removed_change_nothing(bench, caplog):
+    """Handles that come and go while they are dragged, and questions that were answered or belong to another page."""
+    client, other = bench.clients
+    bench.run(30)
+    command(bench)
+    for _ in range(5):
+        bench.page._control._handles.pop("/hands/left").remove()
+        for kind in (_messages.TransformControlsDragStartMessage, _messages.TransformControlsDragEndMessage):
+            client.send(kind("/drag/hands/left"))
+        client.send(_messages.TransformControlsUpdateMessage("/drag/gone", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4)))
+        bench.run(2)
+    client.click("EMERGENCY STOP")
+    bench.until(lambda: has(bench, "stop the robot now"))
+    stop = client.find("stop the robot now")
+    other.send(_messages.GuiUpdateMessage(stop, {"value": True}))
+    client.click("cancel")
+    bench.run(4)
+    client.send(_messages.GuiUpdateMessage(stop, {"value": True}))
+    bench.run(4)
+    assert not bench.asked and not bench.moved.drain() and not caplog.records
+    client.click("EMERGENCY STOP")
+    bench.run(4)
+    client.send(_messages.GuiUpdateMessage([*client.gui][-2], {"value": True}))
+    bench.until(lambda: bench.asked == [NoFields()])
 
 
 @pytest.mark.parametrize("bench", [False], indirect=True)
