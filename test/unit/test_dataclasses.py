@@ -7,7 +7,7 @@ import pytest
 
 PACKAGES = Path(__file__).resolve().parents[2] / "src"
 CHANGED = {
-    "solfer_tools/allocations/meter.py": {"LineCost"},
+    "solfer_tools/cli/allocations/meter.py": {"LineCost"},
     "solfer/components/trajectories/follower.py": {"_Course"},
     "solfer/components/wheeled_motion/targets.py": {"Stream"},
     "solfer/config/loading/check.py": {"CheckReport"},

@@ -1,8 +1,8 @@
-"""Studies, by its name of 0.2: it is `solfer_tools.study` now."""
+"""Studies, by its name before 0.2.0: it is `solfer_tools.study` now."""
 
 import sys
 import warnings
 from importlib import import_module
 
-warnings.warn("solfer.study is solfer_tools.study now; this name goes with 0.4", FutureWarning, stacklevel=2)
+warnings.warn("solfer.study is solfer_tools.study now; this name goes with 0.3", FutureWarning, stacklevel=2)
 sys.modules[__name__] = import_module("solfer_tools.study")

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     from solfer.cli.robots import given_robot
     from solfer.errors import raise_all
     from solfer.plugins.generation.check import check_file
-    from solfer_tools.allocations.report import allocations
+    from solfer_tools.cli.allocations.report import allocations
 
     places = {"search_paths": options.search_paths, "system": options.system}
     report = check_file(options.file, options.names, robot=given_robot(options), **places)

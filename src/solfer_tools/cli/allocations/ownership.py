@@ -36,7 +36,7 @@ class Ownership:
         self._component = _home(component)
         self._libraries = {f"{Path(path)}/" for path in (*sysconfig.get_paths().values(), *_installed()) if path}
         # rooms that stand around a plugin here, and not where it works
-        rooms = (*(SOLFER / room for room in ("cli", "middleware", "simulation")), Path(__file__).parents[1])
+        rooms = (*(SOLFER / room for room in ("cli", "middleware", "simulation")), Path(__file__).parents[2])
         self._stand_ins = tuple(f"{room}/" for room in rooms)
         self._known: dict[str, CodeOwner] = {}
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from solfer_tools.allocations.ownership import CodeOwner, Ownership
+from solfer_tools.cli.allocations.ownership import CodeOwner, Ownership
 
 SMALLEST_PIECE = sys.getsizeof(np.empty(0))
 """Smallest piece of memory that counts [bytes]: an array, also one on the memory of another. Numbers are smaller."""

@@ -13,9 +13,9 @@ from solfer.config import Configuration
 from solfer.errors import RecordingError, SimulationError
 from solfer.plugins import Plugin, generate
 from solfer.robot.description.shipped import RobotFiles
-from solfer_tools.allocations.meter import LineCost, LineMeter
-from solfer_tools.allocations.ownership import Ownership
-from solfer_tools.allocations.standing_robot import StandingRobot
+from solfer_tools.cli.allocations.meter import LineCost, LineMeter
+from solfer_tools.cli.allocations.ownership import Ownership
+from solfer_tools.cli.allocations.standing_robot import StandingRobot
 from solfer_tools.cli.recordings.replay import opened
 from solfer_tools.replay.replay import Replay
 from solfer_tools.replay.rows import RecordedRows

@@ -10,9 +10,9 @@ from solfer.cli.robots import given_robot
 from solfer.config import CheckReport, Configuration
 from solfer.errors import ConfigError
 from solfer.plugins.generation.unbuilt import importable_beside
-from solfer_tools.allocations.cycles import CycleMeter, on_recording, on_simulation
-from solfer_tools.allocations.meter import KEPT_BYTES, OFTEN, LineCost
-from solfer_tools.allocations.ownership import SOLFER
+from solfer_tools.cli.allocations.cycles import CycleMeter, on_recording, on_simulation
+from solfer_tools.cli.allocations.meter import KEPT_BYTES, OFTEN, LineCost
+from solfer_tools.cli.allocations.ownership import SOLFER
 
 
 def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
