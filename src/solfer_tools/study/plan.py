@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field, JsonValue
 from pydantic.dataclasses import dataclass as checked
 
+from solfer import errors
 from solfer.config.records.record import parse
 from solfer.config.yaml.files import check_file, read_node
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
@@ -27,8 +28,8 @@ from solfer_tools.study.records import DRAWN_KEYS, StudyRecord, VariationRecord
 from solfer_tools.study.robot import files_of
 from solfer_tools.study.simulated_run import check_tags, configurations_of, function_of, listed, rehearse
 
-CODE_FOLDER = Path(__file__).resolve().parents[1]
-"""Folder of the code; that of `solfer.__init__` may be one of catkin's."""
+CODE_FOLDERS = tuple(Path(file).resolve() for file in (Path(errors.__file__).parent, Path(__file__).parents[1]))
+"""Folders of the code; that of `solfer.__init__` may be one of catkin's."""
 
 CONFIGURATION_KEY = "configuration"
 """First key of a path into the configuration of the plugins; others lead into the study itself."""
@@ -286,7 +287,9 @@ def record_of(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> tuple[Stud
 def code_hash() -> str:
     """Return a hash of the package's Python files, and of the versions of what it works with."""
     contents = [
-        f"{path.relative_to(CODE_FOLDER)} {_file_hash(str(path))}" for path in sorted(CODE_FOLDER.rglob("*.py"))
+        f"{path.relative_to(folder)} {_file_hash(str(path))}"
+        for folder in CODE_FOLDERS
+        for path in sorted(folder.rglob("*.py"))
     ]
     return _hash(*contents, json.dumps(versions(), sort_keys=True))[:16]
 

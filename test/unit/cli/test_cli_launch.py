@@ -12,7 +12,7 @@ from solfer_tools.cli.main import main
 
 LAUNCH = Path(__file__).parents[3] / "launch"
 FILES = sorted(LAUNCH.glob("*.launch"))
-TEMPLATES = sorted((LAUNCH.parent / "src/solfer/cli/templates").glob("*/*.launch.in"))
+TEMPLATES = sorted((LAUNCH.parent / "src/solfer_tools/cli/templates").glob("*/*.launch.in"))
 
 
 @pytest.mark.parametrize("file", [*FILES, *TEMPLATES], ids=lambda file: file.name)

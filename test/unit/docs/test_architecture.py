@@ -21,10 +21,15 @@ def cells(page, table, column):
 
 
 def is_there(name):
-    """Whether a dotted name below `solfer` is a module, or what a module holds."""
-    module, _, attribute = f"solfer.{name}".rpartition(".")
+    """Whether a dotted name below `solfer` or `solfer_tools` is a module, or what a module holds."""
+    return any(is_below(f"{package}.{name}") for package in ("solfer_tools", "solfer"))
+
+
+def is_below(name):
+    """Whether a whole dotted name is there."""
+    module, _, attribute = name.rpartition(".")
     try:
-        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(f"solfer.{name}"))
+        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(name))
     except ModuleNotFoundError:
         return False
 

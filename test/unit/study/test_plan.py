@@ -152,7 +152,7 @@ def test_other_code_makes_other_ids(tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "first.py").write_text("a = 1")
     hashes = [plan.code_hash()]
-    monkeypatch.setattr(plan, "CODE_FOLDER", folder)
+    monkeypatch.setattr(plan, "CODE_FOLDERS", (folder,))
     for text in ("b = 1", "b = 2"):
         plan.code_hash.cache_clear()
         (folder / f"{text[-1]}.py").write_text(text)
@@ -160,4 +160,4 @@ def test_other_code_makes_other_ids(tmp_path, monkeypatch):
     plan.code_hash.cache_clear()
     assert len(set(hashes)) == 3
     monkeypatch.undo()
-    assert (plan.CODE_FOLDER / "study/plan.py").is_file() and plan.code_hash() == hashes[0]
+    assert (plan.CODE_FOLDERS[1] / "study/plan.py").is_file() and plan.code_hash() == hashes[0]

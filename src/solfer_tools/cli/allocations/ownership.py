@@ -6,9 +6,9 @@ from enum import IntEnum
 from pathlib import Path
 from types import ModuleType
 
-import solfer
+from solfer import errors
 
-SOLFER = Path(solfer.__file__).parent
+SOLFER = Path(errors.__file__).parent
 
 
 class CodeOwner(IntEnum):
@@ -63,7 +63,7 @@ class Ownership:
 def _home(module: ModuleType) -> str:
     """Return how the names of the files of a module's package begin."""
     top = sys.modules.get(module.__name__.partition(".")[0])
-    if top in (None, module, solfer) or getattr(top, "__file__", None) is None:
+    if top in (None, module, sys.modules["solfer"]) or getattr(top, "__file__", None) is None:
         return str(module.__file__)
     return f"{Path(str(top.__file__)).parent}/"
 

@@ -29,7 +29,7 @@ class Skeleton:
 
     def __init__(self, kind: str, name: str, folder: Path):
         self.folder, self.package = folder, folder.resolve().name
-        self._templates = files("solfer.cli") / "templates" / kind
+        self._templates = files("solfer_tools.cli") / "templates" / kind
         _check(name, kind)
         _check(self.package, "package")
         if folder.exists() or folder.is_symlink():
