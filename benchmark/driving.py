@@ -67,8 +67,8 @@ from driving_cases.pushes import compare as compare_pushes
 
 from solfer.errors import SolferError, SolferErrors, UnknownName
 from solfer.middleware.memory import read_faults
-from solfer.scenarios import Scenario, read_scenario
 from solfer.supervision import supervise
+from solfer_tools.scenarios import Scenario, read_scenario
 
 
 def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:

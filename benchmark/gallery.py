@@ -26,8 +26,6 @@ from form import Figures, parser_of
 from PIL import Image
 from robots import state_srdf
 
-from solfer.cli.skeletons.collections import EXAMPLES, find_in_collection, folder_of
-from solfer.cli.skeletons.robot import RobotSkeleton, tip_of
 from solfer.components.wheeled_motion.drive import Twist, Vector
 from solfer.config import load
 from solfer.errors import SolferError
@@ -38,6 +36,8 @@ from solfer.plugins import Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.server.publications import robot_parameters
+from solfer_tools.cli.skeletons.collections import EXAMPLES, find_in_collection, folder_of
+from solfer_tools.cli.skeletons.robot import RobotSkeleton, tip_of
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "examples"))
 import wheeled_quadruped

@@ -22,11 +22,11 @@ import numpy as np
 import pinocchio as pin
 from robots import collections, hold, why
 
-from solfer.cli.skeletons.collections import EXAMPLES, PYBULLET, folder_of
 from solfer.errors import MissingDependency, SolferError
 from solfer.model.kinematics import Kinematics
 from solfer.simulation import Simulation, read_bundle
 from solfer.simulation.bullet import differences
+from solfer_tools.cli.skeletons.collections import EXAMPLES, PYBULLET, folder_of
 
 TARGETS, NEEDED, STARTS, STEPS = 20, 18, 20, 80
 NEAR = 1e-4

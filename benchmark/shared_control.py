@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 from form import Figures, parser_of
 
-from solfer.demo.story import MoveJoints, Reply
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
 from solfer.supervision import supervise
 from solfer.transport.messages import JointMessage
+from solfer_tools.demo.story import MoveJoints, Reply
 
 RATES = {"NRT": 200.0, "RT": 500.0}
 """Rates of the layers of config/centauro.yaml [Hz]."""

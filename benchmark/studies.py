@@ -30,10 +30,10 @@ from typing import Any
 
 import numpy as np
 
-from solfer.study import Result, read_study
-from solfer.study.folder import StudyFolder
-from solfer.study.report import write_report
 from solfer.supervision import descendants, supervise
+from solfer_tools.study import Result, read_study
+from solfer_tools.study.folder import StudyFolder
+from solfer_tools.study.report import write_report
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLFER = str(ROOT / "nodes/solfer")
@@ -114,8 +114,8 @@ def kills(folder: Path, runs: int, seed: int) -> dict[str, Any]:
 def overhead(folder: Path, runs: int, seed: int) -> dict[str, Any]:
     """Compare a study with its simulations alone."""
     file = study_file(folder, runs, 30.0, seed=seed)
-    code = "import sys; from solfer.study import read_study; from solfer.study.run import carry_out\n"
-    code += "import os, time; from solfer.study.simulated_run import rehearse\n"
+    code = "import sys; from solfer_tools.study import read_study; from solfer_tools.study.run import carry_out\n"
+    code += "import os, time; from solfer_tools.study.simulated_run import rehearse\n"
     code += "study = read_study(sys.argv[1]); runs = study.plan().runs; rehearse(study.record); total = 0.0\n"
     code += "for run in runs:\n    begin = time.monotonic()\n    child = os.fork()\n    if not child:\n"
     code += "        record, over = study.settings(run.variations)\n"

@@ -3,8 +3,9 @@
 
 Run with `./run exec python tools/structure.py`; `--list` prints what the figures count, one place a line.
 
-Rooms are those of the contract `rooms` in pyproject.toml; a room stands one floor above the highest that it imports
-from. Tokens count neither docstrings nor comments. A constant of a module is an upper-case name that it assigns.
+Rooms are those of the contracts `rooms` and `tools` in pyproject.toml; a room stands one floor above the highest that
+it imports from. Tokens count neither docstrings nor comments. A constant of a module is an upper-case name that it
+assigns.
 """
 
 import argparse
@@ -21,16 +22,17 @@ import grimp
 from importlinter.api import read_configuration
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-SOURCE = REPOSITORY / "src" / "solfer"
+SOURCE = REPOSITORY / "src"
+TRUNK = SOURCE / "solfer"
 MOST_FILES = 13
 """Files of a folder above which it is listed."""
 
 
 def rooms() -> list[str]:
-    """Return the rooms, the highest first."""
+    """Return the rooms, the highest first; those of the tools stand above the trunk."""
     contracts = read_configuration(str(REPOSITORY / "pyproject.toml"))["contracts_options"]
-    layers = next(contract["layers"] for contract in contracts if contract["id"] == "rooms")
-    return list(layers)
+    layers = {contract["id"]: contract["layers"] for contract in contracts if contract["id"] in ("tools", "rooms")}
+    return [*(f"solfer_tools.{room}" for room in layers["tools"]), *(f"solfer.{room}" for room in layers["rooms"])]
 
 
 def arrows(modules: grimp.ImportGraph) -> set[tuple[str, str]]:
@@ -38,8 +40,7 @@ def arrows(modules: grimp.ImportGraph) -> set[tuple[str, str]]:
     names = rooms()
 
     def room_of(module: str) -> str:
-        name = module.removeprefix("solfer.")
-        return next((room for room in names if name == room or name.startswith(f"{room}.")), "")
+        return next((room for room in names if module == room or module.startswith(f"{room}.")), "")
 
     pairs = {
         (room_of(importer), room_of(imported))
@@ -105,8 +106,8 @@ def main() -> None:
                 lists["used once"].append(place)
             if name.lower().lstrip("_").startswith(f"{module.removesuffix('s')}_"):
                 lists["named after their module"].append(place)
-    sys.path.insert(0, str(SOURCE.parent))  # before the messages that catkin makes
-    graph = grimp.build_graph("solfer", exclude_type_checking_imports=True)
+    sys.path.insert(0, str(SOURCE))  # before the messages that catkin makes
+    graph = grimp.build_graph("solfer", "solfer_tools", exclude_type_checking_imports=True)
     pairs = arrows(graph)
     order = {room: index for index, room in enumerate(rooms())}
     lists["arrows that run up"] = [f"{one} -> {other}" for one, other in sorted(pairs) if order[other] < order[one]]
@@ -124,6 +125,7 @@ def main() -> None:
     floor = floors(pairs)
     figures = {
         "lines": sum(text.count("\n") for text in files.values()),
+        "lines of the trunk": sum(text.count("\n") for path, text in files.items() if TRUNK in path.parents),
         "tokens": sum(tokens(text) for text in files.values()),
         "rooms": len(floor),
         "floors": max(floor.values()),

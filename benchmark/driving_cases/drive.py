@@ -15,7 +15,7 @@ from driving_cases.scenario import Goal, ScenarioProfile
 from driving_cases.world import PERIOD, World
 
 from solfer.errors import SolferError
-from solfer.scenarios import Scenario
+from solfer_tools.scenarios import Scenario
 
 EVERY = 4
 """Cycles from one look at the robot to the next."""

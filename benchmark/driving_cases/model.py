@@ -30,8 +30,8 @@ from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.pace.kernel import LATERAL_SPEED
 from solfer.config import load
 from solfer.errors import SolferError
-from solfer.scenarios import Scenario
 from solfer.simulation import read_bundle
+from solfer_tools.scenarios import Scenario
 
 CAUSES = ("speeds", "wheels", "joints", "start", "lift")
 """What slows a course down: speeds that may not be larger; wheels that do not point there yet; joints, and what holds;

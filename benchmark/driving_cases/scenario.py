@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solfer.components.wheeled_motion.references import References
-from solfer.scenarios import Player, Scenario
+from solfer_tools.scenarios import Player, Scenario
 
 
 class Goal(NamedTuple):

@@ -8,11 +8,11 @@ from support.integration.world import CONFIG, ROBOT
 from support.paper.full_control import Nodes
 
 from breaking.sensors import PERIOD, Saying, logged
-from solfer.demo.waving import Waving
 from solfer.middleware.memory import FaultsRecord, MemoryMiddleware, read_faults
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.transport.lower_level import REFUSALS_TOPIC
 from solfer.transport.messages import FieldsMessage
+from solfer_tools.demo.waving import Waving
 
 ALARMS = (
     "leaps by",

@@ -15,11 +15,11 @@ import numpy as np
 from support.paper.full_control import Nodes
 
 from breaking.sensor_faults import COMMANDS, FAULTS, LASTS, MECHANICAL, PERIOD, SENSORS, WHEELS
-from solfer.demo.waving import Waving
 from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
 from solfer.transport.messages import FieldsMessage
+from solfer_tools.demo.waving import Waving
 
 MOTIONS = {"stands": (0.0, 0.0), "drives": (0.2, 0.0), "turns": (0.1, 0.3)}
 """Velocities of the base, ahead and about z [m/s, rad/s]."""

@@ -17,9 +17,9 @@ from sent import Sent
 from std_srvs.srv import Trigger
 from system import START, end, program, started, wait_for
 
-from solfer.cli.main import main
 from solfer.recording.reader import read
 from solfer.srv import MoveJoints
+from solfer_tools.cli.main import main
 
 REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
 sys.path.append(str(REPOSITORY / "test"))

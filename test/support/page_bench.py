@@ -9,14 +9,14 @@ from solfer.interfaces.declaration import Accepted, Service
 from solfer.interfaces.geometry import Pose, Turn, Vector
 from solfer.interfaces.task_references import TaskReferences
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.scene import LiveScene
 from solfer.transport import Inbox, JointMessage
 from solfer.transport.declared.fields import message_of
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import NoFields
 from solfer.transport.parameters import GetParameters, ParametersReply, SetParameters
-from solfer.view import Page, PageServer
+from solfer_tools.scene import LiveScene
+from solfer_tools.view import Page, PageServer
 
 PERIOD = 0.05
 GOAL = Pose(Vector(0.5, 0.2, 0.3), Turn(*Rotation.from_euler("z", 0.3).as_quat()))

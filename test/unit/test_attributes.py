@@ -3,7 +3,7 @@
 import ast
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+PACKAGES = Path(__file__).resolve().parents[2] / "src"
 
 MOST = 15
 """Attributes that a class may assign to itself. Records of tags and compiled functions assign none."""
@@ -37,7 +37,7 @@ def attributes(text):
 
 def test_classes_have_few_attributes():
     counts = {}
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in sorted(PACKAGES.rglob("*.py")):
         counts |= {name: count for name, count in attributes(path.read_text()).items() if count > MOST}
     assert counts == MORE
 

@@ -4,16 +4,16 @@ import ast
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+PACKAGES = Path(__file__).resolve().parents[2] / "src"
 
 
 def module_of(path) -> str:
     """Return the dotted name of a source file; a package has that of its folder."""
-    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    parts = path.relative_to(PACKAGES).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {module_of(path): ast.parse(path.read_text()) for path in PACKAGE.rglob("*.py")}
+MODULES = {module_of(path): ast.parse(path.read_text()) for path in PACKAGES.rglob("*.py")}
 
 
 def statements(node, later, inside=False):

@@ -5,22 +5,22 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+PACKAGES = Path(__file__).resolve().parents[2] / "src"
 CHANGED = {
-    "cli/allocations/meter.py": {"LineCost"},
-    "components/trajectories/follower.py": {"_Course"},
-    "components/wheeled_motion/targets.py": {"Stream"},
-    "config/loading/check.py": {"CheckReport"},
-    "demo/record.py": {"Trace"},
-    "demo/story.py": {"Show"},
-    "middleware/memory/bus.py": {"_Entry"},
-    "middleware/ros/topic_publisher.py": {"SendBacklog"},
-    "middleware/shared_memory/rpc/calls.py": {"_PendingCall"},
-    "middleware/shared_memory/rpc/services.py": {"_Call"},
-    "numerics/solvers/problem.py": {"Problem"},
-    "realtime/schedule.py": {"Schedule"},
-    "replay/replay.py": {"Replay"},
-    "transport/messages.py": {
+    "solfer_tools/cli/allocations/meter.py": {"LineCost"},
+    "solfer/components/trajectories/follower.py": {"_Course"},
+    "solfer/components/wheeled_motion/targets.py": {"Stream"},
+    "solfer/config/loading/check.py": {"CheckReport"},
+    "solfer_tools/demo/record.py": {"Trace"},
+    "solfer_tools/demo/story.py": {"Show"},
+    "solfer/middleware/memory/bus.py": {"_Entry"},
+    "solfer/middleware/ros/topic_publisher.py": {"SendBacklog"},
+    "solfer/middleware/shared_memory/rpc/calls.py": {"_PendingCall"},
+    "solfer/middleware/shared_memory/rpc/services.py": {"_Call"},
+    "solfer/numerics/solvers/problem.py": {"Problem"},
+    "solfer/realtime/schedule.py": {"Schedule"},
+    "solfer_tools/replay/replay.py": {"Replay"},
+    "solfer/transport/messages.py": {
         "BodyMessage",
         "FieldsMessage",
         "ImuMessage",
@@ -48,7 +48,7 @@ def changeable(text: str) -> set[str]:
 
 @pytest.mark.slow
 def test_dataclasses_are_frozen():
-    found = {str(path.relative_to(PACKAGE)): changeable(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
+    found = {str(path.relative_to(PACKAGES)): changeable(path.read_text()) for path in sorted(PACKAGES.rglob("*.py"))}
     assert {file: names for file, names in found.items() if names} == CHANGED
 
 

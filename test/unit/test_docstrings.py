@@ -4,7 +4,7 @@ import ast
 import re
 from pathlib import Path
 
-SOURCE = Path(__file__).parents[2] / "src" / "solfer"
+SOURCE = Path(__file__).parents[2] / "src"
 
 TERMS = set(
     "CDR CENTAURO COLLADA CSV CVIU DIN DOT FER GIF HAMILTONIAN HTML ICAR ICRA IEEE IMU JPL JSON LAPACK MCAP MLESAC NPZ "
@@ -34,7 +34,7 @@ def unknown_words(path: Path) -> list[str]:
 
 def yaml_words() -> set[str]:
     """Return the upper-case words that are values of the configuration, such as `RBDL`."""
-    paths = [path for room in ("config", "model", "robot") for path in (SOURCE / room).rglob("*.py")]
+    paths = [path for room in ("config", "model", "robot") for path in (SOURCE / "solfer" / room).rglob("*.py")]
     texts = (node for path in paths for node in ast.walk(ast.parse(path.read_text())))
     return {node.value for node in texts if isinstance(node, ast.Constant) and isinstance(node.value, str)}
 

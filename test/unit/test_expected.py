@@ -8,7 +8,7 @@ import pytest
 import solfer.errors
 from solfer.errors import SolferError
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+PACKAGES = Path(__file__).resolve().parents[2] / "src"
 ERRORS = {
     name for name, each in vars(solfer.errors).items() if isinstance(each, type) and issubclass(each, SolferError)
 }
@@ -43,8 +43,8 @@ def passed_on(argument):
 
 @pytest.mark.slow
 def test_errors_say_what_was_expected():
-    files = sorted(PACKAGE.rglob("*.py"))
-    found = {str(path.relative_to(PACKAGE)): silent(ast.parse(path.read_text())) for path in files}
+    files = sorted(PACKAGES.rglob("*.py"))
+    found = {str(path.relative_to(PACKAGES)): silent(ast.parse(path.read_text())) for path in files}
     assert files and {path: lines for path, lines in found.items() if lines} == {}
 
 

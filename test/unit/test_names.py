@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PACKAGE = REPOSITORY / "src" / "solfer"
+PACKAGES = REPOSITORY / "src"
 
 
 def public_classes(folder: Path) -> dict[str, list[str]]:
@@ -23,7 +23,7 @@ def public_classes(folder: Path) -> dict[str, list[str]]:
 
 @pytest.mark.slow
 def test_no_public_class_name_twice():
-    assert {name: files for name, files in public_classes(PACKAGE).items() if len(files) > 1} == {}
+    assert {name: files for name, files in public_classes(PACKAGES).items() if len(files) > 1} == {}
 
 
 def test_same_name_in_two_files_is_found(tmp_path):

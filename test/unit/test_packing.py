@@ -3,7 +3,7 @@
 import ast
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+PACKAGES = Path(__file__).resolve().parents[2] / "src"
 MOST = 0.03
 """Share of assignments that may pack values: those that depend on each other, and constants with one description."""
 
@@ -18,7 +18,7 @@ def packed(text):
 
 
 def test_assignments_pack_no_values():
-    counts = [packed(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))]
+    counts = [packed(path.read_text()) for path in sorted(PACKAGES.rglob("*.py"))]
     assignments, several = (sum(column) for column in zip(*counts, strict=True))
     assert assignments > 10_000 and several < MOST * assignments
 

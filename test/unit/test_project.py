@@ -14,8 +14,8 @@ else:
     import tomli as tomllib  # pytest brings it along
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = REPOSITORY / "src" / "solfer"
-ROS = {SOURCES / "middleware" / "ros", SOURCES / "ros_view"}
+SOURCES = REPOSITORY / "src"
+ROS = {SOURCES / "solfer/middleware/ros", SOURCES / "solfer_tools/ros_view", SOURCES / "solfer/ros_statistics.py"}
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 NAMES = {
@@ -42,8 +42,8 @@ def imported(path: Path) -> set[str]:
 
 @pytest.mark.slow
 def test_what_is_imported_is_declared_and_nothing_else():
-    files = [path for path in SOURCES.rglob("*.py") if not ROS & set(path.parents)]
-    others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}
+    files = [path for path in SOURCES.rglob("*.py") if not ROS & {path, *path.parents}]
+    others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer", "solfer_tools"}
     used = (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"], *EXTRAS["study"], *EXTRAS["view"])
     declared = {Requirement(text).name for text in used}
     assert {NAMES.get(name, name) for name in others} == declared
@@ -67,7 +67,7 @@ def test_every_kernel_is_compiled_at_the_installation():
     begin = script.index("compile_kernels() (")
     text = script[begin : script.index("\n)\n", begin)]
     compiled = {
-        ".".join(path.relative_to(SOURCES.parent).with_suffix("").parts)
+        ".".join(path.relative_to(SOURCES).with_suffix("").parts)
         for path in SOURCES.rglob("*.py")
         if re.search(r"^\w+ = cached\(", path.read_text(), re.MULTILINE)
     }

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-SOURCE = Path(__file__).parents[2] / "src/solfer"
+SOURCE = Path(__file__).parents[2] / "src"
 
 NOWHERE = re.compile(r"\b(?:told|tells?|hears?|heard|wanted|anew|nobody|somebody|someone|whoever)\b", re.IGNORECASE)
 """In no name, docstring or text."""

@@ -1,6 +1,6 @@
-"""The `solfer` command.
+"""The `solfer` command, with the sub-commands of the trunk; `solfer_tools.cli.main` adds its own.
 
-A sub-command is a module of this package: the first line of its docstring is its help, `add_arguments(parser)` declares
+A sub-command is a module: the first line of its docstring is its help, `add_arguments(parser)` declares
 its arguments, and `run(options)` does the work and returns the exit code. Where it has sub-commands of its own, each
 sets `parser` to its own, which prints the usage after a mistake. Imports that only one sub-command needs stand in its
 `run`, so that the others start without them.
@@ -10,47 +10,29 @@ import argparse
 import io
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 
 from solfer.errors import SolferError, singles
 
-SUB_COMMANDS = {
-    "check": "commands.check",
-    "show": "commands.show",
-    "list": "commands.listing",
-    "graph": "commands.graph",
-    "launch": "commands.launch",
-    "new": "commands.new",
-    "cut": "commands.cut",
-    "rt": "commands.rt",
-    "params": "commands.params",
-    "scenario": "commands.scenario",
-    "study": "commands.study",
-    "top": "commands.top",
-    "view": "commands.view",
-    "record": "rt.record",
-    "compare": "commands.recordings.compare",
-    "plot": "commands.recordings.plot",
-    "replay": "commands.recordings.replay",
-    "log": "commands.recordings.log",
-    "completion": "commands.completion",
+COMMANDS = {
+    "check": "solfer.cli.commands.check",
+    "show": "solfer.cli.commands.show",
+    "list": "solfer.cli.commands.listing",
+    "rt": "solfer.cli.commands.rt",
+    "record": "solfer.cli.rt.record",
 }
-"""Modules of the sub-commands, below this package."""
+"""Modules of the sub-commands."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, commands: Mapping[str, str] = COMMANDS) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
     words = sys.argv[1:] if arguments is None else list(arguments)
-    if "_ARGCOMPLETE" in os.environ:
-        from solfer.cli.completion import complete
-
-        complete(parser())
     _open_streams()
     try:
         try:
-            return _run(words)
+            return _run(words, commands)
         finally:
             sys.stdout.flush()
     except BrokenPipeError:  # the reader, such as `head`, has ended
@@ -84,10 +66,10 @@ def _open_streams() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-def _run(words: Sequence[str]) -> int:
+def _run(words: Sequence[str], commands: Mapping[str, str]) -> int:
     """Run a command; see `main`."""
     # a parser of one command is there in a fifth of the time: an emergency stop waits for it
-    known = words[:1] if words and words[0] in SUB_COMMANDS else SUB_COMMANDS
+    known = {words[0]: commands[words[0]]} if words and words[0] in commands else commands
     options, unknown = parser(known).parse_known_args(words)
     if unknown:  # the sub-command prints its usage; the root's parser knows only the names of commands
         options.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -104,17 +86,17 @@ def _run(words: Sequence[str]) -> int:
         return error.exit_code
 
 
-def parser(names: Iterable[str] = SUB_COMMANDS) -> argparse.ArgumentParser:
+def parser(modules: Mapping[str, str] = COMMANDS) -> argparse.ArgumentParser:
     """Build the parser of the command line, with some of the sub-commands."""
     parser = argparse.ArgumentParser(
         prog="solfer",
         description="Tools for robots and their configurations. None but `params` and `top` need a ROS master.",
     )
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for name in names:
-        module = import_module(f"solfer.cli.{SUB_COMMANDS[name]}")
+    group = parser.add_subparsers(metavar="COMMAND", required=True)
+    for name, path in modules.items():
+        module = import_module(path)
         summary, _, text = (module.__doc__ or "").partition("\n")
-        command = commands.add_parser(
+        command = group.add_parser(
             name, help=summary, description=f"{summary}\n{text}".strip(),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )  # fmt: skip

@@ -95,3 +95,14 @@ def add_robot_files(parser: argparse.ArgumentParser, source: bool = False) -> No
             help="a robot of example-robot-data, pybullet_data or robot_descriptions",
         )
     parser.add_argument("--srdf", type=Path, metavar="FILE", help="the robot's SRDF")
+
+
+SECONDS = Number(0.01, 86400.0, "seconds")
+
+
+def add_times(parser: argparse.ArgumentParser) -> None:
+    """Declare when tables are printed."""
+    parser.add_argument("--once", action="store_true", help="print the table once instead of again and again")
+    parser.add_argument(
+        "--every", type=SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
+    )

@@ -3,20 +3,32 @@
 import argparse
 import logging
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from solfer.cli.diagram import Network, connect
-from solfer.cli.diagram.network import Declared
-from solfer.cli.pipes import received
 from solfer.config import CheckReport, Configuration, check
 from solfer.errors import ConfigError, SolferError, raise_all
 from solfer.interfaces.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
-from solfer.plugins.sharing.groups import conflicts, robot_groups
 from solfer.robot import robot_files
 
 _LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a component declares besides its pipes.
+
+    Attributes:
+        kind: `service`, `topic in`, `topic out`, `action` or `parameter`.
+        name: Its whole name.
+        interface: `package/Type`, or the type of a parameter.
+    """
+
+    kind: str
+    name: str
+    interface: str
 
 
 def report_of(options: argparse.Namespace) -> CheckReport:
@@ -128,23 +140,3 @@ def _printed(owner: str, declaration: Declaration) -> Declared:
         Parameter: "parameter",
     }
     return Declared(kinds[type(declaration)], full_name(owner, declaration.name), interface)
-
-
-def network_of(file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()) -> Network:
-    """Build the network of a file's plugins; see `check` for the arguments.
-
-    Raises:
-        SolferError: One of the configurations is wrong.
-        SolferErrors: Several mistakes.
-    """
-    report = checked(file, names, system, search_paths=search_paths)
-    raise_all(report.errors)
-    configurations = list(configurations_of(report))
-    groups = {name: robot_groups(each.configurations) for name, each in report.shared.items()}
-    raise_all([error for each in groups.values() for group in each for error in conflicts(group, received=received)])
-    shared = {
-        name: tuple(tuple(dict.fromkeys(member.module.name for member in group)) for group in each)
-        for name, each in groups.items()
-    }
-    declarations = [known_declarations(each) for each in configurations]
-    return connect(configurations, [component_of(each) for each in configurations], shared, declared=declarations)

@@ -1,13 +1,8 @@
-"""Studies: many simulated runs of one configuration, on one machine or on many ([studies.md](docs/how-to/studies.md)).
+"""Studies, by its name before 0.2.0: it is `solfer_tools.study` now."""
 
-`read_study` reads the file of a study, `run` makes one simulated run, and `SimulatedRun` is a run for a loop of one's
-own.
-"""
+import sys
+import warnings
+from importlib import import_module
 
-from solfer.study.plan import Plan, PlannedRun, Study, read_study
-from solfer.study.records import StudyRecord
-from solfer.study.result import Result
-from solfer.study.run import run
-from solfer.study.simulated_run import SimulatedRun
-
-__all__ = ["Plan", "PlannedRun", "Result", "SimulatedRun", "Study", "StudyRecord", "read_study", "run"]
+warnings.warn("solfer.study is solfer_tools.study now; this name goes with 0.3", FutureWarning, stacklevel=2)
+sys.modules[__name__] = import_module("solfer_tools.study")

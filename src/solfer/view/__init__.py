@@ -1,17 +1,8 @@
-"""A live page in the browser: a robot and its plugins, from a scene and from what a middleware offers."""
+"""The page in the browser, by its name before 0.2.0: it is `solfer_tools.view` now."""
 
-from solfer.errors import MissingDependency
+import sys
+import warnings
+from importlib import import_module
 
-try:
-    import viser  # noqa: F401
-except ModuleNotFoundError as error:
-    raise MissingDependency(
-        f"the page in the browser needs viser, and there is no module '{error.name}'",
-        expected="pip install -r requirements-view.txt",
-    ) from error
-
-from solfer.view.page import Page
-from solfer.view.playback import Playback
-from solfer.view.server import PageServer
-
-__all__ = ["Page", "PageServer", "Playback"]
+warnings.warn("solfer.view is solfer_tools.view now; this name goes with 0.3", FutureWarning, stacklevel=2)
+sys.modules[__name__] = import_module("solfer_tools.view")

@@ -9,11 +9,11 @@ import pybullet_data
 import pytest
 import yaml
 
-from solfer.cli.main import main
 from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
 from solfer.simulation.server.publications import robot_parameters
+from solfer_tools.cli.main import main
 
 URDF = Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf"
 

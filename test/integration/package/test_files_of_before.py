@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.processes import SOURCES
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 FILES = Path(__file__).parents[2] / "data/0.2.0"
 

@@ -7,13 +7,13 @@ import pybullet_data
 import pytest
 import yaml
 
-from solfer.cli.main import main
 from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.plugins import PluginState, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.server.publications import robot_parameters
+from solfer_tools.cli.main import main
 
 COLLECTION = Path(pybullet_data.getDataPath())
 

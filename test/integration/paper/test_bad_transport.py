@@ -8,7 +8,7 @@ import pytest
 from support.paper.full_control import FRAME, PERIOD, Layer, Nodes, course
 
 from solfer.middleware.memory import read_faults
-from solfer.scenarios import Player, read_scenario
+from solfer_tools.scenarios import Player, read_scenario
 
 COURSE = course(0.4, 0.6, 0.25, 0.4)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from solfer.demo import centauro, report, story
-from solfer.demo.record import MotionRecorder
 from solfer.middleware.memory import MemoryMiddleware
+from solfer_tools.demo import centauro, report, story
+from solfer_tools.demo.record import MotionRecorder
 
 
 @pytest.fixture

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from support.paper.full_control import Nodes, course
 
-from solfer.demo import centauro, driving, driving_report
-from solfer.demo.driving_record import DrivingRecorder
-from solfer.demo.film import film
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.recording.model import COLUMNS_KIND, Channel, Recording
 from solfer.simulation.world.world import FLAT_WORLD
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
+from solfer_tools.demo import centauro, driving, driving_report
+from solfer_tools.demo.driving_record import DrivingRecorder
+from solfer_tools.demo.film import film
 
 COURSE = course(0.3, 0.5, 0.15, 0.25)
 

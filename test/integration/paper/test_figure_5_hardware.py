@@ -7,7 +7,7 @@ import pytest
 from support.paper.full_control import HardwareNodes, course
 
 from solfer.plugins import PluginState
-from solfer.scenarios import read_scenario
+from solfer_tools.scenarios import read_scenario
 
 COURSE = course(0.3, 0.0, 0.15, 0.25)
 

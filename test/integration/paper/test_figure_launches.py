@@ -9,7 +9,7 @@ from rosgraph.names import resolve_name
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 REPOSITORY = Path(__file__).parents[3]
 

@@ -9,8 +9,8 @@ from support.plugins.plugin_claims import kill, owners
 
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import CycleTrace, PluginState
-from solfer.scenarios import read_scenario
 from solfer.transport.messages import FieldsMessage
+from solfer_tools.scenarios import read_scenario
 
 CYCLE = [
     "hands reads link_side_online",

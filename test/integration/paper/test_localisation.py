@@ -9,7 +9,7 @@ from support.paper.full_control import Nodes
 from support.unit.correction import Correction
 
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.navigation import DriveLimits, Navigation, Waypoint, WaypointCourse, WaypointFollower
+from solfer_tools.navigation import DriveLimits, Navigation, Waypoint, WaypointCourse, WaypointFollower
 
 WAYPOINTS = Waypoint(2.4, 1.2), Waypoint(2.5, 1.6, 0.8)
 """In the map, where the robot stands at (2, 1) m, with a heading of 0.5 rad, as the localisation is on average."""

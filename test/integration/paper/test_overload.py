@@ -9,7 +9,7 @@ from support.paper.full_control import Nodes, course
 
 from solfer.middleware.memory import Bus
 from solfer.plugins import PluginState
-from solfer.scenarios import read_scenario
+from solfer_tools.scenarios import read_scenario
 
 DRIVES, STARVED, LATER = 2.5, 3.0, 2.5
 """Time before the computer is busy, while it is, and after that [s]."""

@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose
 from support.integration.world import CONFIG
 from support.plugins.plugin import configuration
 
-from solfer.cli.main import main
 from solfer.errors import PipeError, SolferError, UnknownName
 from solfer.plugins import PluginState, check_file
+from solfer_tools.cli.main import main
 
 WHEELS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
 ROBOT = {"class": "support.plugins.contact_pipes:Watcher", "kinematics": True, "controller": []}

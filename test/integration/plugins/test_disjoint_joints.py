@@ -6,7 +6,6 @@ import pybullet_data
 import pytest
 import yaml
 
-from solfer.cli.main import main
 from solfer.config import load
 from solfer.errors import ClaimRefused
 from solfer.middleware.memory import Bus, MemoryMiddleware
@@ -14,6 +13,7 @@ from solfer.model import Description
 from solfer.plugins import PluginState, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.server.publications import robot_parameters
+from solfer_tools.cli.main import main
 
 URDF = Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf"
 JOINTS = tuple(joint.name for joint in Description.from_file(URDF).moving_joints)

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from support.integration.world import CONFIG, World
 
-from solfer.cli.main import main
-from solfer.cli.params import callers
 from solfer.components.gravity_compensation import GravityCompensation
 from solfer.components.ground_forces import GroundForces
 from solfer.components.inverse_dynamics import InverseDynamics
@@ -22,6 +20,8 @@ from solfer.config import load
 from solfer.config.records.live import live_fields
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry
+from solfer_tools.cli.main import main
+from solfer_tools.cli.params import callers
 
 KINEMATICS = "solfer.components.inverse_kinematics:InverseKinematics"
 ODOMETRY = "solfer.components.odometry:Odometry"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from solfer import Robot
-from solfer.cli.skeletons.robot import RobotSkeleton
 from solfer.config import load
 from solfer.interfaces.trajectories import (
     FOLLOW,
@@ -25,6 +24,7 @@ from solfer.plugins import Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.server.publications import robot_parameters
 from solfer.transport.declared import ActionClient, GoalStatus
+from solfer_tools.cli.skeletons.robot import RobotSkeleton
 
 ROBOTS = distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")
 URDF = Path(str(ROBOTS), "panda_description/urdf/panda.urdf")

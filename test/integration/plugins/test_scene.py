@@ -8,7 +8,7 @@ from support.integration.world import ROBOT, World
 
 from solfer import Robot
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.scene import LiveScene
+from solfer_tools.scene import LiveScene
 
 
 def test_the_scene_is_what_the_simulation_does():

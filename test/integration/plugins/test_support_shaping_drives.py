@@ -11,7 +11,7 @@ from solfer import Robot
 from solfer.config import load_shared
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginSet, PluginState, Registry, generate_shared
-from solfer.scene import LiveScene
+from solfer_tools.scene import LiveScene
 
 
 class Shaped(World):

@@ -6,7 +6,7 @@ import pytest
 from support.integration.xbot_system import REPOSITORY, WAIT, until
 from support.integration.xbot_system import system as made
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 CONFIG = REPOSITORY / "config" / "centauro.yaml"
 SINK = "velocity_controller:\n        sink: /command"

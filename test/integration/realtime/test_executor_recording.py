@@ -12,12 +12,12 @@ from support.integration.world import CONFIG
 from support.integration.xbot_system import REPOSITORY, WHEELS, System, system, until
 from support.realtime.executor_faults import SPEED, begin
 
-from solfer.cli.main import main
 from solfer.errors import RecordingError, UnknownName
 from solfer.plugins import PluginState
 from solfer.recording.model import Recording
 from solfer.recording.reader import read
 from solfer.telemetry.statistics import LoopCount
+from solfer_tools.cli.main import main
 
 WAIT = 60.0  # [s]
 RATE = 500.0  # [Hz]

@@ -10,13 +10,13 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from solfer.cli.main import main
 from solfer.errors import RecordingError
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
 from solfer.segments.namespace import Namespace
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.recordings import FileRecorder, place_beside
+from solfer_tools.cli.main import main
 
 WAIT = 30.0  # [s]
 

@@ -6,7 +6,6 @@ from contextlib import closing
 import numpy as np
 from support.integration.world import CONFIG
 
-from solfer.cli.main import main
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, generate
@@ -17,6 +16,7 @@ from solfer.recording.writer import RecordingWriter
 from solfer.telemetry.black_box import BlackBox
 from solfer.telemetry.drain import RecordDrain
 from solfer.transport.middleware import SEED
+from solfer_tools.cli.main import main
 
 PLUGIN = "joint_states"
 

@@ -16,7 +16,6 @@ from pathlib import Path
 import pytest
 from support.integration.xbot_system import until
 
-from solfer.cli.main import main
 from solfer.errors import SolferError
 from solfer.interfaces.declaration import Service
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
@@ -26,6 +25,7 @@ from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.transport import Inbox
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import NoFields
+from solfer_tools.cli.main import main
 
 ALICE, BOB, MALLORY = 61001, 61002, 61003
 ROBOTS, OTHERS = 61010, 61011

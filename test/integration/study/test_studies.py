@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 from support.unit.studies import CONFIG, made, written
 
-from solfer.study import SimulatedRun, run
-from solfer.study.folder import StudyFolder
 from solfer.supervision import descendants
+from solfer_tools.study import SimulatedRun, run
+from solfer_tools.study.folder import StudyFolder
 
 SOLFER = CONFIG.parent / "nodes/solfer"
 

@@ -16,9 +16,9 @@ from support.page import view  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.robot.description.shipped import robot_of  # noqa: E402
-from solfer.scene import LiveScene  # noqa: E402
-from solfer.study import SimulatedRun, read_study  # noqa: E402
-from solfer.view import Page, PageServer  # noqa: E402
+from solfer_tools.scene import LiveScene  # noqa: E402
+from solfer_tools.study import SimulatedRun, read_study  # noqa: E402
+from solfer_tools.view import Page, PageServer  # noqa: E402
 
 pytestmark = [pytest.mark.soak, pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")]
 

@@ -17,10 +17,10 @@ from solfer.recording.model import JOINTS_KIND, Channel  # noqa: E402
 from solfer.recording.reader import read  # noqa: E402
 from solfer.recording.writer import RecordingWriter  # noqa: E402
 from solfer.robot.description.shipped import robot_of  # noqa: E402
-from solfer.scene import LiveScene  # noqa: E402
-from solfer.study import SimulatedRun, read_study  # noqa: E402
 from solfer.telemetry.rows import RowLayout  # noqa: E402
-from solfer.view import Page, PageServer, Playback  # noqa: E402
+from solfer_tools.scene import LiveScene  # noqa: E402
+from solfer_tools.study import SimulatedRun, read_study  # noqa: E402
+from solfer_tools.view import Page, PageServer, Playback  # noqa: E402
 
 pytestmark = pytest.mark.slow
 

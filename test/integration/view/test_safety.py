@@ -18,8 +18,8 @@ from websockets.exceptions import InvalidStatus  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.middleware.memory import MemoryMiddleware  # noqa: E402
-from solfer.scene import LiveScene  # noqa: E402
-from solfer.view import Page, PageServer  # noqa: E402
+from solfer_tools.scene import LiveScene  # noqa: E402
+from solfer_tools.view import Page, PageServer  # noqa: E402
 
 pytestmark = pytest.mark.slow
 

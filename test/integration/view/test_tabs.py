@@ -11,7 +11,7 @@ from support.page import opened_page  # noqa: E402
 
 from solfer.config.records.live import live_fields  # noqa: E402
 from solfer.middleware.memory import MemoryMiddleware  # noqa: E402
-from solfer.view import Page, PageServer  # noqa: E402
+from solfer_tools.view import Page, PageServer  # noqa: E402
 
 COMPONENTS = {
     "joint_states": None,

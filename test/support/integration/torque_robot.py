@@ -11,7 +11,6 @@ import pytest
 import yaml
 from support.integration.carried import with_other_masses
 
-from solfer.cli.main import main
 from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Plugin, Registry, generate
@@ -19,6 +18,7 @@ from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.server.publications import robot_parameters
+from solfer_tools.cli.main import main
 
 ROBOTS = "cmeel.prefix/share/example-robot-data/robots/"
 FRICTION = 0.7

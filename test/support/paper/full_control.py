@@ -7,14 +7,14 @@ from support.simulation.hardware_plugin import mocked
 
 from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
-from solfer.demo.waving import FRAME, HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
-from solfer.navigation import Navigation, ScenarioCourse
 from solfer.plugins import PluginSet, Registry, generate, generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorTelemetry
-from solfer.scenarios import Player, Scenario
+from solfer_tools.demo.waving import FRAME, HANDS, Waving
+from solfer_tools.navigation import Navigation, ScenarioCourse
+from solfer_tools.scenarios import Player, Scenario
 
 STANCE = "\n".join(f"{axis} cp: [0.0, 0.0, 0.0, 0.0]\n{axis} cp ref: [[0.0, 0.0, 0.0, 0.0]]" for axis in "xyz")
 

@@ -14,18 +14,18 @@ from support.integration.world import CONFIG, STEP, World
 
 from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
-from solfer.demo.driving import COURSE_RATE
-from solfer.demo.waving import Waving
 from solfer.middleware.bridge import Bridge
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.navigation import Navigation, ScenarioCourse
 from solfer.plugins import PluginSet, Registry, generate, generate_shared
 from solfer.plugins.outputs.start_blend import SHORTEST
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
-from solfer.scenarios import Player, read_scenario
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, Flag
+from solfer_tools.demo.driving import COURSE_RATE
+from solfer_tools.demo.waving import Waving
+from solfer_tools.navigation import Navigation, ScenarioCourse
+from solfer_tools.scenarios import Player, read_scenario
 
 COURSE = CONFIG / "figures" / "course.yaml"
 PLUGINS_RATE = 200.0

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.navigation.course import CORRECTION_TIME
+from solfer_tools.navigation.course import CORRECTION_TIME
 
 
 class Correction:

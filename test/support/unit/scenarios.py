@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from solfer.scenarios import Scenario, read_scenario
+from solfer_tools.scenarios import Scenario, read_scenario
 
 RELATIVE = """
     base now: [0.0, 0.0, 0.0, 0.0]

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from solfer.study import Study, read_study
+from solfer_tools.study import Study, read_study
 
 CONFIG = Path(__file__).parents[3] / "config"
 

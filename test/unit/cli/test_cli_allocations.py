@@ -1,4 +1,4 @@
-"""`solfer check --allocations`: which lines take memory in a cycle, on a recording and on the simulated robot."""
+"""`solfer allocations`: which lines take memory in a cycle, on a recording and on the simulated robot."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ from support.recording import reach
 from support.recording.sine import recorded, tree
 from support.unit.cart import URDF
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 REACH = "support.recording.reach:Reach"
 CLEAN = "support.recording.reach:Clean"
@@ -24,7 +24,7 @@ def recording(tmp_path):
 
 
 def check(folder, *more):
-    return main(["check", str(folder / "main.yaml"), "-n", "first", "--allocations", *map(str, more)])
+    return main(["allocations", str(folder / "main.yaml"), "-n", "first", *map(str, more)])
 
 
 def row_of(text, output):
@@ -76,5 +76,5 @@ def test_recording_that_is_too_short_is_refused(tmp_path, capsys):
 
 def test_allocations_of_no_plugin_are_refused(tmp_path, capsys):
     loaded(tmp_path, tree(CLEAN), ("first",))
-    assert main(["check", str(tmp_path / "main.yaml"), "--allocations"]) == 2
+    assert main(["allocations", str(tmp_path / "main.yaml")]) == 2
     assert "expected: -n NAME" in capsys.readouterr().err

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 CONFIG = Path(__file__).parents[3] / "config"
 CENTAURO = CONFIG / "centauro.yaml"
@@ -168,7 +168,7 @@ def test_unusable_arguments_are_reported(arguments, message, capsys):
 @pytest.mark.slow
 def test_it_needs_neither_the_simulation_nor_ros():
     program = (
-        "import sys; from solfer.cli.main import main; "
+        "import sys; from solfer_tools.cli.main import main; "
         f"main(['check', {str(CENTAURO)!r}]); "
         "sys.exit(' '.join({'pybullet', 'rospy', 'matplotlib'} & sys.modules.keys()) or 0)"
     )

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from solfer.cli.completion import finder
-from solfer.cli.main import SUB_COMMANDS, main, parser
 from solfer.config import module_names
+from solfer_tools.cli.completion import finder
+from solfer_tools.cli.main import ALL_COMMANDS, main, parser
 
 REPOSITORY = Path(__file__).parents[3]
 MODULES = module_names(REPOSITORY / "config/centauro.yaml")
@@ -23,7 +23,7 @@ def folder(monkeypatch):
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
-        ("", sorted(SUB_COMMANDS)),
+        ("", sorted(ALL_COMMANDS)),
         ("ch", ["check"]),
         ("list jo", ["joints"]),
         ("check config/cen", ["config/centauro.yaml"]),

@@ -11,13 +11,12 @@ import yaml
 from support.plugins.fleet import tree
 from support.unit.cart import URDF
 
-from solfer.cli.diagram import Network, dot_text, plain_text
-from solfer.cli.diagram.network import LOWER_LEVEL_END, SENSORS, Arrow, End, Kind, PluginBox
-from solfer.cli.main import main
-from solfer.cli.plugins import network_of
 from solfer.components import Component, Port, TopicIn, TopicOut
 from solfer.errors import SolferErrors
 from solfer.interfaces.geometry import Header, Vector
+from solfer_tools.cli.diagram import Network, dot_text, network_of, plain_text
+from solfer_tools.cli.diagram.network import LOWER_LEVEL_END, SENSORS, Arrow, End, Kind, PluginBox
+from solfer_tools.cli.main import main
 
 CENTAURO = Path(__file__).parents[3] / "config" / "centauro.yaml"
 FIGURE_5 = Path(__file__).parents[2] / "data" / "graph_shared.yaml"
@@ -149,7 +148,7 @@ def test_graphviz_draws_every_plugin_and_every_arrow(figure_4, tmp_path):
 def test_strange_names_survive_graphviz(tmp_path):
     strange = End(Kind.TOPIC, 'a "quoted" \\ <topic>')
     network = Network("SM", (box("one"),), (Arrow(strange, plugin("one"), "p<i>pe & co"),))
-    from solfer.cli.diagram import draw
+    from solfer_tools.cli.diagram import draw
 
     draw(dot_text(network), tmp_path / "strange.svg")
     texts = [text.text for text in ElementTree.parse(tmp_path / "strange.svg").getroot().iter() if text.text]

@@ -7,12 +7,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from solfer.cli.commands.launch import known_to, started
-from solfer.cli.main import main
+from solfer_tools.cli.commands.launch import known_to, started
+from solfer_tools.cli.main import main
 
 LAUNCH = Path(__file__).parents[3] / "launch"
 FILES = sorted(LAUNCH.glob("*.launch"))
-TEMPLATES = sorted((LAUNCH.parent / "src/solfer/cli/templates").glob("*/*.launch.in"))
+TEMPLATES = sorted((LAUNCH.parent / "src/solfer_tools/cli/templates").glob("*/*.launch.in"))
 
 
 @pytest.mark.parametrize("file", [*FILES, *TEMPLATES], ids=lambda file: file.name)
@@ -95,7 +95,7 @@ def test_a_missing_rviz_is_one_error(monkeypatch, capsys):
 
 
 def test_a_missing_page_is_one_error(monkeypatch, capsys):
-    monkeypatch.setattr("solfer.cli.commands.launch.find_spec", lambda name: None)
+    monkeypatch.setattr("solfer_tools.cli.commands.launch.find_spec", lambda name: None)
     assert main(["launch", f"{LAUNCH}/view.launch"]) == 2
     err = capsys.readouterr().err
     assert "error: view.launch: there is no module 'viser'" in err and "requirements-view.txt" in err

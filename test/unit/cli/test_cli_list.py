@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from solfer.cli.columns import aligned
-from solfer.cli.main import main
 from solfer.model import Description, Semantics
+from solfer_tools.cli.main import main
 
 CONFIG = Path(__file__).parents[3] / "config"
 CENTAURO = CONFIG / "centauro.yaml"
@@ -146,7 +146,9 @@ def test_an_unknown_kind_shows_the_known_ones(capsys):
 @pytest.mark.slow
 def test_a_reader_may_stop_early():
     """As in `solfer list links FILE | head -1`."""
-    program = "import sys; from solfer.cli.main import main; sys.exit(main(['list', 'links', '--robot', 'centauro']))"
+    program = (
+        "import sys; from solfer_tools.cli.main import main; sys.exit(main(['list', 'links', '--robot', 'centauro']))"
+    )
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-c", program]

@@ -4,9 +4,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from solfer.cli.main import main
 from solfer.config import load
 from solfer.simulation.bundle import read_bundle
+from solfer_tools.cli.main import main
 
 
 @pytest.fixture(autouse=True)

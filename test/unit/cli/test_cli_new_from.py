@@ -5,10 +5,10 @@ from pathlib import Path
 import pybullet_data
 import pytest
 
-from solfer.cli.main import main
-from solfer.cli.skeletons import collections
 from solfer.errors import MissingDependency
 from solfer.simulation.bundle import read_bundle
+from solfer_tools.cli.main import main
+from solfer_tools.cli.skeletons import collections
 
 
 @pytest.fixture(autouse=True)

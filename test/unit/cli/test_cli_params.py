@@ -9,11 +9,11 @@ import pytest
 from support.plugins.fleet import Fleet, loaded, still
 from support.recording.sine import tree
 
-from solfer.cli.completion import finder
-from solfer.cli.main import main, parser
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins.generation.config_service import answer_at_once
 from solfer.segments.namespace import Namespace
+from solfer_tools.cli.completion import finder
+from solfer_tools.cli.main import main, parser
 
 TAGS = {"gain": 0.3, "limit": 4.0, "parts": {"hand": {"weight": 2.0}, "foot": {}}}
 LAYER = f"test-{uuid.uuid4().hex}"

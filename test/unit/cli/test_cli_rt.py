@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solfer.cli.main import main
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
@@ -18,6 +17,7 @@ from solfer.segments.namespace import Namespace
 from solfer.telemetry.kernel import count_durations
 from solfer.telemetry.statistics import LoopCount, RuntimeStatistics
 from solfer.transport.health import Health
+from solfer_tools.cli.main import main
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_an_emergency_stop_imports_next_to_nothing(namespace):
     """It has to work at once, also on a full machine, and for a user without a home: nothing may be compiled for it."""
     code = f"""
 import sys
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 main(["rt", "--namespace", {namespace!r}, "estop"])
 sys.exit(", ".join({HEAVY!r} & set(sys.modules)))
 """

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.unit.scenarios import made
 
-from solfer.cli.main import main
-from solfer.cli.tables.scenario import ScenarioTrace
-from solfer.scenarios import read_scenario
+from solfer_tools.cli.main import main
+from solfer_tools.cli.scenario_trace import ScenarioTrace
+from solfer_tools.scenarios import read_scenario
 
 
 def printed(capsys, *arguments):

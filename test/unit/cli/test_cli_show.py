@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from solfer.cli.main import main
 from solfer.config import load
+from solfer_tools.cli.main import main
 
 CONFIG = Path(__file__).parents[3] / "config"
 CENTAURO = CONFIG / "centauro.yaml"

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from solfer.cli.main import SUB_COMMANDS, main
 from solfer.errors import SolferError
 from solfer.simulation.bundle import read_bundle
 from solfer.simulation.server.publications import robot_parameters
+from solfer_tools.cli.main import ALL_COMMANDS, main
 
 COMMAND = (sys.executable, str(Path(__file__).parents[3] / "nodes/solfer"))
 SCENARIO = str(Path(__file__).parents[3] / "config/scenarios/straight.yaml")
@@ -49,7 +49,7 @@ def test_streams_that_cannot_be_written_to(words):
 @pytest.mark.slow
 @pytest.mark.parametrize("environment", [ASCII, {"PYTHONOPTIMIZE": "2"}], ids=["ascii", "optimized"])
 def test_a_terminal_of_ascii_and_a_python_without_docstrings(tmp_path, environment):
-    for command in SUB_COMMANDS:
+    for command in ALL_COMMANDS:
         assert run([command, "--help"], **environment) == (0, "")
     assert run(["scenario", SCENARIO], **environment)[0] == 0
     text = "text: \u4f60\n"

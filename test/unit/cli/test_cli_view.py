@@ -4,8 +4,8 @@ import pytest
 
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
-from solfer.cli.main import main  # noqa: E402
 from solfer.recording.writer import RecordingWriter  # noqa: E402
+from solfer_tools.cli.main import main  # noqa: E402
 
 
 @pytest.fixture

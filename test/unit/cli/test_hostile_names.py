@@ -7,8 +7,8 @@ import pytest
 import yaml
 from support.unit.golden import CENTAURO
 
-from solfer.cli.main import main
-from solfer.cli.skeletons.robot import RobotSkeleton
+from solfer_tools.cli.main import main
+from solfer_tools.cli.skeletons.robot import RobotSkeleton
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 NAMES = [

@@ -19,7 +19,7 @@ from solfer.plugins import check_file
 from solfer.realtime import schedule
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
-ROSLESS = ("solfer.middleware.ros", "solfer.middleware.bridge", "solfer.msg", "solfer.srv", "solfer.demo")
+ROSLESS = ("solfer.middleware.ros", "solfer.middleware.bridge", "solfer.msg", "solfer.srv", "solfer_tools.demo")
 
 
 def records(parent=Record):

@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from support.recording.sine import recorded
 from support.unit.mutations import damaged, mutated, shipped
 
-from solfer.cli.main import main as solfer
 from solfer.config import Configuration, load, module_names, read
 from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import SolferError
@@ -34,6 +33,7 @@ from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.simulation.mock_hardware.mock_hardware import mounted
 from solfer.simulation.mock_hardware.records import HardwareRecord
 from solfer.simulation.world.world import read_world, steps_of
+from solfer_tools.cli.main import main as solfer
 
 WORDS = st.sampled_from(
     ["", "~", "{}", "[]", "[all]", "[[1]]", "{a: 1}", "-1", "1e400", ".nan", "0x" + "f" * 2000, "9" * 5000, "yes",

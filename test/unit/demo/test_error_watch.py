@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from solfer.demo.driving import ErrorWatch, RealTimeLost
 from solfer.errors import MiddlewareError
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 from solfer.transport.plugin_state import SAFE_STOP
+from solfer_tools.demo.driving import ErrorWatch, RealTimeLost
 
 
 def watch_of(summary, times):

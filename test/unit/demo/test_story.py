@@ -3,8 +3,8 @@
 import pytest
 
 from solfer.components.joint_states import MoveJoints
-from solfer.demo.story import UPPER, StoryStep, StoryTeller
 from solfer.errors import ComponentError
+from solfer_tools.demo.story import UPPER, StoryStep, StoryTeller
 
 
 class Refusing:

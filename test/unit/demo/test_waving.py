@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from solfer.demo.waving import Waving
 from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer_tools.demo.waving import Waving
 
 HANDS = {"left": np.array((0.5, 0.3, 0.1)), "right": np.array((0.5, -0.3, 0.1))}
 

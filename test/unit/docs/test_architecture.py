@@ -21,10 +21,15 @@ def cells(page, table, column):
 
 
 def is_there(name):
-    """Whether a dotted name below `solfer` is a module, or what a module holds."""
-    module, _, attribute = f"solfer.{name}".rpartition(".")
+    """Whether a dotted name below `solfer` or `solfer_tools` is a module, or what a module holds."""
+    return any(is_below(f"{package}.{name}") for package in ("solfer_tools", "solfer"))
+
+
+def is_below(name):
+    """Whether a whole dotted name is there."""
+    module, _, attribute = name.rpartition(".")
     try:
-        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(f"solfer.{name}"))
+        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(name))
     except ModuleNotFoundError:
         return False
 
@@ -38,14 +43,14 @@ def test_dotted_names_of_the_glossary_exist(glossary):
 @pytest.mark.slow
 def test_class_names_of_the_glossary_exist(glossary, repository):
     names = set(re.findall(r"`([A-Z]\w+)(?:\.\w+)?`", "".join(cells(glossary, GLOSSARY, 2))))
-    sources = "".join(path.read_text() for path in (repository / "src/solfer").rglob("*.py"))
+    sources = "".join(path.read_text() for path in (repository / "src").rglob("*.py"))
     assert {name for name in names if not re.search(rf"^class {name}\b", sources, re.MULTILINE)} == set()
 
 
 def test_homes_of_the_originals_packages_exist(repository):
     page = (repository / "docs/explanation/original.md").read_text()
     named = re.findall(r"`([\w./]+)`", "".join(cells(page, PACKAGES, 1)))
-    roots = (repository, repository / "src/solfer")
+    roots = (repository, repository / "src/solfer", repository / "src/solfer_tools")
     homes = [name for name in named if not name[0].isupper()]
     assert len(homes) > 15
     assert [name for name in homes if not any((root / name).exists() for root in roots)] == []

@@ -7,7 +7,7 @@ import shlex
 import pytest
 from support.modules import forget
 
-from solfer.cli.main import main, parser
+from solfer_tools.cli.main import main, parser
 
 
 def sub_command(parser, words):

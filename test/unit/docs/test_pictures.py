@@ -5,7 +5,7 @@ import shlex
 
 import pytest
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 PICTURE = re.compile(r"^solfer graph (.* -o (\S+\.png))$", re.MULTILINE)
 

@@ -8,8 +8,8 @@ from solfer import Robot
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.config import read
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.navigation import ReferenceCourse, read_references
 from solfer.plugins.generation.check import check_file
+from solfer_tools.navigation import ReferenceCourse, read_references
 
 SECTION = re.compile(r"^#+ References(?: without a program)?\n(.*?)(?=^#+ )", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)

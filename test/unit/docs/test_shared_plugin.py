@@ -13,11 +13,11 @@ from support.integration.world import CONFIG, World
 from support.plugins.fleet import tree
 from support.unit.cart import URDF
 
-from solfer.cli.main import main
 from solfer.config import load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Generator, PluginState, Registry, generate_shared
+from solfer_tools.cli.main import main
 
 FORCE = "geometry_msgs/Vector3Stamped"
 

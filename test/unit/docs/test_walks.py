@@ -10,8 +10,7 @@ def test_every_step_is_a_file_with_its_name(repository):
     steps = STEP.findall(page)
     rows = [line for line in page.splitlines() if line.startswith("| ") and not line.startswith("| step")]
     assert len(steps) == len(rows) > 25
-    source = repository / "src/solfer"
-    missing = [step for step in steps if not re.search(rf"\b{step[1]}\b", read(source / step[0]))]
+    missing = [step for step in steps if not re.search(rf"\b{step[1]}\b", read(repository / "src", step[0]))]
     assert missing == []
 
 
@@ -21,6 +20,7 @@ def test_files_in_the_text_exist(repository):
     assert len(named) >= 2 and all((repository / "src/solfer" / name).exists() for name in named)
 
 
-def read(path):
-    """Return a file's text; empty if there is no such file."""
-    return path.read_text() if path.is_file() else ""
+def read(sources, name):
+    """Return the text of a file of the trunk, or of a package; empty if there is no such file."""
+    path = next((path for path in (sources / "solfer" / name, sources / name) if path.is_file()), None)
+    return path.read_text() if path else ""

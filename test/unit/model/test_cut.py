@@ -7,10 +7,10 @@ from pathlib import Path
 import pinocchio
 import pytest
 
-from solfer.cli.main import main
 from solfer.errors import ModelError, UnknownName
 from solfer.model.urdf.cut import cut
 from solfer.model.urdf.description import Description
+from solfer_tools.cli.main import main
 
 CENTAURO = Path(__file__).parents[3] / "config" / "robots" / "centauro" / "centauro.urdf"
 
@@ -121,7 +121,7 @@ def test_a_wrong_call_shows_the_usage(arguments, capsys):
 def test_the_command_starts_without_the_heavy_libraries():
     """A launch file runs it for every part before anything else starts."""
     program = (
-        "import sys; from solfer.cli.main import main; "
+        "import sys; from solfer_tools.cli.main import main; "
         f"main(['cut', {str(CENTAURO)!r}, '--at', 'torso_2', '--keep', 'upper']); "
         "sys.exit(' '.join({'numpy', 'pinocchio', 'pydantic'} & sys.modules.keys()) or 0)"
     )

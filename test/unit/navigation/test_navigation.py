@@ -10,7 +10,7 @@ from support.unit.scenarios import made
 
 from solfer.errors import ComponentError, MiddlewareError, SolferError
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.navigation import (
+from solfer_tools.navigation import (
     DriveLimits,
     Navigation,
     ScenarioCourse,
@@ -18,8 +18,8 @@ from solfer.navigation import (
     WaypointCourse,
     WaypointFollower,
 )
-from solfer.navigation.course import CORRECTION_TIME, MeasuredPose
-from solfer.scenarios import Player, read_scenario
+from solfer_tools.navigation.course import CORRECTION_TIME, MeasuredPose
+from solfer_tools.scenarios import Player, read_scenario
 
 RATE = 100.0  # [Hz]
 LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")

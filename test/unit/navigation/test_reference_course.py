@@ -12,9 +12,9 @@ from solfer.components.joint_states import JointStates
 from solfer.config import read
 from solfer.errors import ConfigError, MiddlewareError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.navigation import Navigation, ReferenceCourse, read_references
 from solfer.transport import Inbox, JointMessage
 from solfer.transport.declared import bind
+from solfer_tools.navigation import Navigation, ReferenceCourse, read_references
 
 RATE, PERIOD = 100.0, 0.01  # [Hz], [s]
 HANDS = """

@@ -9,8 +9,8 @@ from support.unit.scenarios import made
 
 from solfer.errors import SolferError
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.navigation import Navigation, ScenarioCourse
-from solfer.scenarios import Player
+from solfer_tools.navigation import Navigation, ScenarioCourse
+from solfer_tools.scenarios import Player
 
 RATE = 50.0  # [Hz]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.errors import SolferError
-from solfer.navigation import DriveLimits, Waypoint, WaypointFollower
+from solfer_tools.navigation import DriveLimits, Waypoint, WaypointFollower
 
 PERIOD = 0.02  # [s]
 

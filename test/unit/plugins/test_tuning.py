@@ -9,13 +9,13 @@ import pytest
 from support.plugins.fleet import RATE, Fleet, still
 from support.recording.sine import recorded, tree
 
-from solfer.cli.main import main
 from solfer.components import Component, LiveParameter
 from solfer.errors import ComponentError, MiddlewareError, Overtaken
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins.tuning import MOVING_PARAMETERS, RAMP, WAITING_CHANGES, Tuning
 from solfer.recording.reader import read
 from solfer.transport.parameters import SetParameters
+from solfer_tools.cli.main import main
 
 TUNED = "support.plugins.tuned:Tuned"
 TAGS = {"gain": 0.3, "parts": {"hand": {"weight": 2.0}, "foot": {}}}

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from support.recording.motion import POSITION, Motion
 
-from solfer.cli.main import main
 from solfer.errors import RecordingError, UnknownName
 from solfer.recording.model import Channel, Recording
-from solfer.recording.review import Difference, compare
 from solfer.recording.writer import save
+from solfer_tools.cli.main import main
+from solfer_tools.review import Difference, compare
 
 NOISE = 3e-4  # [rad]
 SEEDS = range(10)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.recording.model import JOINTS_KIND, Channel, Recording
-from solfer.recording.review import Difference, compare
+from solfer_tools.review import Difference, compare
 
 NAMES, RATE, DURATION = ("wheel", "knee", "hip"), 200.0, 12.0
 URDF = b"""<robot name="r"><joint name="wheel" type="continuous"/><joint name="knee" type="revolute"/>

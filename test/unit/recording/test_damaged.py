@@ -10,12 +10,12 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel as ChannelRecord
 
-from solfer.cli.main import main
 from solfer.errors import RecordingError
 from solfer.recording import reader
 from solfer.recording.model import COLUMNS_KIND, Channel, Recording
 from solfer.recording.reader import read
 from solfer.recording.writer import save
+from solfer_tools.cli.main import main
 
 
 @pytest.fixture

@@ -10,17 +10,17 @@ from matplotlib.image import imread
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from solfer.cli.main import main
-from solfer.cli.recordings.actions import limits_of
-from solfer.cli.recordings.progress import progress
 from solfer.model import Description
 from solfer.recording.kinds import NAMED
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, REQUEST, Channel, Event, Recording
 from solfer.recording.reader import read
-from solfer.recording.review import tracks_of
-from solfer.recording.review.canvas import LINE_POINTS, outline
-from solfer.recording.review.plugin_page import plugin_page
 from solfer.recording.writer import save
+from solfer_tools.cli.main import main
+from solfer_tools.cli.recordings.actions import limits_of
+from solfer_tools.cli.recordings.progress import progress
+from solfer_tools.review import tracks_of
+from solfer_tools.review.canvas import LINE_POINTS, outline
+from solfer_tools.review.plugin_page import plugin_page
 
 URDF = Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf"
 RATE, START = 100.0, 50.0
@@ -242,8 +242,8 @@ def test_each_plugin_has_its_picture(file, capsys):
 
 
 def test_progress_is_shown_on_a_terminal_alone(capsys, monkeypatch):
-    monkeypatch.setattr("solfer.cli.recordings.progress.DELAY", 0.0)
-    monkeypatch.setattr("solfer.cli.recordings.progress.PERIOD", 0.0)
+    monkeypatch.setattr("solfer_tools.cli.recordings.progress.DELAY", 0.0)
+    monkeypatch.setattr("solfer_tools.cli.recordings.progress.PERIOD", 0.0)
     assert list(progress(range(3), 3, "rows")) == [0, 1, 2]
     assert capsys.readouterr().err == ""
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)

@@ -6,7 +6,7 @@ import sys
 import pytest
 from support.recording.sine import recorded
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 MATPLOTLIB = ("matplotlib", "matplotlib.figure")
 
@@ -21,7 +21,7 @@ def test_what_records_imports_no_review(repository, node):
     load = (
         f"import runpy; runpy.run_path({str(repository / 'nodes' / node)!r})" if node else f"import {', '.join(rooms)}"
     )
-    found = "{'matplotlib', 'solfer.recording.review'} & sys.modules.keys()"
+    found = "{'matplotlib', 'solfer_tools.review'} & sys.modules.keys()"
     program = f"{load}; import sys; sys.exit(' '.join({found}) or 0)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr.strip()) == (0, "")

@@ -7,9 +7,9 @@ import pytest
 from support.plugins.fleet import loaded
 from support.recording.sine import WRENCH, Kept, Pressed, Slow, recorded, tree
 
-from solfer.cli.main import main
 from solfer.recording.reader import read
 from solfer.recording.writer import save
+from solfer_tools.cli.main import main
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ import pytest
 from support.recording.sine import recorded
 from support.recording.turning import DRIVERS, driven
 
-from solfer.cli.main import main
 from solfer.recording.reader import read
-from solfer.recording.review import compare, tracks_of
+from solfer_tools.cli.main import main
+from solfer_tools.review import compare, tracks_of
 
 
 @pytest.fixture(scope="module")

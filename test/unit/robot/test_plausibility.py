@@ -2,7 +2,7 @@
 
 import pytest
 
-from solfer.cli.main import main
+from solfer_tools.cli.main import main
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 LINKS = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in "abc")

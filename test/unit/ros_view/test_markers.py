@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solfer.ros_view.markers import FORCE_SCALE, markers_of
-from solfer.scene import ContactForce, ScenePose, SceneState, ShownReference
+from solfer_tools.ros_view.markers import FORCE_SCALE, markers_of
+from solfer_tools.scene import ContactForce, ScenePose, SceneState, ShownReference
 
 FRICTION = 0.5
 SQUARE = np.array(((0.0, 0.0, 0.1), (1.0, 0.0, 0.1), (1.0, 1.0, 0.1), (0.0, 1.0, 0.1)))

@@ -1,6 +1,6 @@
 """Figures of a real-time layer as messages."""
 
-from solfer.ros_view.statistics import message_of
+from solfer.ros_statistics import message_of
 from solfer.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
 

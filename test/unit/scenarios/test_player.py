@@ -10,7 +10,7 @@ from support.allocations import check_that_it_keeps_no_memory
 from support.unit.scenarios import made
 
 from solfer.errors import SolferError
-from solfer.scenarios import Player, read_scenario
+from solfer_tools.scenarios import Player, read_scenario
 
 PERIOD = 0.01  # [s]
 STAY = {"x_cp": 0, "y_cp": 0, "z_cp": 0}

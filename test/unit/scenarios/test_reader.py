@@ -9,7 +9,7 @@ import pytest
 from support.unit.scenarios import RELATIVE, text_of
 
 from solfer.errors import ConfigError, SolferError, SolferErrors, UnknownName
-from solfer.scenarios import read_scenario
+from solfer_tools.scenarios import read_scenario
 
 ABSOLUTE = {"circular", "events", "events_25", "straight", "support"}
 

@@ -9,10 +9,10 @@ from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.config import read
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.robot import Robot
-from solfer.scene import DraggedReferences, LiveScene, ScenePose
-from solfer.scene.dragging import OPERATOR_SILENCE
 from solfer.transport import Inbox, JointMessage
 from solfer.transport.declared import bind
+from solfer_tools.scene import DraggedReferences, LiveScene, ScenePose
+from solfer_tools.scene.dragging import OPERATOR_SILENCE
 
 HANDS = """
 hands:

@@ -12,12 +12,12 @@ from solfer.interfaces.geometry import Pose, Turn, Vector
 from solfer.interfaces.support import SupportMargins
 from solfer.interfaces.task_references import TaskReferences
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.scene import LiveScene
-from solfer.scene.discovery import STALE_AGE
-from solfer.scene.polygon import hull, shrunk
 from solfer.transport import BodyMessage, JointMessage
 from solfer.transport.declared.fields import message_of
 from solfer.transport.messages import PointsMessage, WrenchMessage
+from solfer_tools.scene import LiveScene
+from solfer_tools.scene.discovery import STALE_AGE
+from solfer_tools.scene.polygon import hull, shrunk
 
 PLACE, TURN = np.array((0.3, -0.2, 0.8)), Rotation.from_euler("xyz", (0.05, -0.1, 0.7))
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")

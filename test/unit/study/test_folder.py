@@ -12,9 +12,9 @@ import pytest
 from support.unit.studies import made
 
 from solfer.errors import StudyError
-from solfer.study import Result
-from solfer.study.drive import StudyProgress, find_run
-from solfer.study.folder import CLAIM_TIMEOUT, STUDY, StudyFolder
+from solfer_tools.study import Result
+from solfer_tools.study.drive import StudyProgress, find_run
+from solfer_tools.study.folder import CLAIM_TIMEOUT, STUDY, StudyFolder
 
 VARY = {"mass": {"path": "simulation/mass", "grid": [0.9, 1.0, 1.1]}}
 
@@ -74,7 +74,7 @@ def test_the_first_result_counts(folder):
 @pytest.mark.parametrize(
     ("failure", "is_kept"),
     [
-        ("SystemExit: 143 (at /src/solfer/study/worker.py:220 in <lambda>)", False),
+        ("SystemExit: 143 (at /src/solfer_tools/study/worker.py:220 in <lambda>)", False),
         ("KeyboardInterrupt (at /src/solfer/numerics/qp.py:7 in solve)", False),
         ("its process ended by signal SIGUSR2; see stderr", False),
         ("its process ended by signal SIGSEGV; see stderr", True),

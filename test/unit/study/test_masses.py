@@ -6,8 +6,8 @@ import pytest
 from support.unit.studies import CONFIG
 
 from solfer.errors import UnknownName
-from solfer.study.records import SimulationRecord
-from solfer.study.robot import with_masses
+from solfer_tools.study.records import SimulationRecord
+from solfer_tools.study.robot import with_masses
 
 URDF = (CONFIG / "robots/centauro/centauro.urdf").read_text()
 

@@ -7,8 +7,8 @@ import pytest
 
 from solfer.errors import ConfigError, UnknownName
 from solfer.recording.log import Logger
-from solfer.study.measures import Columns, evaluated, measured
-from solfer.study.records import MeasureRecord
+from solfer_tools.study.measures import Columns, evaluated, measured
+from solfer_tools.study.records import MeasureRecord
 
 RAMP = np.arange(3000) * 0.01
 

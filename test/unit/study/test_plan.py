@@ -8,7 +8,7 @@ import pytest
 from support.unit.studies import CONFIG, made, written
 
 from solfer.errors import ConfigError, SolferError, SolferErrors
-from solfer.study import read_study
+from solfer_tools.study import read_study
 
 FRICTION = {"path": "simulation/friction/wheels", "grid": [0.3, 0.8]}
 MASS = {"path": "simulation/mass", "grid": [0.9, 1.0, 1.1]}
@@ -138,7 +138,7 @@ def test_the_shipped_studies_can_run():
 
 
 def test_a_text_of_a_study_is_the_same_study_in_another_folder(tmp_path):
-    from solfer.study.plan import study_of
+    from solfer_tools.study.plan import study_of
 
     study = read_study(written(tmp_path, vary={"mass": MASS}))
     again = study_of(study.text(), study.file)
@@ -146,13 +146,13 @@ def test_a_text_of_a_study_is_the_same_study_in_another_folder(tmp_path):
 
 
 def test_other_code_makes_other_ids(tmp_path, monkeypatch):
-    from solfer.study import plan
+    from solfer_tools.study import plan
 
     folder = tmp_path / "package"
     folder.mkdir()
     (folder / "first.py").write_text("a = 1")
     hashes = [plan.code_hash()]
-    monkeypatch.setattr(plan, "CODE_FOLDER", folder)
+    monkeypatch.setattr(plan, "CODE_FOLDERS", (folder,))
     for text in ("b = 1", "b = 2"):
         plan.code_hash.cache_clear()
         (folder / f"{text[-1]}.py").write_text(text)
@@ -160,4 +160,4 @@ def test_other_code_makes_other_ids(tmp_path, monkeypatch):
     plan.code_hash.cache_clear()
     assert len(set(hashes)) == 3
     monkeypatch.undo()
-    assert (plan.CODE_FOLDER / "study/plan.py").is_file() and plan.code_hash() == hashes[0]
+    assert (plan.CODE_FOLDERS[1] / "study/plan.py").is_file() and plan.code_hash() == hashes[0]

@@ -10,11 +10,11 @@ import pytest
 from support.unit.studies import made
 
 from solfer.errors import SolferError, SolferErrors, StudyError
-from solfer.study import Result
-from solfer.study.drive import find_run
-from solfer.study.folder import COLUMNS_FILE, RECORDING, STUDY, StudyFolder
-from solfer.study.plan import MOST_RUNS
-from solfer.study.report import write_report
+from solfer_tools.study import Result
+from solfer_tools.study.drive import find_run
+from solfer_tools.study.folder import COLUMNS_FILE, RECORDING, STUDY, StudyFolder
+from solfer_tools.study.plan import MOST_RUNS
+from solfer_tools.study.report import write_report
 
 SCRIPT = "<script>alert(1)</script>"
 ODD = (

@@ -15,9 +15,9 @@ from solfer import Robot  # noqa: E402
 from solfer.errors import RecordingError  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
 from solfer.recording.model import JOINTS_KIND, Channel, Recording  # noqa: E402
-from solfer.scene import LiveScene  # noqa: E402
-from solfer.view import Page, PageServer, Playback  # noqa: E402
-from solfer.view.playback import robot_of_recording  # noqa: E402
+from solfer_tools.scene import LiveScene  # noqa: E402
+from solfer_tools.view import Page, PageServer, Playback  # noqa: E402
+from solfer_tools.view.playback import robot_of_recording  # noqa: E402
 
 TIMES = 100.0 + np.arange(0.0, 4.0, 0.01)
 

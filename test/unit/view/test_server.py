@@ -15,7 +15,7 @@ viser = pytest.importorskip("viser", reason="needs pip install -r requirements-v
 
 from support.page import opened_page  # noqa: E402
 
-from solfer.view import PageServer  # noqa: E402
+from solfer_tools.view import PageServer  # noqa: E402
 
 
 @pytest.fixture(scope="module")

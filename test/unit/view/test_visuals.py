@@ -9,7 +9,7 @@ from support.unit.colladas import COLLADA
 from solfer.model import Description
 
 pytest.importorskip("trimesh")
-from solfer.view.visuals import DEFAULT_GREY, visuals_of  # noqa: E402 it imports trimesh
+from solfer_tools.view.visuals import DEFAULT_GREY, visuals_of  # noqa: E402 it imports trimesh
 
 
 def robot(color, geometry='<box size="1 1 1"/>'):

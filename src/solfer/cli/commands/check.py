@@ -4,14 +4,10 @@ The exit code is 0 if the configuration can be used, also with warnings, and 2 i
 and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf. Each plugin
 is made as at its start, component included, but connects to nothing. A package that is not built yet is looked for
 beside FILE. Of an RT layer, such as config/xbot.yaml, the plugins that it lists are checked as they run in the layer.
-
-With --allocations the plugins of -n run, too, for some hundred cycles in the mode idle: on the simulated robot, or in
-the cycles of a recording. The lines that allocate memory in a cycle are named, and the exit code is 1 if there are any.
 """
 
 import argparse
 import sys
-from pathlib import Path
 
 from solfer.cli.options import add_file, add_robot_files, add_search_paths, add_system
 
@@ -32,26 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="print a list of objects with severity (error, warning or info), file, line, column, path, "
         "message, expected and names (the nearest ones that there are)",
     )
-    parser.add_argument(
-        "--allocations", action="store_true", help="name the lines that allocate memory in a cycle of -n"
-    )
-    parser.add_argument(
-        "--recording",
-        type=Path,
-        metavar="FILE",
-        help="for --allocations: what the plugin receives (default: simulation)",
-    )
     add_search_paths(parser)
     add_system(parser)
     add_robot_files(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check and print the findings: mistakes and warnings to stderr, a summary to stdout; or all as JSON.
-
-    Raises:
-        SolferError: Allocations cannot be measured.
-    """
+    """Check and print the findings: mistakes and warnings to stderr, a summary to stdout; or all as JSON."""
     from solfer.cli.findings import findings_of, summary
     from solfer.cli.robots import given_robot
     from solfer.config.loading.rt_layer import is_layer, read_once
@@ -75,8 +58,4 @@ def run(options: argparse.Namespace) -> int:
             print(f"{finding.severity}: {finding.text}", file=sys.stderr)
         sys.stderr.flush()
         print(summary(options.file, report))
-    if report.errors or not options.allocations:
-        return 2 if report.errors else 0
-    from solfer.cli.allocations.report import allocations
-
-    return 1 if allocations(options, report) else 0
+    return 2 if report.errors else 0

@@ -7,7 +7,7 @@ too. `estop` sets a latch and waits until the layer has seen it; exit code 2: no
 import argparse
 from typing import Any
 
-from solfer.cli.commands.top import add_times
+from solfer.cli.options import add_times
 from solfer.cli.rt.record import add_file
 
 

@@ -13,7 +13,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from solfer.cli.options import Number
+from solfer.cli.options import SECONDS, Number
 from solfer.errors import MiddlewareError, RecordingError, UnknownName
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 POLL_PERIOD = 0.1
 """Period at which new rows are polled [s]."""
-
-SECONDS = Number(0.01, 86400.0, "seconds")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

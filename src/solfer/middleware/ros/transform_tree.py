@@ -11,7 +11,7 @@ from solfer.middleware.ros.tf import prefixed, tf_prefix
 
 
 class TransformTree:
-    """Locates frames in a fixed one, such as `map`, by tf: a `solfer.navigation.Localisation`.
+    """Locates frames in a fixed one, such as `map`, by tf: a `solfer_tools.navigation.Localisation`.
 
     Args:
         fixed: The fixed frame.

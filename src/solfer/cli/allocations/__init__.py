@@ -1,1 +1,0 @@
-"""`solfer check --allocations`: the lines of a plugin that allocate memory in its cycle."""

@@ -1,7 +1,0 @@
-"""Scenarios: files of where the base and the wheels of a robot go, and what plays them, step by step."""
-
-from solfer.scenarios.player import Player
-from solfer.scenarios.reader import read_scenario
-from solfer.scenarios.scenario import Scenario
-
-__all__ = ["Player", "Scenario", "read_scenario"]

@@ -1,0 +1,1 @@
+"""The `solfer` command with all its sub-commands."""

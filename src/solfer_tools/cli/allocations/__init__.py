@@ -1,0 +1,1 @@
+"""Which lines allocate memory in the cycle of a plugin."""

@@ -1,0 +1,1 @@
+"""Sub-commands beyond those of `solfer.cli.commands`, each with its arguments."""

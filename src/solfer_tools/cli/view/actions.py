@@ -1,0 +1,120 @@
+"""Shows a page in the browser."""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+
+from solfer.robot import Robot
+from solfer.robot.description.shipped import robot_of
+from solfer.transport import Middleware
+from solfer.transport.fixed_rate import FixedRateLoop
+from solfer_tools.cli.view.paced import PacedMiddleware
+from solfer_tools.scene import LiveScene
+from solfer_tools.view import Page, PageServer, Playback
+
+ROBOT = "centauro"
+NODE = "view"
+
+
+@dataclass(frozen=True)
+class ShownSource:
+    """What is shown.
+
+    Attributes:
+        robot: The robot, for the scene alone.
+        middleware: Carries its topics.
+        stop: The emergency stop; None: the service of the lower level.
+        playback: The recording; None: it is live.
+    """
+
+    robot: Robot
+    middleware: Middleware
+    stop: Callable[[], None] | None = None
+    playback: Playback | None = None
+
+
+def show(options: argparse.Namespace) -> int:
+    """Show the page until the source or the user ends it."""
+    with suppress(KeyboardInterrupt), _opened(options) as source, closing(PageServer(int(options.port))) as server:
+        scene = LiveScene(source.robot, source.middleware)
+        page = Page(
+            server,
+            source.robot.description,
+            source.middleware,
+            stop=source.stop,
+            control=options.control,
+            playback=source.playback,
+            foxglove=options.foxglove,
+        )
+        print(server.address, flush=True)  # after errors of the source
+        if page.foxglove is not None:
+            print(page.foxglove.address, flush=True)
+        FixedRateLoop(source.middleware, 20.0).run(lambda *_: page.update(scene.update()), source.middleware.running)
+    return 0
+
+
+@contextmanager
+def _opened(options: argparse.Namespace) -> Iterator[ShownSource]:
+    """Open what is shown."""
+    with ExitStack() as stack:
+        if options.file is not None:
+            yield _recording(options)
+        elif options.study is not None:
+            yield _simulation(options, stack)
+        else:
+            source = _ros(options) if options.namespace is None else _layer(options)
+            stack.enter_context(closing(source.middleware))
+            yield source
+
+
+def _named(name: str) -> Robot:
+    """Load a robot of this package, or that of a bundle."""
+    name, files = robot_of(name)
+    return Robot.load(files.urdf, files.srdf, files.floating_base, name=name, contacts=files.contacts)
+
+
+def _recording(options: argparse.Namespace) -> ShownSource:
+    from solfer.middleware.memory import Bus, MemoryMiddleware
+    from solfer.recording.reader import read
+    from solfer_tools.view.playback import robot_of_recording
+
+    recording = read(options.file)
+    bus = Bus()
+    robot = robot_of_recording(recording) if options.robot is None else _named(options.robot)
+    playback = Playback(recording, MemoryMiddleware(bus, "recording"), robot)
+
+    def step(duration: float) -> None:
+        bus.run_until(bus.time + duration)
+        playback.advance(duration)
+
+    return ShownSource(robot, PacedMiddleware(bus, NODE, step), playback=playback)
+
+
+def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
+    from solfer_tools.study import SimulatedRun, read_study
+
+    record = read_study(options.study).record
+    run = stack.enter_context(SimulatedRun(record))
+    run.attend()
+    return ShownSource(_named(options.robot or record.simulation.robot), PacedMiddleware(run.bus, NODE, run.step))
+
+
+def _layer(options: argparse.Namespace) -> ShownSource:
+    from solfer.realtime.emergency_stop import EmergencyStopLatch
+    from solfer.realtime.namespaces import find
+    from solfer_tools.cli.view.layer import LayerMiddleware
+
+    namespace = find(options.namespace)
+    latch = EmergencyStopLatch(namespace.folder)
+    stop = partial(latch.trip, "by the page")
+    return ShownSource(_named(options.robot or ROBOT), LayerMiddleware(namespace, NODE), stop)
+
+
+def _ros(options: argparse.Namespace) -> ShownSource:
+    from solfer.middleware.ros import RosMiddleware, RosNode
+
+    robot = _named(options.robot or ROBOT)  # before the master is called
+    return ShownSource(robot, RosMiddleware(RosNode(NODE, sys.argv)))

@@ -1,0 +1,64 @@
+"""The picture of a comparison: the joints that differ, the first one on top."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solfer_tools.review.canvas import FIRST_COLOR, FONT_SIZE, SECOND_COLOR, WRONG_COLOR, draw, dress, new_figure
+from solfer_tools.review.compare import Comparison
+from solfer_tools.review.verdict import JointVerdict
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
+    """Draw both positions and their difference, of the joints that differ first; if none does, where most is left.
+
+    Args:
+        comparison: What was found out.
+        names: Names of the two recordings.
+    """
+    place = {joint: row for row, joint in enumerate(comparison.joints)}
+    shown = [verdict for verdict in comparison.different if verdict.joint in place][:8]
+    if not shown:
+        known = (verdict for verdict in comparison.verdicts if verdict.joint in place)
+        shown = sorted(known, key=lambda verdict: -verdict.largest)[:4]
+    figure = new_figure(12.0, 0.8 + 1.9 * len(shown))
+    grid = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
+    for (left, right), verdict in zip(grid, shown, strict=True):
+        _joint(left, right, verdict, comparison=comparison, row=place[verdict.joint], names=names)
+    for axes in grid[-1]:
+        axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT_SIZE)
+    figure.suptitle(_title(comparison, names), fontsize=FONT_SIZE + 3)
+    return figure
+
+
+def _title(comparison: Comparison, names: tuple[str, str]) -> str:
+    count = len(comparison.different)
+    found = f"{count} joint{'s differ' if count != 1 else ' differs'}" if count else "no joint differs"
+    return f"{names[1]} against {names[0]}: {found}"
+
+
+def _joint(
+    left: "Axes", right: "Axes", verdict: JointVerdict, comparison: Comparison, row: int, *, names: tuple[str, str]
+) -> None:
+    times = comparison.times
+    first = comparison.first[row]
+    second = comparison.second[row]
+    draw(left, times, first, color=FIRST_COLOR, lw=1.2, label=names[0])
+    draw(left, times, second, color=SECOND_COLOR, lw=1.2, ls="--", label=names[1])
+    draw(right, times, 1e3 * (second - first), color="black", lw=0.9)
+    right.axhline(0.0, color="grey", lw=0.5)
+    dress(left, verdict.joint, "position [rad, m]")
+    dress(right, verdict.text or "no difference", "difference\n[mrad, mm]")
+    left.legend(fontsize=FONT_SIZE - 1, loc="best", ncols=2, framealpha=0.8)
+    if not np.isnan(verdict.since):
+        for axes in (left, right):
+            axes.axvline(verdict.since, color=WRONG_COLOR, lw=0.9)
+        right.annotate(
+            f" {verdict.since:.3f} s", (verdict.since, 1.0), xycoords=("data", "axes fraction"), color=WRONG_COLOR,
+            fontsize=FONT_SIZE - 1, va="top",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
+        )  # fmt: skip

@@ -1,0 +1,39 @@
+"""The picture of a replay: the numbers that it sends otherwise, the first one on top."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solfer_tools.review.canvas import FIRST_COLOR, FONT_SIZE, SECOND_COLOR, WRONG_COLOR, draw, dress, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MAX_REPLAY_ROWS = 8
+"""Most numbers on a page."""
+
+
+def replay_page(title: str, times: np.ndarray, tracks: Sequence[tuple[str, np.ndarray, np.ndarray]]) -> "Figure":
+    """Draw numbers as recorded and as replayed, and their differences.
+
+    Args:
+        title: Title of the page.
+        times: Of the cycles, shape (T,) [s].
+        tracks: Title, recorded and replayed values of each number, shape (T,); after `MAX_REPLAY_ROWS` they are left
+            out.
+    """
+    shown = tracks[:MAX_REPLAY_ROWS]
+    figure = new_figure(12.0, 0.8 + 1.9 * max(1, len(shown)))
+    grid = figure.subplots(max(1, len(shown)), 2, sharex=True, squeeze=False)
+    for (left, right), (name, recorded, replayed) in zip(grid, shown, strict=False):
+        draw(left, times, recorded, color=FIRST_COLOR, lw=1.6, label="recorded")
+        draw(left, times, replayed, color=SECOND_COLOR, lw=1.0, label="replayed")
+        draw(right, times, replayed - recorded, color=WRONG_COLOR, lw=1.0)
+        dress(left, name)
+        dress(right, "difference")
+    grid[0][0].legend(fontsize=FONT_SIZE - 1)
+    for axes in grid[-1]:
+        axes.set_xlabel("time after the first cycle [s]", fontsize=FONT_SIZE)
+    figure.suptitle(title, fontsize=FONT_SIZE + 3)
+    return figure

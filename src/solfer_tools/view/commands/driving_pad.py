@@ -1,0 +1,104 @@
+"""The pad of a page: buttons that drive the base."""
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+
+from viser import GuiApi, GuiButtonHandle, GuiEvent
+
+from solfer.errors import MiddlewareError
+from solfer.transport import Middleware, Writer
+from solfer.transport.messages import FieldsMessage
+from solfer.transport.topics import Topics
+from solfer_tools.view.commands.requests import PageRequests
+
+CMD_VEL = "cmd_vel"
+
+
+class DrivingPad:
+    """Buttons that drive the base while one is pressed, by a component and with a speed that are chosen beside them.
+
+    Args:
+        gui: Where the buttons are.
+        requests: Carries out what they request.
+        middleware: Carries the velocities.
+        is_pressed_by: Whether a page may press them.
+    """
+
+    def __init__(
+        self,
+        gui: GuiApi,
+        requests: PageRequests,
+        middleware: Middleware,
+        is_pressed_by: Callable[[int | None], bool],
+    ):
+        self._requests = requests
+        self._middleware = middleware
+        self._is_pressed_by = is_pressed_by
+        self._writers: dict[str, Writer] = {}
+        self._direction = (0.0, 0.0, 0.0)
+        self._pressed = -math.inf
+        self._drives = False
+        self._topics: Future[Topics] | None = None
+        self._next = -math.inf
+        self._module = gui.add_dropdown("base", ("",))
+        self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
+        directions = {  # x, y, yaw
+            "ahead": (1.0, 0.0, 0.0),
+            "back": (-1.0, 0.0, 0.0),
+            "left": (0.0, 1.0, 0.0),
+            "right": (0.0, -1.0, 0.0),
+            "turn left": (0.0, 0.0, 1.0),
+            "turn right": (0.0, 0.0, -1.0),
+        }
+        for name, direction in directions.items():
+            self._connect(gui.add_button(name), direction)
+
+    def find_modules(self) -> None:
+        """Look once a second which components drive the base."""
+        now = self._middleware.now()
+        if self._topics is None and now >= self._next:
+            self._topics = self._middleware.topics()
+            self._next = now + 1.0
+        if self._topics is None or not self._topics.done():
+            return
+        topics = self._topics
+        self._topics = None
+        try:
+            received = topics.result().received
+        except MiddlewareError:  # it is asked again
+            return
+        modules = sorted(name.removesuffix(f"/{CMD_VEL}") for name in received if name.endswith(f"/{CMD_VEL}"))
+        if modules and tuple(modules) != tuple(self._module.options):
+            self._module.options = tuple(modules)
+
+    def drive(self) -> None:
+        """Publish the velocity while a button is pressed, then zero once."""
+        pressed = self._middleware.now() - self._pressed <= 0.25  # [s]; a pressed button says so ten times a second
+        module = str(self._module.value)
+        if not module or not (pressed or self._drives):
+            return
+        speed = float(self._speed.value) if pressed else 0.0
+        x, y, yaw = (speed * each for each in self._direction)
+        if module not in self._writers:
+            topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
+            self._writers[module] = self._middleware.declared_writer(topic, "geometry_msgs/Twist")
+        linear = {"x": x, "y": y, "z": 0.0}
+        angular = {"x": 0.0, "y": 0.0, "z": 2.0 * yaw}  # 2 rad/s at 1 m/s
+        self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
+        self._drives = pressed
+
+    def release(self) -> None:
+        """Release the button that is pressed."""
+        self._pressed = -math.inf
+
+    def _connect(self, button: GuiButtonHandle, direction: tuple[float, float, float]) -> None:
+        @button.on_hold(callback_hz=10.0)
+        async def _(event: GuiEvent[GuiButtonHandle]) -> None:
+            self._requests.submit(("press", event.client_id), partial(self._press, event.client_id, direction))
+
+    def _press(self, client: int | None, direction: tuple[float, float, float]) -> None:
+        if self._is_pressed_by(client):
+            self._direction = direction
+            self._pressed = self._middleware.now()

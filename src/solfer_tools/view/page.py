@@ -1,0 +1,120 @@
+"""The page: what is seen of a robot, and what belongs to it."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from solfer.model.urdf.description import Description
+from solfer.transport import Middleware
+from solfer_tools.scene import SceneState
+from solfer_tools.view.columns import LiveColumns
+from solfer_tools.view.commands.control import PageControl
+from solfer_tools.view.commands.emergency_stop import EmergencyStopButton
+from solfer_tools.view.commands.parameters import KnownParameters
+from solfer_tools.view.commands.plugin_tabs import PluginTabs
+from solfer_tools.view.commands.requests import PageRequests
+from solfer_tools.view.drawing import SceneDrawing
+from solfer_tools.view.freshness import Freshness
+from solfer_tools.view.playback import Playback
+from solfer_tools.view.plots import Plots
+from solfer_tools.view.server import PageServer
+from solfer_tools.view.time_line import TimeLine
+
+if TYPE_CHECKING:
+    from solfer_tools.view.foxglove_server import FoxgloveServer
+
+
+class Page:
+    """A page of one robot; `update` is called by one loop, which does all that pages request.
+
+    Args:
+        server: Serves it.
+        description: The robot.
+        middleware: Carries what belongs to it.
+        stop: The emergency stop; None: the service of the lower level.
+        control: Whether pages may command.
+        playback: The recording that is shown; None: what is shown is live.
+        foxglove: Whether Foxglove gets the same.
+
+    Attributes:
+        foxglove: Its server; None: there is none.
+    """
+
+    CAMERA = (2.1, -1.8, 1.4)
+    """Where it looks from at first [m]."""
+
+    TARGET = (0.0, 0.0, 0.6)
+    """Where it looks to at first [m]."""
+
+    FIELD_OF_VIEW = math.radians(40.0)
+    """Vertical field of view [rad]."""
+
+    def __init__(
+        self,
+        server: PageServer,
+        description: Description,
+        middleware: Middleware,
+        stop: Callable[[], None] | None = None,
+        control: bool = False,
+        *,
+        playback: Playback | None = None,
+        foxglove: bool = False,
+    ):
+        self._viser = server.viser
+        self._middleware = middleware
+        self._playback = playback
+        gui = self._viser.gui
+        gui.configure_theme(show_share_button=False, show_logo=False)
+        self._viser.initial_camera.position = self.CAMERA
+        self._viser.initial_camera.look_at = self.TARGET
+        self._viser.initial_camera.fov = self.FIELD_OF_VIEW
+        self._freshness = Freshness(server)
+        self._requests = PageRequests(middleware, self._viser)
+        self._drawing = SceneDrawing(self._viser.scene, description)
+        self._control: PageControl | None = None
+        self.foxglove: FoxgloveServer | None = None
+        if playback is not None:
+            self._time_line = TimeLine(server, self._requests, playback)
+            self._plots = Plots(gui, self._requests, playback, incoming=server.incoming)
+            return
+        EmergencyStopButton(self._viser, self._requests, stop)
+        self._columns = LiveColumns(middleware)
+        self._plots = Plots(gui, self._requests, self._columns, incoming=server.incoming)
+        self._control = PageControl(server, self._requests, middleware) if control else None
+        self._parameters = KnownParameters(middleware)
+        self._tabs = PluginTabs(gui, self._requests, self._parameters, control=self._control)
+        if foxglove:
+            self.foxglove = self._make_foxglove(server)
+
+    def _make_foxglove(self, server: PageServer) -> "FoxgloveServer":
+        from solfer_tools.view.foxglove_server import FoxgloveServer  # 54 MB, which most do without
+
+        return FoxgloveServer(server, self._requests, self._columns, parameters=self._parameters, control=self._control)
+
+    def update(self, state: SceneState | None) -> None:
+        """Show a scene; None: nothing new is known."""
+        self._requests.update()
+        carry_out = self._requests.carry_out
+        if self._playback is not None:
+            carry_out("the time line", self._time_line.update)
+            now = self._playback.time - self._playback.begin
+        else:
+            reports = dict(self._middleware.reports())
+            carry_out("the list of parameters", partial(self._parameters.update, reports))
+            carry_out("the tabs", partial(self._tabs.update, reports))
+            carry_out("what is plotted", partial(self._columns.update, state, reports))
+            now = self._middleware.now()
+            if self.foxglove is not None:
+                carry_out("the server for Foxglove", partial(self.foxglove.update, state))
+        if self._control is not None:
+            carry_out("the control", partial(self._control.update, state))
+        if state is None:
+            return
+        carry_out("the plot", partial(self._plots.update, now))
+        carry_out("the drawing", partial(self._draw, state))
+
+    def _draw(self, state: SceneState) -> None:
+        with self._viser.atomic():
+            self._drawing.update(state)
+        self._freshness.beat()
