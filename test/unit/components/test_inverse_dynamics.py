@@ -310,7 +310,7 @@ def test_what_cannot_be_kept_is_named_and_held(caplog):
 def test_wrong_states_are_held():
     component = started()
     cycle(component)
-    component.problem._robot.state.velocity[20] = np.nan
+    component.model.state.velocity[20] = np.nan
     component.update()
     assert component.is_holding and "not finite" in component.problem.violated
 

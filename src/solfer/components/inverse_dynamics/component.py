@@ -130,7 +130,9 @@ class InverseDynamics(Component):
         # a cycle acts one period after its measurement
         horizon = max(limits.horizon, 2.0 * self.period)
         bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
-        self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=self._torque_limits(self.tags))
+        torque_limits = self._torque_limits(self.tags)
+        self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=torque_limits, demand=self._demand)
+        self._watch.connect(self.problem.force, self._demand.slip)
         self._report_cycles = max(2, round(rate))  # once a second
         self.references.connect(self.period)
 
@@ -198,8 +200,8 @@ class InverseDynamics(Component):
         self.ground.update(step)
         demand.update(state, self.ground)
         if not self.is_holding:
-            self._watch.update(step, self.problem.force, demand.slip)
-        is_solved = not self._watch.fault and self.problem.solve(demand.stack.jacobian, demand.tasks, demand.contacts)
+            self._watch.update(step)
+        is_solved = not self._watch.fault and self.problem.solve()
         if is_solved is self.is_holding:
             self._switch(not is_solved)
         if is_solved:

@@ -6,31 +6,90 @@ x_B = c + T z for as many *fixed* unknowns B, and z for the *free* ones.
 
 import numpy as np
 
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import REORDERED, cached, part
+
+WHOLE_BODY = Layout(
+    "WholeBody",
+    dofs=int,
+    force_count=int,
+    inertia=(float, "dofs", "dofs"),
+    bias=(float, "dofs"),
+    passive_count=int,
+    passive=(int, "passive_count"),  # DoFs without a drive
+    driven_count=int,
+    driven=(int, "driven_count"),
+    torque_limits=(float, "driven_count"),
+    lower_acceleration=(float, "dofs"),
+    upper_acceleration=(float, "dofs"),
+    # tasks: W J and W r, and the weight of each unknown's square
+    row_count=int,
+    task_rows=(float, "row_count", "dofs"),
+    desired=(float, "row_count"),
+    smallest=(float, "dofs + force_count"),
+    # contacts, see `solfer.components.inverse_dynamics.ground.Ground`, and the accelerations that they are to have
+    contact_count=int,
+    cone_count=int,
+    jacobian=(float, "force_count", "dofs"),
+    demanded=(float, "force_count"),
+    holds=(bool, "force_count"),
+    cones=(float, "cone_count", "force_count"),
+    normals=(float, "contact_count", "force_count"),
+    largest=(float, "contact_count"),
+    unit=float,
+    # elimination: A of the equalities, b and then c, the fixed and the free unknowns, T, and work space
+    fixed_count=int,
+    free_count=int,
+    rows=(float, "fixed_count", "dofs + force_count"),
+    sides=(float, "fixed_count"),
+    fixed=(int, "fixed_count"),
+    free=(int, "free_count"),
+    table=(float, "fixed_count", "free_count"),
+    work=(float, 3, "dofs + force_count"),
+    origins=(float, "force_count", "force_count"),
+    # the QP over z
+    limit_count=int,
+    hessian=(float, "free_count", "free_count"),
+    gradient=(float, "free_count"),
+    matrix=(float, "limit_count", "free_count"),
+    lower=(float, "limit_count"),
+    upper=(float, "limit_count"),
+    z_min=(float, "free_count"),
+    z_max=(float, "free_count"),
+    # the solution
+    z=(float, "free_count"),
+    acceleration=(float, "dofs"),
+    force=(float, "force_count"),
+    torque=(float, "dofs"),
+)
+"""What `build` and `finish` read and write."""
+
+_whole_body_at = WHOLE_BODY.at
 
 
 @part
-def _write_equalities(inertia, bias, jacobian, demanded, unit, dofs, holds, rows, sides):
+def _write_equalities(body):
     """Write the rows A x = b: no torque at some DoFs, and accelerations of contacts; no force where one is lifted."""
-    size = len(bias)
-    count = len(demanded)
-    count_dofs = len(dofs)
-    for i in range(count_dofs):
-        dof = dofs[i]
-        sides[i] = -bias[dof]
+    size = body.dofs
+    first = body.passive_count
+    rows = body.rows
+    sides = body.sides
+    for i in range(first):
+        dof = body.passive[i]
+        sides[i] = -body.bias[dof]
         for j in range(size):
-            rows[i, j] = inertia[dof, j]
-        for j in range(count):
-            rows[i, size + j] = -unit * jacobian[j, dof]
-    for i in range(count):
-        rows[count_dofs + i] = 0.0
-        sides[count_dofs + i] = 0.0
-        if holds[i]:
-            sides[count_dofs + i] = demanded[i]
+            rows[i, j] = body.inertia[dof, j]
+        for j in range(body.force_count):
+            rows[i, size + j] = -body.unit * body.jacobian[j, dof]
+    for i in range(body.force_count):
+        rows[first + i] = 0.0
+        sides[first + i] = 0.0
+        if body.holds[i]:
+            sides[first + i] = body.demanded[i]
             for j in range(size):
-                rows[count_dofs + i, j] = jacobian[i, j]
+                rows[first + i, j] = body.jacobian[i, j]
         else:
-            rows[count_dofs + i, size + i] = 1.0
+            rows[first + i, size + i] = 1.0
 
 
 @part
@@ -133,18 +192,18 @@ def _sort(rows, fixed, free, table):
 
 
 @part
-def _reduce(row, fixed, sides, free, table, out):
+def _reduce(body, row, out):
     """Write a row over the first unknowns x as one over z; return its constant part."""
     size = len(row)
     constant = 0.0
-    for j in range(len(free)):
-        out[j] = row[free[j]] if free[j] < size else 0.0
-    for i in range(len(fixed)):
-        if fixed[i] < size and row[fixed[i]] != 0.0:
-            entry = row[fixed[i]]
-            constant += entry * sides[i]
-            for j in range(len(free)):
-                out[j] += entry * table[i, j]
+    for j in range(body.free_count):
+        out[j] = row[body.free[j]] if body.free[j] < size else 0.0
+    for i in range(body.fixed_count):
+        if body.fixed[i] < size and row[body.fixed[i]] != 0.0:
+            entry = row[body.fixed[i]]
+            constant += entry * body.sides[i]
+            for j in range(body.free_count):
+                out[j] += entry * body.table[i, j]
     return constant
 
 
@@ -160,129 +219,106 @@ def _add_square(row, left, weight, hessian, gradient):
 
 
 @part
-def _write_cost(jacobian, desired, smallest, fixed, sides, free, table, row, hessian, gradient):
+def _write_cost(body):
     """Write the cost of all tasks, with a small weight of each unknown's square."""
+    hessian = body.hessian
+    gradient = body.gradient
+    row = body.work[1, : body.free_count]
     hessian[:] = 0.0
     gradient[:] = 0.0
-    for i in range(len(desired)):
-        constant = _reduce(jacobian[i], fixed, sides, free, table, row)
-        _add_square(row, desired[i] - constant, 1.0, hessian, gradient)
-    for i in range(len(fixed)):
-        _add_square(table[i], -sides[i], smallest[fixed[i]], hessian, gradient)
-    for i in range(len(free)):
-        hessian[i, i] += smallest[free[i]]
+    for i in range(body.row_count):
+        constant = _reduce(body, body.task_rows[i], row)
+        _add_square(row, body.desired[i] - constant, 1.0, hessian, gradient)
+    for i in range(body.fixed_count):
+        _add_square(body.table[i], -body.sides[i], body.smallest[body.fixed[i]], hessian, gradient)
+    for i in range(body.free_count):
+        hessian[i, i] += body.smallest[body.free[i]]
         for j in range(i):
             hessian[j, i] = hessian[i, j]
 
 
-def _build(
-    inertia,
-    bias,
-    jacobian,
-    demanded,
-    unit,
-    passive,
-    holds,
-    tasks,
-    desired,
-    smallest,
-    driven,
-    torques,
-    cones,
-    normals,
-    most,
-    lower_acceleration,
-    upper_acceleration,
-    rows,
-    sides,
-    fixed,
-    free,
-    table,
-    work,
-    origins,
-    hessian,
-    gradient,
-    matrix,
-    lower,
-    upper,
-    least,
-    largest,
-):
+def _build(start):
     """Write the QP over z; return whether the equalities have a solution.
 
     Rows of inequalities: torques of the driven DoFs, cones, normal forces, and the bounds of the fixed accelerations.
     """
-    size = len(bias)
-    count_forces = len(demanded)
-    _write_equalities(inertia, bias, jacobian, demanded, unit, passive, holds, rows, sides)
-    if not _eliminate(rows, sides, len(passive), fixed, work[0], origins):
+    body = _whole_body_at(start)
+    size = body.dofs
+    matrix = body.matrix
+    lower = body.lower
+    upper = body.upper
+    _write_equalities(body)
+    if not _eliminate(body.rows, body.sides, body.passive_count, body.fixed, body.work[0], body.origins):
         return False
-    _sort(rows, fixed, free, table)
-    _write_cost(tasks, desired, smallest, fixed, sides, free, table, work[1, : len(free)], hessian, gradient)
-    row = work[2]
+    _sort(body.rows, body.fixed, body.free, body.table)
+    _write_cost(body)
+    row = body.work[2]
     place = 0
-    for i in range(len(driven)):
-        dof = driven[i]
+    for i in range(body.driven_count):
+        dof = body.driven[i]
         for j in range(size):
-            row[j] = inertia[dof, j]
-        for j in range(count_forces):
-            row[size + j] = -unit * jacobian[j, dof]
-        constant = bias[dof] + _reduce(row[: size + count_forces], fixed, sides, free, table, matrix[place])
-        lower[place], upper[place] = -torques[i] - constant, torques[i] - constant
+            row[j] = body.inertia[dof, j]
+        for j in range(body.force_count):
+            row[size + j] = -body.unit * body.jacobian[j, dof]
+        constant = body.bias[dof] + _reduce(body, row, matrix[place])
+        lower[place], upper[place] = -body.torque_limits[i] - constant, body.torque_limits[i] - constant
         place += 1
     row[:size] = 0.0
-    for i in range(len(cones)):
-        for j in range(count_forces):
-            row[size + j] = cones[i, j]
-        constant = _reduce(row[: size + count_forces], fixed, sides, free, table, matrix[place])
+    for i in range(body.cone_count):
+        row[size:] = body.cones[i]
         lower[place] = -np.inf
-        upper[place] = -constant
+        upper[place] = -_reduce(body, row, matrix[place])
         place += 1
-    for i in range(len(normals)):
-        for j in range(count_forces):
-            row[size + j] = normals[i, j]
-        constant = _reduce(row[: size + count_forces], fixed, sides, free, table, matrix[place])
-        lower[place], upper[place] = -constant, most[i] / unit - constant
+    for i in range(body.contact_count):
+        row[size:] = body.normals[i]
+        constant = _reduce(body, row, matrix[place])
+        lower[place], upper[place] = -constant, body.largest[i] / body.unit - constant
         place += 1
-    for i in range(len(fixed)):
-        matrix[place] = table[i]
+    for i in range(body.fixed_count):
+        fixed = body.fixed[i]
+        matrix[place] = body.table[i]
         lower[place], upper[place] = -np.inf, np.inf
-        if fixed[i] < size:
-            lower[place] = lower_acceleration[fixed[i]] - sides[i]
-            upper[place] = upper_acceleration[fixed[i]] - sides[i]
+        if fixed < size:
+            lower[place] = body.lower_acceleration[fixed] - body.sides[i]
+            upper[place] = body.upper_acceleration[fixed] - body.sides[i]
         place += 1
-    for i in range(len(free)):
-        least[i], largest[i] = -np.inf, np.inf
-        if free[i] < size:
-            least[i], largest[i] = lower_acceleration[free[i]], upper_acceleration[free[i]]
+    for i in range(body.free_count):
+        free = body.free[i]
+        body.z_min[i], body.z_max[i] = -np.inf, np.inf
+        if free < size:
+            body.z_min[i], body.z_max[i] = body.lower_acceleration[free], body.upper_acceleration[free]
     return True
 
 
-def _finish(z, inertia, bias, jacobian, unit, passive, fixed, sides, free, table, acceleration, force, torque):
-    """Write accelerations, forces [N] and torques of a solution z."""
-    size = len(bias)
-    for i in range(len(free) + len(fixed)):
-        if i < len(free):
-            unknown = free[i]
-            value = z[i]
-        else:
-            unknown = fixed[i - len(free)]
-            value = sides[i - len(free)]
-            for j in range(len(free)):
-                value += table[i - len(free), j] * z[j]
-        if unknown < size:
-            acceleration[unknown] = value
-        else:
-            force[unknown - size] = unit * value
-    for i in range(size):
-        torque[i] = bias[i]
-        for j in range(size):
-            torque[i] += inertia[i, j] * acceleration[j]
-    for i in range(len(force)):
-        for j in range(size):
-            torque[j] -= jacobian[i, j] * force[i]
-    for i in range(len(passive)):
-        torque[passive[i]] = 0.0
+@part
+def _write_unknown(body, unknown, value):
+    """Write an acceleration, or a force [N]."""
+    if unknown < body.dofs:
+        body.acceleration[unknown] = value
+    else:
+        body.force[unknown - body.dofs] = body.unit * value
+
+
+def _finish(start):
+    """Write accelerations, forces [N] and torques of a solution z: x_B = c + T z, and M a + h - Jc' f."""
+    body = _whole_body_at(start)
+    torque = body.torque
+    for j in range(body.free_count):
+        _write_unknown(body, body.free[j], body.z[j])
+    for i in range(body.fixed_count):
+        value = body.sides[i]
+        for j in range(body.free_count):
+            value += body.table[i, j] * body.z[j]
+        _write_unknown(body, body.fixed[i], value)
+    for i in range(body.dofs):
+        torque[i] = body.bias[i]
+        for j in range(body.dofs):
+            torque[i] += body.inertia[i, j] * body.acceleration[j]
+    for i in range(body.force_count):
+        for j in range(body.dofs):
+            torque[j] -= body.jacobian[i, j] * body.force[i]
+    for i in range(body.passive_count):
+        torque[body.passive[i]] = 0.0
 
 
 def _touch(values, lower, upper, slack, active):
@@ -292,22 +328,6 @@ def _touch(values, lower, upper, slack, active):
         active[i] = 1 if values[i] >= upper[i] - near or values[i] <= lower[i] + near else 0
 
 
-_MATRIX = "float64[:, ::1]"
-_VECTOR = "float64[::1]"
-_INDICES = "int64[::1]"
-
-build = cached(
-    f"boolean({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, float64, {_INDICES}, boolean[::1], {_MATRIX}, {_VECTOR}, "
-    f"{_VECTOR}, {_INDICES}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, "
-    f"{_INDICES}, {_INDICES}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, "
-    f"{_VECTOR}, {_VECTOR})",
-    _build,
-    REORDERED,
-)
-finish = cached(
-    f"void({_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, float64, {_INDICES}, {_INDICES}, {_VECTOR}, {_INDICES}, "
-    f"{_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR})",
-    _finish,
-    REORDERED,
-)
-touch = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, {_INDICES})", _touch, REORDERED)
+build = cached("boolean(int64)", _build, REORDERED)
+finish = cached("void(int64)", _finish, REORDERED)
+touch = cached("void(float64[::1], float64[::1], float64[::1], float64, int64[::1])", _touch, REORDERED)

@@ -1,12 +1,13 @@
 """The QP of an inverse dynamics: accelerations and forces of contacts within all limits."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from solfer.components.inverse_dynamics.constraints import ProblemConstraints
+from solfer.components.inverse_dynamics.demand import DemandedAccelerations
 from solfer.components.inverse_dynamics.ground import Ground
-from solfer.components.inverse_dynamics.kernel import build, finish
+from solfer.components.inverse_dynamics.kernel import WHOLE_BODY, build, finish
+from solfer.dynamics import BIAS, INERTIA
+from solfer.numerics.blocks import Block
 from solfer.numerics.bounds.acceleration import AccelerationBounds
 from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
 from solfer.numerics.solvers.problem import Problem
@@ -18,42 +19,6 @@ small."""
 
 FORCE_WEIGHT = 1e-5
 """Weight of the square of each force in units of a contact's part of the weight: forces are distributed."""
-
-
-class Elimination(NamedTuple):
-    """What the kernel writes when it eliminates what the e equalities fix, in its order; see `kernel`.
-
-    Attributes:
-        rows: A, shape (e, n + k).
-        sides: b, then c, shape (e,).
-        fixed: The fixed unknowns, shape (e,).
-        free: The free ones, shape (m,).
-        table: T, shape (e, m).
-        work: Work space, shape (3, n + k).
-        origins: Work space, shape (k, k).
-    """
-
-    rows: np.ndarray
-    sides: np.ndarray
-    fixed: np.ndarray
-    free: np.ndarray
-    table: np.ndarray
-    work: np.ndarray
-    origins: np.ndarray
-
-    @classmethod
-    def empty(cls, fixed: int, free: int, forces: int) -> "Elimination":
-        """Make one of a number of fixed and of free unknowns, and of forces."""
-        unknowns = fixed + free
-        return cls(
-            np.zeros((fixed, unknowns)),
-            np.zeros(fixed),
-            np.zeros(fixed, dtype=np.int64),
-            free=np.zeros(free, dtype=np.int64),
-            table=np.zeros((fixed, free)),
-            work=np.zeros((3, unknowns)),
-            origins=np.zeros((forces, forces)),
-        )
 
 
 class WholeBodyProblem:
@@ -70,6 +35,7 @@ class WholeBodyProblem:
         ground: Its contacts.
         bounds: Bounds of the accelerations of all DoFs, updated by the caller.
         torque_limits: Largest torques of all DoFs, inf where there is none, shape (n,) [Nm, N].
+        demand: W J and W r of the tasks, and Jc a of the contacts; live.
 
     Attributes:
         acceleration: a of the last solution, shape (n,) [rad/s^2, m/s^2].
@@ -86,22 +52,27 @@ class WholeBodyProblem:
         NOT_FINITE: "is not finite",
     }
 
-    def __init__(self, robot: Robot, ground: Ground, bounds: AccelerationBounds, torque_limits: np.ndarray):
+    def __init__(
+        self,
+        robot: Robot,
+        ground: Ground,
+        bounds: AccelerationBounds,
+        torque_limits: np.ndarray,
+        demand: DemandedAccelerations,
+    ):
         size = robot.size
         forces = ground.rows.rows
-        self._robot = robot
-        self._ground = ground
+        self._dynamics = robot.dynamics
         self.bounds = bounds
         moved = np.setdiff1d(np.arange(size), robot.kinematics.followers.dofs)
         driven = np.intersect1d(robot.actuated, moved).astype(np.int64)
-        self._passive = np.setdiff1d(moved, robot.actuated).astype(np.int64)
-        fixed = len(self._passive) + forces
-        free = size - len(self._passive)
-        self._smallest = np.concatenate((np.full(size, ACCELERATION_WEIGHT), np.full(forces, FORCE_WEIGHT)))
-        self._elimination = Elimination.empty(fixed, free, forces)
+        passive = np.setdiff1d(moved, robot.actuated).astype(np.int64)
+        fixed = len(passive) + forces
+        free = size - len(passive)
         self._constraints = ProblemConstraints(robot, ground, bounds, driven, torque_limits)
         count = self._constraints.count + fixed
-        self._problem = Problem.empty(free, 0, count)
+        problem = Problem.empty(free, 0, count)
+        self._problem = problem
         self._method = ActiveSet(free, count, 1e-9)  # largest residual of a solution
         self._z = np.zeros(free)
         self.acceleration = np.zeros(size)
@@ -109,71 +80,70 @@ class WholeBodyProblem:
         self.force = np.zeros(forces)
         self.steps = 0
         self._outcome = SOLVED
+        self._block = Block(
+            WHOLE_BODY,
+            dofs=size,
+            force_count=forces,
+            inertia=self._dynamics.inertia,
+            bias=self._dynamics.bias,
+            passive_count=len(passive),
+            passive=passive,
+            driven_count=len(driven),
+            driven=driven,
+            torque_limits=self._constraints.limits,
+            lower_acceleration=bounds.lower,
+            upper_acceleration=bounds.upper,
+            row_count=len(demand.tasks),
+            task_rows=demand.stack.jacobian,
+            desired=demand.tasks,
+            smallest=np.concatenate((np.full(size, ACCELERATION_WEIGHT), np.full(forces, FORCE_WEIGHT))),
+            contact_count=len(ground.normals),
+            cone_count=len(ground.cones),
+            jacobian=ground.jacobian,
+            demanded=demand.contacts,
+            holds=ground.holds,
+            cones=ground.cones,
+            normals=ground.normals,
+            largest=ground.largest,
+            unit=ground.unit,
+            fixed_count=fixed,
+            free_count=free,
+            rows=np.zeros((fixed, size + forces)),
+            sides=np.zeros(fixed),
+            fixed=np.zeros(fixed, dtype=np.int64),
+            free=np.zeros(free, dtype=np.int64),
+            table=np.zeros((fixed, free)),
+            work=np.zeros((3, size + forces)),
+            origins=np.zeros((forces, forces)),
+            limit_count=count,
+            hessian=problem.hessian,
+            gradient=problem.gradient,
+            matrix=problem.inequality_matrix,
+            lower=problem.lower,
+            upper=problem.upper,
+            z_min=problem.x_min,
+            z_max=problem.x_max,
+            z=self._z,
+            acceleration=self.acceleration,
+            force=self.force,
+            torque=self.torque,
+        )
 
-    def solve(self, jacobian: np.ndarray, desired: np.ndarray, demanded: np.ndarray) -> bool:
-        """Solve the problem at the last update of the Robot; `violated` has the reason where there is no solution.
+    def solve(self) -> bool:
+        """Solve the problem at the last update of the Robot, and of what is demanded.
 
-        Args:
-            jacobian: W J of all tasks, shape (rows, n).
-            desired: W r, shape (rows,).
-            demanded: Jc a of contacts, shape (k,).
+        Returns:
+            Whether there is a solution; `violated` has the reason where there is none.
         """
-        dynamics = self._robot.dynamics
-        ground = self._ground
-        problem = self._problem
-        constraints = self._constraints
-        solved = self._elimination
-        inertia = dynamics.inertia
-        bias = dynamics.bias
-        held = ground.jacobian
-        is_sound = build(
-            inertia,
-            bias,
-            held,
-            demanded,
-            ground.unit,
-            self._passive,
-            ground.holds,
-            jacobian,
-            desired,
-            self._smallest,
-            constraints.driven,
-            constraints.limits,
-            ground.cones,
-            ground.normals,
-            ground.largest,
-            self.bounds.lower,
-            self.bounds.upper,
-            *solved,
-            problem.hessian,
-            problem.gradient,
-            problem.inequality_matrix,
-            problem.lower,
-            problem.upper,
-            problem.x_min,
-            problem.x_max,
-        )
+        for element in (INERTIA, BIAS):
+            self._dynamics.manager.use(element)
         self._outcome = INFEASIBLE
-        if not is_sound:
-            constraints.values[:] = np.nan
+        if not build(self._block.address):
+            self._constraints.values[:] = np.nan
             return False
-        self._outcome, self.steps, _ = self._method.solve(problem, self._z)
-        finish(
-            self._z,
-            inertia,
-            bias,
-            held,
-            ground.unit,
-            self._passive,
-            solved.fixed,
-            solved.sides,
-            solved.free,
-            solved.table,
-            self.acceleration,
-            self.force,
-            self.torque,
-        )
-        constraints.compare(self.torque, self.force, self.acceleration)
+        self._outcome, self.steps, _ = self._method.solve(self._problem, self._z)
+        finish(self._block.address)
+        self._constraints.compare(self.torque, self.force, self.acceleration)
         return bool(self._outcome == SOLVED)
 
     @property

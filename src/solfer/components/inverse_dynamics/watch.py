@@ -5,8 +5,41 @@ import math
 import numpy as np
 
 from solfer.components.inverse_dynamics.ground import Ground
+from solfer.numerics.blocks import Block, Layout
 from solfer.numerics.compilation import cached, part
 from solfer.robot import Robot
+
+WATCH = Layout(
+    "Watch",
+    dofs=int,
+    effort_count=int,
+    efforts=(int, "effort_count"),
+    # torques: the commanded ones, what springs add to them, the measured ones, and both smoothed
+    torque=(float, "dofs"),
+    springs=(float, "dofs"),
+    measured=(float, "dofs"),
+    sent=(float, "dofs"),
+    difference=(float, "dofs"),
+    limit=float,
+    # contacts: computed and measured forces, which of all contacts they are, and how they move
+    count=int,
+    force_count=int,
+    normals=(float, "count", "force_count"),
+    force=(float, "force_count"),
+    fractions=(float, "count"),
+    unit=float,
+    contact_count=int,
+    wrenches=(float, "contact_count", 6),
+    tracked=(int, "count"),
+    missing=(float, "count"),
+    starts=(int, "count + 1"),
+    slip=(float, "force_count"),
+    is_point=(bool, "count"),
+    moved=(float, "count", 3),
+)
+"""What `watch` reads and writes."""
+
+_watch_at = WATCH.at
 
 
 class DynamicsWatch:
@@ -26,20 +59,56 @@ class DynamicsWatch:
     """
 
     def __init__(self, robot: Robot, ground: Ground, efforts: np.ndarray):
-        self._robot, self._ground, self._efforts = robot, ground, efforts.astype(np.int64)
+        self._robot = robot
+        self._ground = ground
+        self._efforts = efforts.astype(np.int64)
         count = len(ground.normals)
         # [Nm] friction of wrists is more than they carry: 3 cm times the weight
         self._limit = 0.03 * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
-        contacts = robot.contacts
-        self._tracked = np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64)
         self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._springs, self._part = np.zeros((2, robot.size))
         self._sent, self._difference = np.zeros((2, robot.size))
         self._moved = np.zeros((count, 3))
         self._missing = np.zeros(count)
-        self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()], dtype=bool)
         self._time = 0.0
         self.fault = ""
+
+    def connect(self, force: np.ndarray, slip: np.ndarray) -> None:
+        """Bind what is compared.
+
+        Args:
+            force: Forces of contacts that belong to the commands, shape (k,) [N, Nm]; live.
+            slip: Velocities of the rows that contacts hold, shape (k,) [m/s, rad/s]; live.
+        """
+        ground = self._ground
+        contacts = self._robot.contacts
+        self._force = force
+        self._block = Block(
+            WATCH,
+            dofs=self._robot.size,
+            effort_count=len(self._efforts),
+            efforts=self._efforts,
+            torque=self._robot.command.torque,
+            springs=self._springs,
+            measured=self._robot.state.torque,
+            sent=self._sent,
+            difference=self._difference,
+            limit=self._limit,
+            count=len(ground.normals),
+            force_count=len(force),
+            normals=ground.normals,
+            force=force,
+            fractions=ground.fractions,
+            unit=ground.unit,
+            contact_count=len(contacts.wrenches),
+            wrenches=contacts.wrenches,
+            tracked=np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64),
+            missing=self._missing,
+            starts=ground.starts,
+            slip=slip,
+            is_point=np.array([contact.holds_a_point for contact in ground.contacts.values()], dtype=bool),
+            moved=self._moved,
+        )
 
     def start(self) -> None:
         """Begin with a robot of which nothing is known."""
@@ -58,42 +127,14 @@ class DynamicsWatch:
             if gain in command
         ]
 
-    def update(self, step: float, force: np.ndarray, slip: np.ndarray) -> None:
-        """Find what is wrong; the Robot's command is that of the last cycle.
-
-        Args:
-            step: Time since the last cycle [s].
-            force: Forces of contacts that belong to them, shape (k,) [N, Nm].
-            slip: Velocities of the rows that contacts hold, shape (k,) [m/s, rad/s].
-        """
-        robot = self._robot
-        ground = self._ground
+    def update(self, step: float) -> None:
+        """Find what is wrong, after `step` [s]; the Robot's command is that of the last cycle."""
         self._time += step
         self._add_springs()
-        found = watch(
-            step,
-            self._time > 3.0,  # [s] in which commands blend in from those of before
-            robot.command.torque,
-            self._springs,
-            robot.state.torque,
-            self._efforts,
-            self._limit,
-            self._sent,
-            self._difference,
-            ground.normals,
-            force,
-            ground.fractions,
-            ground.unit,
-            robot.contacts.wrenches,
-            self._tracked,
-            self._missing,
-            ground.starts,
-            slip,
-            self._is_point,
-            self._moved,
-        )
+        # commands blend in from those of before for 3 s
+        found = watch(self._block.address, step, self._time > 3.0)
         if found >= 0:
-            self.fault = self._text(found, ground.normals @ force)
+            self.fault = self._text(found, self._ground.normals @ self._force)
 
     def _add_springs(self) -> None:
         """Write the torques of the last command's springs and dampers at the measured state."""
@@ -120,84 +161,58 @@ class DynamicsWatch:
 
 
 @part
-def _lost(coefficient, torque, springs, measured, efforts, limit, sent, difference, is_calm):
+def _lost(block, coefficient, is_calm):
     """Compare torques; return a DoF that has lost its own, or -1."""
     found = -1
     any_measured = False
-    for dof in efforts:
-        any_measured = any_measured or measured[dof] != 0.0
-        sent[dof] += coefficient * (torque[dof] - sent[dof])
-        lower = min(springs[dof], 0.0)
-        upper = max(springs[dof], 0.0)
-        away = measured[dof] - torque[dof]
+    for dof in block.efforts:
+        any_measured = any_measured or block.measured[dof] != 0.0
+        block.sent[dof] += coefficient * (block.torque[dof] - block.sent[dof])
+        lower = min(block.springs[dof], 0.0)
+        upper = max(block.springs[dof], 0.0)
+        away = block.measured[dof] - block.torque[dof]
         away -= min(max(away, lower), upper)
-        difference[dof] += coefficient * (away - difference[dof])
-        if abs(difference[dof]) > max(0.5 * abs(sent[dof]), limit) and found < 0:
+        block.difference[dof] += coefficient * (away - block.difference[dof])
+        if abs(block.difference[dof]) > max(0.5 * abs(block.sent[dof]), block.limit) and found < 0:
             found = dof
     return found if any_measured and is_calm else -1
 
 
-def _watch(
-    step,
-    is_calm,
-    torque,
-    springs,
-    measured,
-    efforts,
-    limit,
-    sent,
-    difference,
-    normals,
-    force,
-    fractions,
-    unit,
-    wrenches,
-    tracked,
-    missing,
-    starts,
-    slip,
-    is_point,
-    moved,
-):
+def _watch(start, step, is_calm):
     """See `DynamicsWatch.update`; return the number of a DoF, of a contact that slips, or of one that is absent."""
-    size = len(torque)
-    count = len(tracked)
+    block = _watch_at(start)
+    moved = block.moved
     smoothing_time = 0.2  # [s] motors swing, and take a while
-    found = _lost(min(step / smoothing_time, 1.0), torque, springs, measured, efforts, limit, sent, difference, is_calm)
+    found = _lost(block, min(step / smoothing_time, 1.0), is_calm)
     if found >= 0:
         return found
     forgetting_time = 0.5  # [s] after which the displacement of a contact does not count
     are_measured = False
-    for i in range(count):
+    for i in range(block.count):
         for k in range(3):
-            are_measured = are_measured or wrenches[tracked[i], k] != 0.0
-    for i in range(count):
+            are_measured = are_measured or block.wrenches[block.tracked[i], k] != 0.0
+    for i in range(block.count):
+        first = block.starts[i]
         distance = 0.0
-        for k in range(3 if is_point[i] or starts[i + 1] - starts[i] == 6 else 0):
-            moved[i, k] += step * (slip[starts[i] + k] - moved[i, k] / forgetting_time)
-            if fractions[i] < 1.0:
+        for k in range(3 if block.is_point[i] or block.starts[i + 1] - first == 6 else 0):
+            moved[i, k] += step * (block.slip[first + k] - moved[i, k] / forgetting_time)
+            if block.fractions[i] < 1.0:
                 moved[i, k] = 0.0
             distance += moved[i, k] ** 2
         if math.sqrt(distance) > 0.02:  # [m]
-            return size + i
+            return block.dofs + i
         pressed = 0.0
         computed = 0.0
         for k in range(3):
-            pressed += wrenches[tracked[i], k] ** 2
-        for k in range(len(force)):
-            computed += normals[i, k] * force[k]
-        is_absent = math.sqrt(pressed) < 0.05 * unit and computed > 0.3 * unit and fractions[i] == 1.0
-        missing[i] = missing[i] + step if are_measured and is_absent else 0.0
-        if missing[i] > 0.2:  # [s]
-            return size + count + i
+            pressed += block.wrenches[block.tracked[i], k] ** 2
+        for k in range(block.force_count):
+            computed += block.normals[i, k] * block.force[k]
+        is_light = math.sqrt(pressed) < 0.05 * block.unit
+        is_absent = is_light and computed > 0.3 * block.unit and block.fractions[i] == 1.0
+        block.missing[i] = block.missing[i] + step if are_measured and is_absent else 0.0
+        if block.missing[i] > 0.2:  # [s]
+            return block.dofs + block.count + i
     return -1
 
 
-_ROWS = "float64[:, ::1]"
-_ROW = "float64[::1]"
-_INDICES = "int64[::1]"
-watch = cached(
-    f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, "
-    f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, boolean[::1], {_ROWS})",
-    _watch,
-)
+watch = cached("int64(int64, float64, boolean)", _watch)
