@@ -1,10 +1,10 @@
 """Levels of tasks by null spaces whose projections are damped like their inverses, as the original program has them."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from solfer.numerics.blocks import Block, Layout
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.compilation import REORDERED, cached, part
 
@@ -166,34 +166,53 @@ def _farthest(columns, lower, upper, is_free, found, scale):
     return place
 
 
-def _descend(
-    jacobian,
-    velocity,
-    damping,
-    ends,
-    columns,
-    rigid,
-    bounds,
-    rows,
-    solved,
-    factor,
-    numbers,
-    found,
-    held,
-    first,
-    used,
-    is_free,
-    out,
-):
+DESCENT = Layout(
+    "Descent",
+    level_count=int,
+    row_count=int,
+    width=int,  # number of DoFs that move
+    dofs=int,
+    rigid=int,
+    ends=(int, "level_count + 1"),
+    columns=(int, "width"),
+    # rows that count: their entries, S, L; rates, squares of dampings, weights; and where levels end
+    rows=(float, "row_count", "width"),
+    solved=(float, "row_count", "width"),
+    factor=(float, "row_count", "row_count"),
+    numbers=(float, 3, "row_count"),
+    used=(int, "level_count + 1"),
+    # velocities of the columns: by all levels, where they are held, those without bounds, and which are free
+    found=(float, "width"),
+    held=(float, "width"),
+    first=(float, "width"),
+    is_free=(bool, "width"),
+    out=(float, "dofs"),
+)
+"""What `descend` computes in, and its result."""
+
+_descent_at = DESCENT.at
+
+
+def _descend(start, jacobian, velocity, damping, bounds):
     """Write the velocities; return the number of joints at their bounds, the scale, and the DoF that bounds it.
 
     See `DampedDescent`.
     """
-    size = _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers)
+    block = _descent_at(start)
+    columns = block.columns
+    rows = block.rows
+    numbers = block.numbers
+    used = block.used
+    found = block.found
+    held = block.held
+    first = block.first
+    is_free = block.is_free
+    out = block.out
+    size = _gather(jacobian, velocity, damping, block.ends, columns, rows, used, numbers)
     width = len(columns)
     rows = rows[:size]
-    solved = solved[:size]
-    factor = factor[:size]
+    solved = block.solved[:size]
+    factor = block.factor[:size]
     rates = numbers[0]
     squares = numbers[1]
     weights = numbers[2]
@@ -229,7 +248,7 @@ def _descend(
             for a in range(width):
                 if not is_free[a]:
                     found[a] = held[a]
-            if _slides(rows, rates, used[rigid], found, is_free):
+            if _slides(rows, rates, used[block.rigid], found, is_free):
                 scale, last = _shorten(columns, lower, upper, first)
                 found[:] = first
                 break
@@ -238,40 +257,11 @@ def _descend(
     return count, scale, columns[last] if last >= 0 else -1
 
 
-_MATRIX = "float64[:, ::1]"
-_VECTOR = "float64[::1]"
-_INDICES = "int64[::1]"
-
 descend = cached(
-    f"Tuple((int64, float64, int64))({_MATRIX}, {_VECTOR}, float64[:], {_INDICES}, {_INDICES}, int64, {_MATRIX}, "
-    f"{_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_INDICES}, boolean[::1], "
-    f"{_VECTOR})",
+    "Tuple((int64, float64, int64))(int64, float64[:, ::1], float64[::1], float64[:], float64[:, ::1])",
     _descend,
     REORDERED,
 )
-
-
-class _Buffers(NamedTuple):
-    """What the kernel computes in, in its order, for rows of all levels and the DoFs that move (width).
-
-    Attributes:
-        rows, solved: Shape (rows, width).
-        factor: Shape (rows, rows).
-        numbers: Shape (3, rows).
-        found, held, first: Shape (width,).
-        used: Shape (levels + 1,).
-        is_free: Shape (width,).
-    """
-
-    rows: np.ndarray
-    solved: np.ndarray
-    factor: np.ndarray
-    numbers: np.ndarray
-    found: np.ndarray
-    held: np.ndarray
-    first: np.ndarray
-    used: np.ndarray
-    is_free: np.ndarray
 
 
 class DampedDescent:
@@ -311,22 +301,28 @@ class DampedDescent:
     def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray, rigid: int = 0):
         rows = int(ends[-1])
         width = len(columns)
-        self._ends = ends.astype(np.int64)
-        self._columns = columns.astype(np.int64)
-        self._rigid = rigid
-        self._buffers = _Buffers(
-            np.zeros((rows, width)),
-            np.zeros((rows, width)),
-            np.zeros((rows, rows)),
+        self._unbounded = np.zeros((0, size))
+        self.velocity = np.zeros(size)
+        self._block = Block(
+            DESCENT,
+            level_count=len(ends) - 1,
+            row_count=rows,
+            width=width,
+            dofs=size,
+            rigid=rigid,
+            ends=ends.astype(np.int64),
+            columns=columns.astype(np.int64),
+            rows=np.zeros((rows, width)),
+            solved=np.zeros((rows, width)),
+            factor=np.zeros((rows, rows)),
             numbers=np.zeros((3, rows)),
+            used=np.zeros(len(ends), dtype=np.int64),
             found=np.zeros(width),
             held=np.zeros(width),
             first=np.zeros(width),
-            used=np.zeros(len(ends), dtype=np.int64),
             is_free=np.zeros(width, dtype=np.bool_),
+            out=self.velocity,
         )
-        self._unbounded = np.zeros((0, size))
-        self.velocity = np.zeros(size)
         self.count = 0
         self.scale = 1.0
         self.last = -1
@@ -342,15 +338,6 @@ class DampedDescent:
             damping: Damping D of each row, in the units of the rows, shape (rows,).
             bounds: Bounds of the velocities, up to date; None: there are none.
         """
-        self.count, self.scale, self.last = descend(
-            jacobian,
-            velocity,
-            damping,
-            self._ends,
-            self._columns,
-            self._rigid,
-            self._unbounded if bounds is None else bounds.limits,
-            *self._buffers,
-            self.velocity,
-        )
+        limits = self._unbounded if bounds is None else bounds.limits
+        self.count, self.scale, self.last = descend(self._block.address, jacobian, velocity, damping, limits)
         return self.velocity
