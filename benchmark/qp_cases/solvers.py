@@ -64,8 +64,8 @@ class Ours:
 
 
 @njit
-def _ours(problem, tolerance, spaces, marks, x):
-    return _compiled(*problem, tolerance, *spaces, *marks, x)
+def _ours(*given):
+    return _compiled(*given)
 
 
 class OursCompiled(Ours):
@@ -73,10 +73,8 @@ class OursCompiled(Ours):
 
     def __init__(self, problem: Problem):
         super().__init__(problem)
-        method = self._solver._method
-        spaces = method._rotated, method._factor, method._vectors
         self._x = np.zeros(len(problem.gradient))
-        self._given = tuple(vars(problem).values()), EXACT, spaces, (method._names, method._is_active), self._x
+        self._given = problem.arrays(), EXACT, self._solver._method._space, self._x
 
     def solve(self) -> Any:  # noqa: D102 see Ours
         return _ours(*self._given)

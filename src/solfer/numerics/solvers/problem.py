@@ -1,6 +1,7 @@
 """Quadratic programs: their matrices and vectors."""
 
 from dataclasses import dataclass, fields
+from operator import attrgetter
 
 import numpy as np
 
@@ -48,18 +49,16 @@ class Problem:
 
     def copy(self) -> "Problem":
         """Return the problem with arrays of its own."""
-        return Problem(*(getattr(self, field.name).copy() for field in fields(self)))
+        return Problem(*(array.copy() for array in self.arrays()))
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """Return all arrays in their order."""
+        return _ARRAYS(self)
 
     def shapes(self) -> tuple[tuple[int, ...], ...]:
         """Return the shapes of all arrays in their order."""
-        return (
-            self.hessian.shape,
-            self.gradient.shape,
-            self.equality_matrix.shape,
-            self.equality_vector.shape,
-            self.inequality_matrix.shape,
-            self.lower.shape,
-            self.upper.shape,
-            self.x_min.shape,
-            self.x_max.shape,
-        )
+        return _SHAPES(self)
+
+
+_ARRAYS = attrgetter(*(field.name for field in fields(Problem)))
+_SHAPES = attrgetter(*(f"{field.name}.shape" for field in fields(Problem)))
