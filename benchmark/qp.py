@@ -24,7 +24,7 @@ import numpy as np
 from form import Figures, parser_of
 from scipy.optimize import linprog, lsq_linear, nnls
 
-from solfer.numerics.solvers.problem import Problem
+from solfer.numerics.solvers.qp import Problem
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 

@@ -18,8 +18,7 @@ from solfer.components.inverse_dynamics import problem as whole_body
 from solfer.components.support_shaping import SupportShaping
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
-from solfer.numerics.solvers.active_set import ActiveSet
-from solfer.numerics.solvers.problem import Problem
+from solfer.numerics.solvers.qp import Problem, QpSolver, QpStatus
 from solfer.points import LinearPoint
 from solfer.tasks import QpHierarchy, Task, joint_bounds
 
@@ -32,17 +31,17 @@ INWARDS = np.array((0.0, -0.05, 0.0, 0.0, 0.05, 0.0) * 2)
 @contextmanager
 def recording(found: list[Problem]) -> Iterator[None]:
     """Append each problem that is solved meanwhile."""
-    solve = ActiveSet.solve
+    write = QpSolver.write
 
-    def record(self: ActiveSet, problem: Problem, out: np.ndarray) -> tuple[int, int, float]:
-        found.append(problem.copy())
-        return solve(self, problem, out)
+    def record(self: QpSolver, out: np.ndarray) -> tuple[QpStatus, int, float]:
+        found.append(self.problem.copy())
+        return write(self, out)
 
-    ActiveSet.solve = record  # type: ignore[method-assign]
+    QpSolver.write = record  # type: ignore[method-assign]
     try:
         yield
     finally:
-        ActiveSet.solve = solve  # type: ignore[method-assign]
+        QpSolver.write = write  # type: ignore[method-assign]
 
 
 def whole(*given: Any) -> Problem:

@@ -8,9 +8,8 @@ import daqp
 import numpy as np
 from numba import njit
 
-from solfer.numerics.solvers.active_set import _compiled
-from solfer.numerics.solvers.problem import Problem
-from solfer.numerics.solvers.qp import QpSolver, QpStatus
+from solfer.numerics.solvers import active_set
+from solfer.numerics.solvers.qp import Problem, QpSolver, QpStatus
 
 SOLVED, INFEASIBLE, UNKNOWN = "solved", "infeasible", "unknown"
 PRIMAL, DUAL = 1e-8, 1e-12
@@ -63,6 +62,9 @@ class Ours:
         return known.get(result.status, UNKNOWN), result.x
 
 
+_compiled = active_set.solve
+
+
 @njit
 def _ours(*given):
     return _compiled(*given)
@@ -74,7 +76,7 @@ class OursCompiled(Ours):
     def __init__(self, problem: Problem):
         super().__init__(problem)
         self._x = np.zeros(len(problem.gradient))
-        self._given = problem.arrays(), EXACT, self._solver._method._space, self._x
+        self._given = problem.arrays(), EXACT, self._solver._space, self._x
 
     def solve(self) -> Any:  # noqa: D102 see Ours
         return _ours(*self._given)

@@ -17,7 +17,7 @@ CHANGED = {
     "middleware/ros/topic_publisher.py": {"SendBacklog"},
     "middleware/shared_memory/rpc/calls.py": {"_PendingCall"},
     "middleware/shared_memory/rpc/services.py": {"_Call"},
-    "numerics/solvers/problem.py": {"Problem"},
+    "numerics/solvers/qp.py": {"Problem"},
     "realtime/schedule.py": {"Schedule"},
     "replay/replay.py": {"Replay"},
     "transport/messages.py": {

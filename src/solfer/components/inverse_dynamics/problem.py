@@ -8,8 +8,7 @@ from solfer.components.inverse_dynamics.constraints import ProblemConstraints
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.kernel import build, finish
 from solfer.numerics.bounds.acceleration import AccelerationBounds
-from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
-from solfer.numerics.solvers.problem import Problem
+from solfer.numerics.solvers.qp import QpSolver, QpStatus
 from solfer.robot import Robot
 
 ACCELERATION_WEIGHT = 1e-8
@@ -80,10 +79,10 @@ class WholeBodyProblem:
     """
 
     _REASONS = {
-        INFEASIBLE: "contradicts the others",
-        GAVE_UP: "takes too many steps",
-        INACCURATE: "depends on others almost",
-        NOT_FINITE: "is not finite",
+        QpStatus.INFEASIBLE: "contradicts the others",
+        QpStatus.NOT_CONVERGED: "takes too many steps",
+        QpStatus.INACCURATE: "depends on others almost",
+        QpStatus.NOT_FINITE: "is not finite",
     }
 
     def __init__(self, robot: Robot, ground: Ground, bounds: AccelerationBounds, torque_limits: np.ndarray):
@@ -101,14 +100,13 @@ class WholeBodyProblem:
         self._elimination = Elimination.empty(fixed, free, forces)
         self._constraints = ProblemConstraints(robot, ground, bounds, driven, torque_limits)
         count = self._constraints.count + fixed
-        self._problem = Problem.empty(free, 0, count)
-        self._method = ActiveSet(free, count, 1e-9)  # largest residual of a solution
+        self._solver = QpSolver(free, 0, count)
         self._z = np.zeros(free)
         self.acceleration = np.zeros(size)
         self.torque = np.zeros(size)
         self.force = np.zeros(forces)
         self.steps = 0
-        self._outcome = SOLVED
+        self._status = QpStatus.SOLVED
 
     def solve(self, jacobian: np.ndarray, desired: np.ndarray, demanded: np.ndarray) -> bool:
         """Solve the problem at the last update of the Robot; `violated` has the reason where there is no solution.
@@ -120,7 +118,7 @@ class WholeBodyProblem:
         """
         dynamics = self._robot.dynamics
         ground = self._ground
-        problem = self._problem
+        problem = self._solver.problem
         constraints = self._constraints
         solved = self._elimination
         inertia = dynamics.inertia
@@ -153,11 +151,11 @@ class WholeBodyProblem:
             problem.x_min,
             problem.x_max,
         )
-        self._outcome = INFEASIBLE
+        self._status = QpStatus.INFEASIBLE
         if not is_sound:
             constraints.values[:] = np.nan
             return False
-        self._outcome, self.steps, _ = self._method.solve(problem, self._z)
+        self._status, self.steps, _ = self._solver.write(self._z)
         finish(
             self._z,
             inertia,
@@ -174,7 +172,7 @@ class WholeBodyProblem:
             self.torque,
         )
         constraints.compare(self.torque, self.force, self.acceleration)
-        return bool(self._outcome == SOLVED)
+        return self._status is QpStatus.SOLVED
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -193,5 +191,5 @@ class WholeBodyProblem:
     @property
     def violated(self) -> str:
         """The constraint that the last `solve` could not keep beside the others, and why."""
-        name = "" if self._outcome == NOT_FINITE else self._constraints.farthest()
-        return f"{name or 'what contacts hold'} {self._REASONS[self._outcome]}"
+        name = "" if self._status is QpStatus.NOT_FINITE else self._constraints.farthest()
+        return f"{name or 'what contacts hold'} {self._REASONS[self._status]}"

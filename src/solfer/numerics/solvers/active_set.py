@@ -20,18 +20,21 @@ After a step t1 < t2 the constraint of that multiplier is dropped, and there are
 If both are infinite, n = N r with r <= 0 for inequalities: no x fulfils n beside the active ones.
 
 Constraint 2 i is the lower limit of inequality i, 2 i + 1 the upper one; the bounds of single unknowns follow.
-Equality i is -1 - i. Each is normal . x >= side (for equalities =). In `work`, the `limits` are the arrays of a
-`Problem` from `equality_matrix` on.
+Equality i is -1 - i. Each is normal . x >= side (for equalities =). Arrays come in groups, each in one order:
+
+    problem  those of a `Problem`
+    cost     hessian, gradient, and the number that is added to the diagonal of the Hessian
+    limits   those of a `Problem` from `equality_matrix` on
+    space    what `work_space` makes: rotated, factor, vectors, names, is_active
+    work     rotated, factor, names of active constraints, normal, d, z, r, multipliers, slope H x + g
 """
 
 import math
 
 import numpy as np
 
-from solfer.errors import SizeMismatch
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.dense import DENSE, cholesky
-from solfer.numerics.solvers.problem import Problem
 
 SOLVED, INFEASIBLE, GAVE_UP, INACCURATE, NOT_FINITE = range(5)
 """Outcomes of a problem."""
@@ -42,7 +45,7 @@ DEPENDENT = 1e-9
 
 @part
 def _check(cost, limits):
-    """Return NOT_FINITE or INFEASIBLE where the numbers alone say so, else SOLVED."""
+    """Return NOT_FINITE, or INFEASIBLE where a lower limit is above its upper one, else SOLVED."""
     hessian, gradient = cost
     equality_matrix, equality_vector, matrix, lower, upper, x_min, x_max = limits
     for numbers in (hessian.ravel(), gradient, equality_matrix.ravel(), equality_vector, matrix.ravel()):
@@ -438,7 +441,7 @@ def _attempt(cost, limits, tolerance, space, x):
     return GAVE_UP, steps, residual
 
 
-def solve(problem, tolerance, space, x):
+def _solve(problem, tolerance, space, x):
     """Write x; return the outcome, the number of steps, and the largest residual.
 
     What is inexact because H is almost singular is solved again as a sequence of problems whose cost has the
@@ -482,41 +485,18 @@ def solve(problem, tolerance, space, x):
 _M = "float64[:, ::1]"
 _V = "float64[::1]"
 _I = "int64[::1]"
-_compiled = cached(
+solve = cached(
     f"Tuple((int64, int64, float64))(Tuple(({_M}, {_V}, {_M}, {_V}, {_M}, {_V}, {_V}, {_V}, {_V})), float64, "
     f"Tuple(({_M}, {_M}, {_M}, {_I}, {_I})), {_V})",
-    solve,
+    _solve,
     REORDERED,
     sources=[DENSE],
 )
 
 
-class ActiveSet:
-    """Solves problems of one size; memory is fixed when it is made.
-
-    Args:
-        size: Number of unknowns n.
-        inequalities: Number of inequalities besides the bounds of single unknowns.
-        tolerance: Largest residual of a solution, see `Solution.residual`.
-    """
-
-    def __init__(self, size: int, inequalities: int, tolerance: float):
-        self._tolerance = tolerance
-        matrices = np.zeros((2, size, size))
-        names = np.zeros(size, dtype=np.int64)
-        is_active = np.zeros(2 * (size + inequalities), dtype=np.int64)
-        self._space = (matrices[0], matrices[1], np.zeros((8, size)), names, is_active)
-
-    def solve(self, problem: Problem, out: np.ndarray) -> tuple[int, int, float]:
-        """Write x into `out`, shape (n,); return the outcome, the number of steps, and the largest residual.
-
-        Raises:
-            SizeMismatch: An array of the problem is not float64 row by row.
-        """
-        try:
-            return _compiled(problem.arrays(), self._tolerance, self._space, out)
-        except TypeError as error:
-            raise SizeMismatch(
-                "an array of a problem is not float64 row by row",
-                expected="arrays as np.ascontiguousarray makes them",
-            ) from error
+def work_space(size: int, inequalities: int) -> tuple[np.ndarray, ...]:
+    """Make the memory for problems of n unknowns and a number of inequalities besides the bounds of unknowns."""
+    matrices = np.zeros((2, size, size))
+    names = np.zeros(size, dtype=np.int64)
+    is_active = np.zeros(2 * (size + inequalities), dtype=np.int64)
+    return matrices[0], matrices[1], np.zeros((8, size)), names, is_active
