@@ -17,7 +17,7 @@ CHANGED = {
     "solfer/middleware/ros/topic_publisher.py": {"SendBacklog"},
     "solfer/middleware/shared_memory/rpc/calls.py": {"_PendingCall"},
     "solfer/middleware/shared_memory/rpc/services.py": {"_Call"},
-    "solfer/numerics/solvers/problem.py": {"Problem"},
+    "solfer/numerics/solvers/qp.py": {"Problem"},
     "solfer/realtime/schedule.py": {"Schedule"},
     "solfer_tools/replay/replay.py": {"Replay"},
     "solfer/transport/messages.py": {

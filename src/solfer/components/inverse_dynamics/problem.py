@@ -9,8 +9,7 @@ from solfer.components.inverse_dynamics.kernel import WHOLE_BODY, build, finish
 from solfer.dynamics import BIAS, INERTIA
 from solfer.numerics.blocks import Block
 from solfer.numerics.bounds.acceleration import AccelerationBounds
-from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
-from solfer.numerics.solvers.problem import Problem
+from solfer.numerics.solvers.qp import QpSolver, QpStatus
 from solfer.robot import Robot
 
 ACCELERATION_WEIGHT = 1e-8
@@ -46,10 +45,10 @@ class WholeBodyProblem:
     """
 
     _REASONS = {
-        INFEASIBLE: "contradicts the others",
-        GAVE_UP: "takes too many steps",
-        INACCURATE: "depends on others almost",
-        NOT_FINITE: "is not finite",
+        QpStatus.INFEASIBLE: "contradicts the others",
+        QpStatus.NOT_CONVERGED: "takes too many steps",
+        QpStatus.INACCURATE: "depends on others almost",
+        QpStatus.NOT_FINITE: "is not finite",
     }
 
     def __init__(
@@ -71,15 +70,14 @@ class WholeBodyProblem:
         free = size - len(passive)
         self._constraints = ProblemConstraints(robot, ground, bounds, driven, torque_limits)
         count = self._constraints.count + fixed
-        problem = Problem.empty(free, 0, count)
-        self._problem = problem
-        self._method = ActiveSet(free, count, 1e-9)  # largest residual of a solution
+        self._solver = QpSolver(free, 0, count)
+        problem = self._solver.problem
         self._z = np.zeros(free)
         self.acceleration = np.zeros(size)
         self.torque = np.zeros(size)
         self.force = np.zeros(forces)
         self.steps = 0
-        self._outcome = SOLVED
+        self._status = QpStatus.SOLVED
         self._block = Block(
             WHOLE_BODY,
             dofs=size,
@@ -137,14 +135,14 @@ class WholeBodyProblem:
         """
         for element in (INERTIA, BIAS):
             self._dynamics.manager.use(element)
-        self._outcome = INFEASIBLE
+        self._status = QpStatus.INFEASIBLE
         if not build(self._block.address):
             self._constraints.values[:] = np.nan
             return False
-        self._outcome, self.steps, _ = self._method.solve(self._problem, self._z)
+        self._status, self.steps, _ = self._solver.write(self._z)
         finish(self._block.address)
         self._constraints.compare(self.torque, self.force, self.acceleration)
-        return bool(self._outcome == SOLVED)
+        return self._status is QpStatus.SOLVED
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -163,5 +161,5 @@ class WholeBodyProblem:
     @property
     def violated(self) -> str:
         """The constraint that the last `solve` could not keep beside the others, and why."""
-        name = "" if self._outcome == NOT_FINITE else self._constraints.farthest()
-        return f"{name or 'what contacts hold'} {self._REASONS[self._outcome]}"
+        name = "" if self._status is QpStatus.NOT_FINITE else self._constraints.farthest()
+        return f"{name or 'what contacts hold'} {self._REASONS[self._status]}"
