@@ -1,5 +1,6 @@
 """Compiled steps of `WeightedForces` and `TorqueOffsets`, number by number. Arrays are described there."""
 
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
@@ -35,40 +36,74 @@ def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
             rest[column] -= jacobian[i, column] * forces[i]
 
 
-def _learn(
-    jacobian, world, weights, columns, diagonal, first, fraction, decay, prior, factor, spread, needed, information,
-    learned, solved, offsets,
-):  # fmt: skip
+OFFSETS = Layout(
+    "Offsets",
+    row_count=int,
+    dofs=int,
+    jacobian=(float, "row_count", "dofs"),
+    # columns that count, the first of them that is a joint, and a number on the diagonal of J S J^T
+    column_count=int,
+    columns=(int, "column_count"),
+    first=int,
+    diagonal=float,
+    # by how much a cycle counts, by how much what is known fades in it, and what is known before
+    fraction=float,
+    decay=float,
+    prior=float,
+    # of the joints: information, the same times the offsets, and the offsets
+    size=int,
+    information=(float, "size", "size"),
+    moments=(float, "size"),
+    offsets=(float, "size"),
+    # work space
+    factor=(float, "row_count", "row_count"),
+    spread=(float, "size", "row_count"),
+    needed=(float, "row_count"),
+    solved=(float, "size", "size"),
+)
+"""What `learn` reads and writes."""
+
+_offsets_at = OFFSETS.at
+
+
+def _learn(start, world, weights):
     """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
-    rows = len(jacobian)
-    size = len(learned)
-    _normal_matrix(jacobian, weights, columns, diagonal, factor)
-    for i in range(rows):
+    block = _offsets_at(start)
+    jacobian = block.jacobian
+    columns = block.columns
+    fraction = block.fraction
+    decay = block.decay
+    spread = block.spread
+    needed = block.needed
+    solved = block.solved
+    offsets = block.offsets
+    _normal_matrix(jacobian, weights, columns, block.diagonal, block.factor)
+    for i in range(block.row_count):
         needed[i] = 0.0
         for column in columns:
             needed[i] += jacobian[i, column] * weights[column] * world[column]
-        for a in range(size):
-            column = columns[first + a]
+        for a in range(block.size):
+            column = columns[block.first + a]
             spread[a, i] = jacobian[i, column] * weights[column]
-    forward(factor, needed)
-    for a in range(size):
-        forward(factor, spread[a])
-    for a in range(size):
-        column = columns[first + a]
+    forward(block.factor, needed)
+    for a in range(block.size):
+        forward(block.factor, spread[a])
+    for a in range(block.size):
+        column = columns[block.first + a]
         left = weights[column] * world[column]
-        for i in range(rows):
+        for i in range(block.row_count):
             left -= spread[a, i] * needed[i]
-        learned[a] += -fraction * left - decay * learned[a]
+        block.moments[a] += -fraction * left - decay * block.moments[a]
         for b in range(a + 1):
             left = weights[column] if a == b else 0.0
-            for i in range(rows):
+            for i in range(block.row_count):
                 left -= spread[a, i] * spread[b, i]
-            information[a, b] += fraction * left - decay * information[a, b]
-            solved[a, b] = information[a, b]
-        solved[a, a] += prior
+            block.information[a, b] += fraction * left - decay * block.information[a, b]
+            solved[a, b] = block.information[a, b]
+        solved[a, a] += block.prior
     cholesky(solved)
-    for a in range(size):
-        offsets[a] = learned[a]
+    for a in range(block.size):
+        offsets[a] = block.moments[a]
     forward(solved, offsets)
     backward(solved, offsets)
 
@@ -82,9 +117,4 @@ fit = cached(
     _fit,
     sources=[DENSE],
 )
-learn = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, int64, float64, float64, float64, "
-    f"{_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})",
-    _learn,
-    sources=[DENSE],
-)
+learn = cached(f"void(int64, {_VECTOR}, {_VECTOR})", _learn, sources=[DENSE])

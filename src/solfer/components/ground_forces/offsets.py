@@ -1,36 +1,14 @@
 """What torque sensors show where there is no torque, from the forces that nothing else explains."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from solfer.components.ground_forces import kernel
 from solfer.components.ground_forces.tags import OffsetTags
 from solfer.components.ground_forces.weighted_forces import PRIOR_INFORMATION, weighed
+from solfer.numerics.blocks import Block
 from solfer.points.contact.contacts import Contact
-
-
-class _Estimate(NamedTuple):
-    """What the kernel keeps and computes, in its order.
-
-    Attributes:
-        factor: Shape (rows, rows).
-        spread: Shape (joints, rows).
-        needed: Shape (rows,).
-        information: Of the offsets, shape (joints, joints).
-        moments: The same times the offsets, shape (joints,).
-        solved: Shape (joints, joints).
-        offsets: Shape (joints,) [Nm, N].
-    """
-
-    factor: np.ndarray
-    spread: np.ndarray
-    needed: np.ndarray
-    information: np.ndarray
-    moments: np.ndarray
-    solved: np.ndarray
-    offsets: np.ndarray
 
 
 class TorqueOffsets:
@@ -56,33 +34,43 @@ class TorqueOffsets:
         rows = 3 * len(contacts)
         size = len(deviations)
         self._tags = tags
-        self._fraction = 0.0
-        self._decay = 0.0
         self._calm = deviations**-2
         self._pushed = self._calm.copy()
         if base:
             self._calm[:6] = tags.push**-2
             self._pushed[:6] = 0.0
-        self._columns = weighed(contacts, deviations**-2)
-        self._first = int(np.count_nonzero(self._columns < 6)) if base else 0
-        self._joints = self._columns[self._first :]
+        columns = weighed(contacts, deviations**-2)
+        first = int(np.count_nonzero(columns < 6)) if base else 0
+        self._joints = columns[first:]
         count = len(self._joints)
         self._jacobian = np.zeros((rows, size))
-        self._estimate = _Estimate(
-            np.zeros((rows, rows)),
-            np.zeros((count, rows)),
-            np.zeros(rows),
+        self._offsets = np.zeros(count)
+        self._block = Block(
+            kernel.OFFSETS,
+            row_count=rows,
+            dofs=size,
+            jacobian=self._jacobian,
+            column_count=len(columns),
+            columns=columns,
+            first=first,
+            diagonal=PRIOR_INFORMATION,
+            size=count,
             information=np.zeros((count, count)),
             moments=np.zeros(count),
+            offsets=self._offsets,
+            factor=np.zeros((rows, rows)),
+            spread=np.zeros((count, rows)),
+            needed=np.zeros(rows),
             solved=np.zeros((count, count)),
-            offsets=np.zeros(count),
         )
         self.value = np.zeros(size)
 
     def start(self, period: float) -> None:
         """Begin with cycles of `period` [s]; what is known stays."""
-        self._fraction = period / self._tags.interval
-        self._decay = period / self._tags.memory
+        record = self._block.record
+        record["fraction"] = period / self._tags.interval
+        record["decay"] = period / self._tags.memory
+        record["prior"] = self._tags.deviation**-2
 
     def update(self, jacobian: np.ndarray, world: np.ndarray, lifted: np.ndarray, pushed: bool) -> None:
         """Learn from a cycle.
@@ -97,16 +85,5 @@ class TorqueOffsets:
         for index in range(len(lifted)):
             if lifted[index]:
                 self._jacobian[3 * index : 3 * index + 3] = 0.0
-        kernel.learn(
-            self._jacobian,
-            world,
-            self._pushed if pushed else self._calm,
-            self._columns,
-            PRIOR_INFORMATION,
-            self._first,
-            self._fraction,
-            self._decay,
-            self._tags.deviation**-2,
-            *self._estimate,
-        )
-        self.value[self._joints] = self._estimate.offsets
+        kernel.learn(self._block.address, world, self._pushed if pushed else self._calm)
+        self.value[self._joints] = self._offsets
