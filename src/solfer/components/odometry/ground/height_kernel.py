@@ -2,10 +2,31 @@
 
 import math
 
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
 
 FLOOR_TOLERANCE = 0.008
 """How far a wheel may be above or below a floor and still be on it [m]: twice what floors are uneven (DIN 18202)."""
+
+
+HEIGHTS = Layout(
+    "Heights",
+    count=int,  # number of wheels
+    sample_count=int,
+    cycle=(int, 1),
+    radii=(float, "count"),
+    floor=(float, 2),  # its height, NaN where there is none; and how far wheels have rolled on even ground
+    # samples of each wheel's track in a ring, how far each was above the floor, and their number
+    tracks=(float, "count", "sample_count", 3),
+    risen=(float, "count", "sample_count"),
+    heads=(int, "count"),
+    followed=(int, "count", 2),  # track and sample that a wheel follows; -1: none
+    leading=(float, "count"),
+    places=(float, "count", 3),
+)
+"""What the kernels read and write."""
+
+_heights_at = HEIGHTS.at
 
 
 @part
@@ -73,14 +94,18 @@ def leads(arm, x, y, velocity, yaw_rate, before):
     return before
 
 
-def _missing_height(
-    arms, normal, radii, position, heading, weights, velocity, yaw_rate, cycle, floor, tracks, heads, followed, leading,
-    places,
-):  # fmt: skip
+def _missing_height(start, arms, normal, position, heading, weights, velocity, yaw_rate):
     """Write the lowest points of the wheels as `places`; return how far the base is below the map [m], NaN: unknown."""
+    heights = _heights_at(start)
+    radii = heights.radii
+    floor = heights.floor
+    followed = heights.followed
+    leading = heights.leading
+    places = heights.places
+    heights.cycle[0] += 1
     cosine = math.cos(heading)
     sine = math.sin(heading)
-    count = len(arms)
+    count = heights.count
     x0 = y0 = total = 0.0
     for i in range(count):
         if weights[i] > 0.0:
@@ -104,12 +129,12 @@ def _missing_height(
             followed[i, 0] = -1
             continue
         leading[i] = leads(arms[i], arms[i, 0] - x0, arms[i, 1] - y0, velocity, yaw_rate, leading[i])
-        if followed[i, 0] < 0 and cycle % count == i:
-            find_track(tracks, heads, i, places[i, 0], places[i, 1], followed)
+        if followed[i, 0] < 0 and heights.cycle[0] % count == i:
+            find_track(heights.tracks, heights.heads, i, places[i, 0], places[i, 1], followed)
         height = math.nan
         weight = 1.0
         if followed[i, 0] >= 0:
-            height = height_on_track(tracks, heads, i, places[i, 0], places[i, 1], slope, followed)
+            height = height_on_track(heights.tracks, heights.heads, i, places[i, 0], places[i, 1], slope, followed)
         if math.isnan(height):
             if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > FLOOR_TOLERANCE:
                 continue
@@ -135,13 +160,19 @@ def end_floor(tracks, heads, risen, wheel):
         later = abs(off)
 
 
-def _note(places, raised, weights, floor, tracks, risen, heads):
+def _note(start, raised, weights):
     """Note where wheels are, on tracks and on floors, when the base has been raised [m].
 
     Returns whether all wheels that touch are on the floor.
     """
-    count = len(places)
-    size = tracks.shape[1]
+    heights = _heights_at(start)
+    places = heights.places
+    floor = heights.floor
+    tracks = heights.tracks
+    risen = heights.risen
+    heads = heights.heads
+    count = heights.count
+    size = heights.sample_count
     on_floor = 0
     touching = 0
     lowest = 1e9
@@ -186,13 +217,6 @@ def _note(places, raised, weights, floor, tracks, risen, heads):
 
 
 _V = "float64[::1]"
-_M = "float64[:, ::1]"
-_F = "float64"
-_T = "float64[:, :, ::1]"
-_N = "int64[::1]"
 
-missing_height = cached(
-    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, int64[:, ::1], {_V}, {_M})",
-    _missing_height,
-)
-note = cached(f"boolean({_M}, {_F}, {_V}, {_V}, {_T}, {_M}, {_N})", _note)
+missing_height = cached(f"float64(int64, float64[:, ::1], {_V}, {_V}, float64, {_V}, {_V}, float64)", _missing_height)
+note = cached(f"boolean(int64, float64, {_V})", _note)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry.ground import height_kernel as kernel
+from solfer.numerics.blocks import Block
 
 
 class HeightMap:
@@ -24,16 +25,27 @@ class HeightMap:
 
     def __init__(self, radii: np.ndarray):
         count = len(radii)
-        self._radii = radii
-        self._cycle = 0
         samples = 256  # of a track: 5 m; older ones are dropped
-        self._tracks = np.zeros((count, samples, 3))
+        self._cycle = np.zeros(1, dtype=np.int64)
         self._risen = np.zeros((count, samples))
         self._heads = np.zeros(count, dtype=np.int64)
         self._followed = np.zeros((count, 2), dtype=np.int64)
         self._leading = np.zeros(count)
-        self._places = np.zeros((count, 3))
         self._floor = np.array((math.nan, 0.0))
+        self._block = Block(
+            kernel.HEIGHTS,
+            count=count,
+            sample_count=samples,
+            cycle=self._cycle,
+            radii=radii,
+            floor=self._floor,
+            tracks=np.zeros((count, samples, 3)),
+            risen=self._risen,
+            heads=self._heads,
+            followed=self._followed,
+            leading=self._leading,
+            places=np.zeros((count, 3)),
+        )
         self.level = False
 
     @property
@@ -46,7 +58,7 @@ class HeightMap:
         self.forget()
         self._floor[:] = floor, 0.0
         self._leading[:] = 0.0
-        self._cycle = 0
+        self._cycle[:] = 0
         self.level = not math.isnan(floor)
 
     def forget(self) -> None:
@@ -77,16 +89,9 @@ class HeightMap:
             velocity: Velocity of the base in the heading frame, shape (3,) [m/s].
             yaw_rate: Yaw rate [rad/s].
         """
-        self._cycle += 1
-        return float(
-            kernel.missing_height(
-                arms, normal, self._radii, position, heading, weights, velocity, yaw_rate, self._cycle, self._floor,
-                self._tracks, self._heads, self._followed, self._leading, self._places,
-            )
-        )  # fmt: skip
+        address = self._block.address
+        return float(kernel.missing_height(address, arms, normal, position, heading, weights, velocity, yaw_rate))
 
     def note(self, raised: float, weights: np.ndarray) -> None:
         """Note where wheels are after the base has been raised [m]; weights are those of `missing_height`."""
-        self.level = bool(
-            kernel.note(self._places, raised, weights, self._floor, self._tracks, self._risen, self._heads)
-        )
+        self.level = bool(kernel.note(self._block.address, raised, weights))
