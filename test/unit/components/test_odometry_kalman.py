@@ -15,6 +15,7 @@ from solfer.components.odometry.kalman import (
     WheelInertialFilter,
 )
 from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, TILT
+from solfer.numerics.blocks import Block
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
@@ -154,6 +155,21 @@ AXIS = np.array((0.1, -0.2, math.sqrt(0.95)))
 STATE = np.random.default_rng(11).normal(scale=0.05, size=kernel.RADIUS + 4)
 
 
+def values(**changed):
+    """Make what the kernels read and write, of four wheels."""
+    size = len(STATE)
+    square = {name: np.zeros((size, size)) for name in ("covariance", "transition", "noise", "half")}
+    arrays = {
+        **square,
+        "state": STATE.copy(),
+        "axes": np.stack((np.zeros(3), np.zeros(3), AXIS)),
+        "rows": np.zeros((4, 3, size)),
+        "innovations": np.zeros((4, 3)),
+        "rolling": np.ones(4),
+    }
+    return Block(kernel.FILTER, size=size, count=4, **(arrays | changed)).values
+
+
 def jacobian(function, at):
     """Compute central differences."""
     step = 1e-6 * np.eye(len(at))
@@ -172,11 +188,12 @@ def test_the_jacobian_of_wheels_is_that_of_their_velocity(share):
             turn = RATE - share * bias + (state[kernel.SCRUB] if share else 0.0)
             return (1.0 - state[kernel.RADIUS + wheel]) * (state[kernel.VELOCITY : GYRO_BIAS] + turn * ACROSS[wheel])
 
-        expected, rows = np.zeros(3), np.zeros((3, len(at)))
-        kernel.wheel_velocity(at, wheel, ARMS[wheel], AXIS, RATE, share, expected)
-        kernel.set_wheel_rows(rows, wheel, ARMS[wheel], AXIS, share, expected)
+        expected = np.zeros(3)
+        kalman = values(state=at)
+        kernel.wheel_velocity(kalman, wheel, ARMS[wheel], RATE, share, expected)
+        kernel.set_wheel_rows(kalman, wheel, ARMS[wheel], share, expected)
         np.testing.assert_allclose(expected, velocity(at), atol=1e-15)
-        np.testing.assert_allclose(rows, jacobian(velocity, at), atol=1e-9)
+        np.testing.assert_allclose(kalman.rows[wheel], jacobian(velocity, at), atol=1e-9)
 
 
 @pytest.mark.parametrize("imu_time", [PERIOD, 0.0])
@@ -198,9 +215,9 @@ def test_the_jacobian_of_the_pose_is_that_of_its_integral(imu_time):
         after[HEADING] -= imu_time * bias if imu_time else PERIOD * state[kernel.SCRUB]
         return after
 
-    transition = np.zeros((len(at), len(at)))
-    kernel.set_pose_process(transition, AXIS, heading, velocity, PERIOD, imu_time)
-    np.testing.assert_allclose(transition, jacobian(integrate, at), atol=1e-9)
+    kalman = values(state=at)
+    kernel.set_pose_process(kalman, heading, PERIOD, imu_time)
+    np.testing.assert_allclose(kalman.transition, jacobian(integrate, at), atol=1e-9)
 
 
 def test_the_jacobian_of_the_process_is_that_of_its_equations():
@@ -227,9 +244,9 @@ def test_the_jacobian_of_the_process_is_that_of_its_equations():
         after[kernel.SLOPE : kernel.RADIUS] = slope_keep * rotated(turn, state[kernel.SLOPE : kernel.RADIUS])
         return after
 
-    transition = np.zeros((len(STATE), len(STATE)))
-    kernel.set_process(transition, axes, arm, heading, turn, turn, PERIOD, keep, slope_keep, np.zeros(3))
-    np.testing.assert_allclose(transition, jacobian(process, STATE), atol=1e-9)
+    kalman = values(axes=axes)
+    kernel.set_process(kalman, arm, heading, (turn, turn), PERIOD, (keep, slope_keep))
+    np.testing.assert_allclose(kalman.transition, jacobian(process, STATE), atol=1e-9)
 
 
 def test_the_covariance_is_propagated_and_corrected_as_matrices_are():
@@ -238,15 +255,16 @@ def test_the_covariance_is_propagated_and_corrected_as_matrices_are():
     covariance = root @ root.T
     transition, noise = random.normal(size=(2, size, size))
     noise = noise @ noise.T
-    half = np.zeros((size, size))
+    state = STATE.copy()
+    kalman = values(covariance=covariance, transition=transition, noise=noise, state=state)
     expected = transition @ covariance @ transition.T + noise
-    kernel.propagate(covariance, transition, noise, half)
+    kernel.propagate(kalman)
     np.testing.assert_allclose(covariance, expected, rtol=1e-10, atol=1e-10)
-    state, row = STATE.copy(), random.normal(size=size)
+    row = random.normal(size=size)
     variance = row @ expected @ row + 0.3
     gain = expected @ row / variance
     gain[:HEADING] = gain[kernel.RADIUS :] = 0.0  # considered
-    kernel.update(covariance, state, row, 0.2, 0.3, half[0], half[1], HEADING)
+    kernel.update(kalman, row, 0.2, 0.3, HEADING)
     np.testing.assert_allclose(state, STATE + 0.2 * gain, rtol=1e-10)
     left = np.eye(size) - np.outer(gain, row)
     np.testing.assert_allclose(covariance, left @ expected @ left.T + 0.3 * np.outer(gain, gain), atol=1e-8)

@@ -7,6 +7,7 @@ import numpy as np
 
 from solfer.components.odometry import kalman_kernel as kernel
 from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, RADIUS, SCRUB, SLOPE, TILT, VELOCITY
+from solfer.numerics.blocks import Block
 
 TILT_TIME_CONSTANT = 30.0
 """Time constant of the error of the tilt that an IMU measures [s]."""
@@ -48,20 +49,6 @@ class FilterVariances(NamedTuple):
     walk: float
     radius: float
     tilt: float
-
-
-class FilterBuffers(NamedTuple):
-    """What the kernels of a step write besides its results, in the order in which they take it.
-
-    Attributes:
-        transition: Transition of the state, shape (n, n).
-        process_noise: Covariance of its noise, shape (n, n).
-        half: Half of a product of three matrices, shape (n, n).
-    """
-
-    transition: np.ndarray
-    process_noise: np.ndarray
-    half: np.ndarray
 
 
 class WheelInertialFilter:
@@ -137,8 +124,22 @@ class WheelInertialFilter:
         self._bias_of_base = self.state[GYRO_BIAS : GYRO_BIAS + 3]
         self.rolling = np.ones(count)
         self.innovations = np.zeros((count, 3))
-        self._rows = np.zeros((count, 3, size))
-        self._buffers = FilterBuffers(*np.zeros((3, size, size)))
+        transition, noise_covariance, half = np.zeros((3, size, size))
+        self._block = Block(
+            kernel.FILTER,
+            size=size,
+            count=count,
+            covariance=self.covariance,
+            state=self.state,
+            axes=self.axes,
+            rows=np.zeros((count, 3, size)),
+            innovations=self.innovations,
+            rolling=self.rolling,
+            transition=transition,
+            noise=noise_covariance,
+            half=half,
+        )
+        self._address = self._block.address
         self.start()
 
     def start(self) -> None:
@@ -220,10 +221,14 @@ class WheelInertialFilter:
             FLOOR_DEVIATION**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
         )
         kernel.predict(
-            self.covariance, self.state, self.axes, _ORIGIN if arm is None else arm, heading, (yaw, tilt_yaw),
-            imu_time if estimates_tilt else 0.0, (1.0 - scrub, 1.0 - slope if estimates_tilt else 1.0), variances,
-            *self._buffers,
-        )  # fmt: skip
+            self._address,
+            _ORIGIN if arm is None else arm,
+            heading,
+            (yaw, tilt_yaw),
+            imu_time if estimates_tilt else 0.0,
+            (1.0 - scrub, 1.0 - slope if estimates_tilt else 1.0),
+            variances,
+        )
 
     def follow_tilt(self, yaw: float, x: float, y: float) -> None:
         """Let the tilt's error follow what the IMU's orientation rotates more than its gyroscope.
@@ -246,14 +251,13 @@ class WheelInertialFilter:
         if self._variances.tilt:
             variance = 2.0 * TILT_TIME_CONSTANT / time * self._variances.tilt
             for which in (TILT, TILT + 1):
-                kernel.measure(self.covariance, self.state, which, 0.0, variance, self._buffers.half)
+                kernel.measure(self._address, which, 0.0, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
         """Measure the bias about the base's x and y by the gyroscope of a robot at rest, in B, shape (3,) [rad/s]."""
         variance = self._variances.noise / time
         for axis in range(2):
-            measured = float(angular[axis])
-            kernel.measure(self.covariance, self.state, GYRO_BIAS + axis, measured, variance, self._buffers.half)
+            kernel.measure(self._address, GYRO_BIAS + axis, float(angular[axis]), variance)
 
     def level(self, x: float, y: float) -> bool:
         """Measure the tilt by the plane through the contacts, which is turned about x and y of H by the IMU [rad].
@@ -261,9 +265,7 @@ class WheelInertialFilter:
         Returns:
             Whether it passes for level ground.
         """
-        return not self._variances.tilt or bool(
-            kernel.level(self.covariance, self.state, x, y, PLANE_DEVIATION**2, self._buffers.half)
-        )
+        return not self._variances.tilt or bool(kernel.level(self._address, x, y, PLANE_DEVIATION**2))
 
     def allow_scrubbing(self, variance: float) -> None:
         """Let scrubbing have at least a variance [rad^2/s^2]."""
@@ -289,10 +291,7 @@ class WheelInertialFilter:
             variances: Variances of w, shape (k,) [m^2/s^2].
             inliers: Which wheels count, shape (k,); those that more likely slip are taken out.
         """
-        kernel.correct(
-            self.covariance, self.state, self._rows, speeds, arms, rate, covered, self._vertical, variances, inliers,
-            self.rolling, self.innovations, self._buffers.half,
-        )  # fmt: skip
+        kernel.correct(self._address, speeds, arms, rate, covered, variances, inliers)
 
     def integrate(self, heading: float, period: float, imu_time: float, unknown: float) -> None:
         """Propagate the pose over an interval.
@@ -305,14 +304,11 @@ class WheelInertialFilter:
         """
         x, y, _ = self.velocity.tolist()
         variances = (self.slide * math.hypot(x, y) * period, unknown, self._variances.walk * period)
-        kernel.integrate(
-            self.covariance, self._vertical, heading, self.velocity, period, imu_time, variances,
-            *self._buffers,
-        )  # fmt: skip
+        kernel.integrate(self._address, heading, period, imu_time, variances)
 
     def settle_height(self, deviation: float) -> None:
         """Measure the height, which is as expected, with a standard deviation [m]."""
-        kernel.condition(self.covariance, 2, deviation * deviation, self._buffers.half)
+        kernel.condition(self._address, 2, deviation * deviation)
 
     def write_covariances(
         self, heading: float, arm: np.ndarray, period: float, pose: np.ndarray, twist: np.ndarray
@@ -326,7 +322,7 @@ class WheelInertialFilter:
             pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        kernel.write_covariances(self.covariance, heading, arm, self._variances.noise / period, pose, twist)
+        kernel.write_covariances(self._address, heading, arm, self._variances.noise / period, pose, twist)
 
 
 _ORIGIN = np.zeros(3)

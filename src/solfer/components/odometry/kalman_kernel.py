@@ -2,6 +2,7 @@
 
 import math
 
+from solfer.numerics.blocks import Layout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.dense import DENSE, cholesky, forward
 
@@ -42,6 +43,27 @@ SLIP_DENSITY = 1.0 / 4.0**3
 """Density of the velocity of a wheel that slips [s^3/m^3]."""
 
 
+FILTER = Layout(
+    "Filter",
+    size=int,
+    count=int,  # number of wheels
+    covariance=(float, "size", "size"),
+    state=(float, "size"),
+    axes=(float, 3, 3),
+    # of each wheel: Jacobian of its velocity, innovation, and the probability that it rolls
+    rows=(float, "count", 3, "size"),
+    innovations=(float, "count", 3),
+    rolling=(float, "count"),
+    # F, Q, and work space
+    transition=(float, "size", "size"),
+    noise=(float, "size", "size"),
+    half=(float, "size", "size"),
+)
+"""What the kernels read and write."""
+
+_filter_at = FILTER.at
+
+
 @part
 def set_identity(transition):
     """Write the identity."""
@@ -74,11 +96,15 @@ def tilt_moves(arm, heading, axis, out):
 
 
 @part
-def set_process(transition, axes, arm, heading, yaw, tilt_yaw, imu_time, scrub_keep, slope_keep, moves):
+def set_process(kalman, arm, heading, angles, imu_time, keeps):
     """Write the Jacobian of the process up to the wheels' measurement.
 
     A bias that errs turns the tilt wrongly for the time of the IMU's samples, and moves the base by that rotation.
     """
+    transition = kalman.transition
+    moves = kalman.half[0]
+    yaw, tilt_yaw = angles
+    scrub_keep, slope_keep = keeps
     set_identity(transition)
     set_rotation(transition, VELOCITY, yaw)
     set_rotation(transition, SLOPE, yaw)
@@ -93,19 +119,21 @@ def set_process(transition, axes, arm, heading, yaw, tilt_yaw, imu_time, scrub_k
     for axis in range(2):
         tilt_moves(arm, heading, axis, moves)
         for column in range(3):
-            wrong = imu_time * axes[axis, column]
+            wrong = imu_time * kalman.axes[axis, column]
             transition[TILT + axis, GYRO_BIAS + column] = wrong
             for row in range(3):
                 transition[POSITION + row, GYRO_BIAS + column] += moves[row] * wrong
 
 
 @part
-def set_pose_process(transition, axis, heading, velocity, period, imu_time):
+def set_pose_process(kalman, heading, period, imu_time):
     """Write the Jacobian of p += R(heading) v T and heading += (u - b - n) s; a tilt that errs leads uphill."""
+    transition = kalman.transition
+    axis = kalman.axes[2]
     cosine = math.cos(heading)
     sine = math.sin(heading)
-    x = velocity[0]
-    y = velocity[1]
+    x = kalman.state[VELOCITY]
+    y = kalman.state[VELOCITY + 1]
     set_identity(transition)
     transition[POSITION, HEADING] = -(sine * x + cosine * y) * period
     transition[POSITION + 1, HEADING] = (cosine * x - sine * y) * period
@@ -124,16 +152,19 @@ def set_pose_process(transition, axis, heading, velocity, period, imu_time):
 
 
 @part
-def yaw_rate(state, axis, rate, covered):
+def yaw_rate(kalman, rate, covered):
     """Return the yaw rate without bias and noise of the gyroscope [rad/s]."""
+    axis = kalman.axes[2]
+    state = kalman.state
     bias = axis[0] * state[GYRO_BIAS] + axis[1] * state[GYRO_BIAS + 1] + axis[2] * state[GYRO_BIAS + 2]
     return rate - covered * (bias + state[GYRO_NOISE])
 
 
 @part
-def wheel_velocity(state, wheel, arm, axis, rate, covered, out):
+def wheel_velocity(kalman, wheel, arm, rate, covered, out):
     """Write the velocity that a wheel measures: (1 - e) (v + (yaw rate + scrub) z x r)."""
-    rate_about_z = yaw_rate(state, axis, rate, covered)
+    state = kalman.state
+    rate_about_z = yaw_rate(kalman, rate, covered)
     if covered > 0.0:
         rate_about_z += state[SCRUB]
     grown = 1.0 - state[RADIUS + wheel]
@@ -143,8 +174,10 @@ def wheel_velocity(state, wheel, arm, axis, rate, covered, out):
 
 
 @part
-def set_wheel_rows(rows, wheel, arm, axis, covered, expected):
+def set_wheel_rows(kalman, wheel, arm, covered, expected):
     """Write the Jacobian of `wheel_velocity`, which is `expected`; radii are those that the configuration has."""
+    rows = kalman.rows[wheel]
+    axis = kalman.axes[2]
     for i in range(3):
         rows[i, VELOCITY + i] = 1.0
         rows[i, RADIUS + wheel] = -expected[i]
@@ -158,9 +191,12 @@ def set_wheel_rows(rows, wheel, arm, axis, covered, expected):
 
 
 @part
-def propagate(covariance, transition, noise, half):
+def propagate(kalman):
     """Write F P F^T + Q over P; zeros of F are left out."""
-    size = len(covariance)
+    covariance = kalman.covariance
+    transition = kalman.transition
+    half = kalman.half
+    size = kalman.size
     for i in range(size):
         half[i] = 0.0
         for j in range(size):
@@ -170,7 +206,7 @@ def propagate(covariance, transition, noise, half):
                     half[i, k] += factor * covariance[j, k]
     for k in range(size):
         for i in range(size):
-            covariance[k, i] = noise[k, i]
+            covariance[k, i] = kalman.noise[k, i]
         for j in range(size):
             factor = transition[k, j]
             if factor != 0.0:
@@ -179,12 +215,16 @@ def propagate(covariance, transition, noise, half):
 
 
 @part
-def apply_gain(covariance, state, innovation, variance, mapped, gain, first):
-    """Correct the state by an innovation of a variance; `mapped` is its covariance with the state.
+def apply_gain(kalman, innovation, variance, first):
+    """Correct the state by an innovation of a variance; its covariance with the state is in the work space.
 
     What precedes `first` and the radii are considered and not corrected (Schmidt).
     """
-    size = len(state)
+    covariance = kalman.covariance
+    state = kalman.state
+    mapped = kalman.half[0]
+    gain = kalman.half[1]
+    size = kalman.size
     for i in range(size):
         gain[i] = mapped[i] / variance if first <= i < RADIUS else 0.0
         state[i] += gain[i] * innovation
@@ -196,9 +236,11 @@ def apply_gain(covariance, state, innovation, variance, mapped, gain, first):
 
 
 @part
-def update(covariance, state, row, innovation, variance, mapped, gain, first):
+def update(kalman, row, innovation, variance, first):
     """Correct the state by a scalar measurement with a row of its Jacobian."""
-    size = len(state)
+    covariance = kalman.covariance
+    mapped = kalman.half[0]
+    size = kalman.size
     for i in range(size):
         mapped[i] = 0.0
     for k in range(size):
@@ -207,13 +249,16 @@ def update(covariance, state, row, innovation, variance, mapped, gain, first):
                 mapped[i] += row[k] * covariance[k, i]
     for k in range(size):
         variance += row[k] * mapped[k]
-    apply_gain(covariance, state, innovation, variance, mapped, gain, first)
+    apply_gain(kalman, innovation, variance, first)
 
 
 @part
-def update_sum(covariance, state, one, other, measured, variance, mapped, gain, first):
+def update_sum(kalman, one, other, measured, variance, first):
     """Correct the state by a measurement of the sum of two numbers, or of one (-1: no other); return if it passes."""
-    size = len(state)
+    covariance = kalman.covariance
+    state = kalman.state
+    mapped = kalman.half[0]
+    size = kalman.size
     innovation = measured - state[one]
     for i in range(size):
         mapped[i] = covariance[one, i]
@@ -224,14 +269,18 @@ def update_sum(covariance, state, one, other, measured, variance, mapped, gain, 
     variance += mapped[one] + (mapped[other] if other >= 0 else 0.0)
     if innovation * innovation > OUTLIER_GATE * OUTLIER_GATE * variance:
         return False
-    apply_gain(covariance, state, innovation, variance, mapped, gain, first)
+    apply_gain(kalman, innovation, variance, first)
     return True
 
 
 @part
-def likelihood(covariance, rows, innovation, variance, spread, mapped):
+def likelihood(kalman, wheel, variance):
     """Return the density of a wheel's innovation, three numbers with rows and a variance each [s^3/m^3]."""
-    size = len(covariance)
+    covariance = kalman.covariance
+    rows = kalman.rows[wheel]
+    mapped = kalman.half[0]
+    spread = kalman.half[2:6]
+    size = kalman.size
     for i in range(3):
         for k in range(size):
             mapped[k] = 0.0
@@ -247,7 +296,7 @@ def likelihood(covariance, rows, innovation, variance, spread, mapped):
     if not cholesky(spread[:3]):
         return 0.0
     whitened = spread[3, :3]
-    whitened[:] = innovation
+    whitened[:] = kalman.innovations[wheel]
     forward(spread, whitened)
     distance = 0.0
     root = 1.0
@@ -257,15 +306,18 @@ def likelihood(covariance, rows, innovation, variance, spread, mapped):
     return math.exp(-0.5 * min(distance, 700.0)) / (math.sqrt(2.0 * math.pi) ** 3 * root)
 
 
-def _predict(covariance, state, axes, arm, heading, angles, imu_time, keeps, variances, transition, noise, half):
+def _predict(start, arm, heading, angles, imu_time, keeps, variances):
     """Propagate up to the wheels' measurement.
 
     `angles` are those by which the axes of velocity and tilt turn [rad]; `keeps` the ratios that scrubbing and slopes
     keep; `variances` those of velocity, scrubbing, gyroscope, tilt and slopes. `follow_tilt` changes the tilt itself.
     """
-    scrub_keep, slope_keep = keeps
-    moves = half[0]
-    set_process(transition, axes, arm, heading, angles[0], angles[1], imu_time, scrub_keep, slope_keep, moves)
+    kalman = _filter_at(start)
+    state = kalman.state
+    transition = kalman.transition
+    noise = kalman.noise
+    moves = kalman.half[0]
+    set_process(kalman, arm, heading, angles, imu_time, keeps)
     noise[:] = 0.0
     for axis in range(3):
         noise[VELOCITY + axis, VELOCITY + axis] = variances[0]
@@ -286,82 +338,85 @@ def _predict(covariance, state, axes, arm, heading, angles, imu_time, keeps, var
         b = state[first + 1]
         state[first] = transition[first, first] * a + transition[first, first + 1] * b
         state[first + 1] = transition[first + 1, first] * a + transition[first + 1, first + 1] * b
-    state[SCRUB] *= scrub_keep
+    state[SCRUB] *= keeps[0]
     state[GYRO_NOISE] = 0.0
-    propagate(covariance, transition, noise, half)
+    propagate(kalman)
 
 
-def _correct(
-    covariance, state, rows, speeds, arms, rate, covered, axis, variances, inliers, rolling, innovations, half
-):  # fmt: skip
+def _correct(start, speeds, arms, rate, covered, variances, inliers):
     """Correct the state by the velocities that wheels measure [m/s], of inliers that more likely roll than slip."""
-    count = len(speeds)
-    mapped = half[0]
-    gain = half[1]
-    spread = half[2:6]
-    expected = half[6]
+    kalman = _filter_at(start)
+    innovations = kalman.innovations
+    rolling = kalman.rolling
+    expected = kalman.half[6]
     likely = 0
-    for wheel in range(count):
-        wheel_velocity(state, wheel, arms[wheel], axis, rate, covered, expected)
-        set_wheel_rows(rows[wheel], wheel, arms[wheel], axis, covered, expected)
+    for wheel in range(kalman.count):
+        wheel_velocity(kalman, wheel, arms[wheel], rate, covered, expected)
+        set_wheel_rows(kalman, wheel, arms[wheel], covered, expected)
         for i in range(3):
             innovations[wheel, i] = speeds[wheel, i] - expected[i]
-        density = likelihood(covariance, rows[wheel], innovations[wheel], variances[wheel], spread, mapped)
-        rolls = (1.0 - SLIP_PRIOR) * density
+        rolls = (1.0 - SLIP_PRIOR) * likelihood(kalman, wheel, variances[wheel])
         rolling[wheel] = rolls / (rolls + SLIP_PRIOR * SLIP_DENSITY)
         likely += inliers[wheel] and rolling[wheel] > 0.5
-    for wheel in range(count):
+    for wheel in range(kalman.count):
         if likely > 1 and rolling[wheel] <= 0.5:  # where all contradict, the prediction is wrong
             inliers[wheel] = False
         if inliers[wheel]:
             for i in range(3):
-                wheel_velocity(state, wheel, arms[wheel], axis, rate, covered, expected)
+                wheel_velocity(kalman, wheel, arms[wheel], rate, covered, expected)
                 innovation = speeds[wheel, i] - expected[i]
                 # what wheels contradict each other by is more than radii: no position follows from it
-                update(covariance, state, rows[wheel, i], innovation, variances[wheel], mapped, gain, HEADING)
+                update(kalman, kalman.rows[wheel, i], innovation, variances[wheel], HEADING)
         elif rolling[wheel] > 0.5:
             rolling[wheel] = 0.5
 
 
-def _integrate(covariance, axis, heading, velocity, period, imu_time, variances, transition, noise, half):
+def _integrate(start, heading, period, imu_time, variances):
     """Propagate the pose; variances are those of slip along x and y, of the yaw, and of the biases."""
-    set_pose_process(transition, axis, heading, velocity, period, imu_time)
+    kalman = _filter_at(start)
+    noise = kalman.noise
+    set_pose_process(kalman, heading, period, imu_time)
     noise[:] = 0.0
     noise[POSITION, POSITION] = variances[0]
     noise[POSITION + 1, POSITION + 1] = variances[0]
     noise[HEADING, HEADING] = variances[1]
     for column in range(GYRO_BIAS, GYRO_BIAS + 3):
         noise[column, column] = variances[2]
-    propagate(covariance, transition, noise, half)
+    propagate(kalman)
 
 
-def _level(covariance, state, about_x, about_y, variance, half):
+def _level(start, about_x, about_y, variance):
     """Measure tilt plus slope about x and y [rad] by the plane through the contacts; return whether both pass."""
-    passes = update_sum(covariance, state, TILT, SLOPE, about_x, variance, half[0], half[1], 0)
-    return update_sum(covariance, state, TILT + 1, SLOPE + 1, about_y, variance, half[0], half[1], 0) and passes
+    kalman = _filter_at(start)
+    passes = update_sum(kalman, TILT, SLOPE, about_x, variance, 0)
+    return update_sum(kalman, TILT + 1, SLOPE + 1, about_y, variance, 0) and passes
 
 
-def _measure(covariance, state, which, measured, variance, half):
+def _measure(start, which, measured, variance):
     """Measure one number of the state; position is not corrected."""
-    return update_sum(covariance, state, which, -1, measured, variance, half[0], half[1], HEADING)
+    return update_sum(_filter_at(start), which, -1, measured, variance, HEADING)
 
 
-def _condition(covariance, which, variance, half):
+def _condition(start, which, variance):
     """Reduce the covariance by a measurement of one number that is as expected."""
+    kalman = _filter_at(start)
+    covariance = kalman.covariance
+    column = kalman.half[0]
     spread = covariance[which, which] + variance
-    for k in range(len(covariance)):
-        half[0, k] = covariance[k, which]
-    for i in range(len(covariance)):
-        for k in range(len(covariance)):
-            covariance[i, k] -= half[0, i] * half[0, k] / spread
+    for k in range(kalman.size):
+        column[k] = covariance[k, which]
+    for i in range(kalman.size):
+        for k in range(kalman.size):
+            covariance[i, k] -= column[i] * column[k] / spread
 
 
-def _write_covariances(errors, heading, arm, white, pose, twist):
+def _write_covariances(start, heading, arm, white, pose, twist):
     """Write the covariances of a pose and of a twist; see `WheelInertialFilter.write_covariances`.
 
     The angular velocity errs by the gyroscope's variance `white` and by its biases, and the base's origin moves by that
     and by the arm.
     """
+    errors = _filter_at(start).covariance
     cosine = math.cos(heading)
     sine = math.sin(heading)
     pose[:] = 0.0
@@ -401,16 +456,10 @@ _V = "float64[::1]"
 _M = "float64[:, ::1]"
 _PAIR = "UniTuple(float64, 2)"
 
-predict = cached(
-    f"void({_M}, {_V}, {_M}, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5), {_M}, {_M}, {_M})", _predict
-)
-correct = cached(
-    f"void({_M}, {_V}, float64[:, :, ::1], {_M}, {_M}, {_F}, {_F}, {_V}, {_V}, boolean[::1], {_V}, {_M}, {_M})",
-    _correct,
-    sources=[DENSE],
-)
-integrate = cached(f"void({_M}, {_V}, {_F}, {_V}, {_F}, {_F}, UniTuple(float64, 3), {_M}, {_M}, {_M})", _integrate)
-level = cached(f"boolean({_M}, {_V}, {_F}, {_F}, {_F}, {_M})", _level)
-measure = cached(f"boolean({_M}, {_V}, int64, {_F}, {_F}, {_M})", _measure)
-condition = cached(f"void({_M}, int64, {_F}, {_M})", _condition)
-write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_M}, {_M})", _write_covariances)
+predict = cached(f"void(int64, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5))", _predict)
+correct = cached(f"void(int64, {_M}, {_M}, {_F}, {_F}, {_V}, boolean[::1])", _correct, sources=[DENSE])
+integrate = cached(f"void(int64, {_F}, {_F}, {_F}, UniTuple(float64, 3))", _integrate)
+level = cached(f"boolean(int64, {_F}, {_F}, {_F})", _level)
+measure = cached(f"boolean(int64, int64, {_F}, {_F})", _measure)
+condition = cached(f"void(int64, int64, {_F})", _condition)
+write_covariances = cached(f"void(int64, {_F}, {_V}, {_F}, {_M}, {_M})", _write_covariances)
