@@ -99,4 +99,4 @@ class Block:
     def values(self) -> Any:
         """What a compiled loop sees, for the same loop without the compiler."""
         arrays = {name: each.view(np.recarray) if each.dtype.names else each for name, each in self._arrays.items()}
-        return self._layout.tuple(*(arrays.get(name, self.record[name]) for name in self._layout.fields))
+        return self._layout.tuple(*(arrays.get(name, self.record[name][()]) for name in self._layout.fields))
