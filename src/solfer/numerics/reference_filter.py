@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.numerics.blocks import Block, Layout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import UNIT_TOLERANCE
@@ -13,6 +14,25 @@ FURTHEST_TARGET = 1e4
 
 TAKEN, NOT_FINITE, NOT_A_ROTATION = range(3)
 """Outcomes of `ReferenceFilter.aim`."""
+
+
+REFERENCES = Layout(
+    "References",
+    size=int,
+    limits=(float, "size", 4),
+    target=(float, "size", 7),
+    value=(float, "size", 7),
+    rate=(float, "size", 6),
+    stream=(float, "size", 6),  # velocity of the target
+    age=(float, "size"),  # time since the last target
+    gap=(float, "size"),  # and that between the last two
+    ratio=(float, "size"),  # of the limits that a stream is followed with
+    is_still=(bool, "size"),
+    work=(float, 3, 7),
+)
+"""What the kernels of a `ReferenceFilter` read and write."""
+
+_references_at = REFERENCES.at
 
 
 class ReferenceFilter:
@@ -48,15 +68,28 @@ class ReferenceFilter:
         self.target, self.value = np.zeros((2, size, 7))
         self.target[:, 6] = self.value[:, 6] = 1.0
         self.rate = np.zeros((size, 6))
-        # velocity of the target; time since the last one, and that between the last two
         self._stream = np.zeros((size, 6))
         self._age = np.zeros(size)
         self._gap = np.zeros(size)
-        # ratio of the limits that a stream is followed with
         self._ratio = np.full(size, self._FIRST_RATIO)
         self._is_still = np.ones(size, dtype=np.bool_)
         self.all_still = True
         self._work = np.zeros((3, 7))
+        self._block = Block(
+            REFERENCES,
+            size=size,
+            limits=self.limits,
+            target=self.target,
+            value=self.value,
+            rate=self.rate,
+            stream=self._stream,
+            age=self._age,
+            gap=self._gap,
+            ratio=self._ratio,
+            is_still=self._is_still,
+            work=self._work,
+        )
+        self._address = self._block.address
 
     def start(self, index: int, value: np.ndarray) -> None:
         """Put a reference and its target somewhere, at rest; shape (7,)."""
@@ -80,19 +113,7 @@ class ReferenceFilter:
         Returns:
             TAKEN; NOT_FINITE, or NOT_A_ROTATION where the quaternion has not the length 1: then nothing has changed.
         """
-        return _aim(
-            index,
-            numbers,
-            first,
-            stream,
-            self.limits,
-            self.target,
-            self._stream,
-            self._age,
-            self._gap,
-            self._is_still,
-            self._work,
-        )
+        return _aim(self._address, index, numbers, first, stream)
 
     def displace(self, index: int, move: PlanarMove) -> None:
         """Move a reference and its target in the world, with what they are doing."""
@@ -113,19 +134,7 @@ class ReferenceFilter:
 
     def update(self) -> None:
         """Advance all references by `period`. Allocates nothing."""
-        self.all_still = _follow(
-            self.target,
-            self._stream,
-            self._age,
-            self._gap,
-            self.value,
-            self.rate,
-            self.limits,
-            self.period,
-            self._ratio,
-            self._is_still,
-            self._work,
-        )
+        self.all_still = _follow(self._address, self.period)
 
     def is_still(self, index: int) -> bool:
         """Return whether a reference is at its target, at rest."""
@@ -213,11 +222,12 @@ def _approach(error, stream, rate, speed, acceleration, period, desired):
         rate[k] += desired[k]
 
 
-def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, gap, still, work):
+def _aim_at(start, index, numbers, first, stream):
     """See `ReferenceFilter.aim`."""
-    limits = all_limits[index]
-    target = targets[index]
-    velocity = streams[index]
+    block = _references_at(start)
+    limits = block.limits[index]
+    target = block.target[index]
+    velocity = block.stream[index]
     last = first + len(numbers)
     for k in range(len(numbers)):
         if not abs(numbers[k]) <= FURTHEST_TARGET:
@@ -227,12 +237,12 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
         length = math.sqrt(numbers[-4] ** 2 + numbers[-3] ** 2 + numbers[-2] ** 2 + numbers[-1] ** 2)
         if abs(length * length - 1.0) > UNIT_TOLERANCE:
             return NOT_A_ROTATION
-    new = work[0]
-    rotation = work[1]
+    new = block.work[0]
+    rotation = block.work[1]
     for k in range(7):
         new[k] = target[k] if k < first or k >= last else numbers[k - first] / (length if k > 2 else 1.0)
     _write_rotation(new, target, rotation)
-    time = age[index]
+    time = block.age[index]
     # the first of a stream says nothing of its velocity
     is_stream = stream and 0.0 < time < 0.1  # [s]; slower ones are targets on their own
     for k in range(3):
@@ -241,23 +251,29 @@ def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, ga
     # what is faster than the reference may be is no motion, but another target
     if _norm(velocity[:3]) > limits[0] or _norm(velocity[3:]) > limits[2]:
         velocity[:] = 0.0
-    gap[index] = age[index] if is_stream else 0.0
-    age[index] = 0.0 if stream else math.inf
+    block.gap[index] = time if is_stream else 0.0
+    block.age[index] = 0.0 if stream else math.inf
     target[:] = new
-    still[index] = False
+    block.is_still[index] = False
     return TAKEN
 
 
-def _follow_all(target, stream, age, gap, value, rate, limits, period, ratios, still, work):
+def _follow_all(start, period):
     """See `ReferenceFilter.update`; return whether all are still."""
-    error = work[0]
-    desired = work[1]
-    aim = work[2]
+    block = _references_at(start)
+    limits = block.limits
+    stream = block.stream
+    age = block.age
+    value = block.value
+    rate = block.rate
+    error = block.work[0]
+    desired = block.work[1]
+    aim = block.work[2]
     all_still = True
-    for i in range(len(target)):
-        if age[i] > 2.0 * gap[i]:  # a stream goes on until no target has come for two of its periods
+    for i in range(block.size):
+        if age[i] > 2.0 * block.gap[i]:  # a stream goes on until no target has come for two of its periods
             stream[i] = 0.0
-        aim[:] = target[i]
+        aim[:] = block.target[i]
         if stream[i].any():
             for k in range(3):
                 aim[k] += stream[i, k] * age[i]
@@ -265,7 +281,7 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, ratios, s
         for k in range(3):
             error[k] = aim[k] - value[i, k]
         distance = _norm(error)
-        ratio = ratios[i] if age[i] < math.inf else 1.0
+        ratio = block.ratio[i] if age[i] < math.inf else 1.0
         speed = ratio * limits[i, 0]
         angular_speed = ratio * limits[i, 2]
         _approach(error, stream[i, :3], rate[i, :3], speed, ratio * limits[i, 1], period, desired)
@@ -273,13 +289,14 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, ratios, s
         _approach(error, stream[i, 3:], rate[i, 3:], angular_speed, ratio * limits[i, 3], period, desired)
         if ratio < 1.0:
             has_met = distance <= speed * period and _norm(error) <= angular_speed * period
-            ratios[i] = 1.0 if has_met else min(ratio + 0.1 * period, 1.0)
+            block.ratio[i] = 1.0 if has_met else min(ratio + 0.1 * period, 1.0)
         for k in range(3):
             value[i, k] += period * rate[i, k]
         _rotate(value[i], rate[i], period)
         age[i] += period
-        still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < 1e-9 and distance + _norm(error) < 1e-9
-        all_still = all_still and still[i]
+        is_still = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < 1e-9 and distance + _norm(error) < 1e-9
+        block.is_still[i] = is_still
+        all_still = all_still and is_still
     return all_still
 
 
@@ -298,14 +315,7 @@ def _halt_at(target, value, rate, limits, period, displacement):
 
 
 _ROW = "float64[::1]"
-_ROWS = "float64[:, ::1]"
 
-_aim = cached(
-    f"int64(int64, {_ROW}, int64, boolean, {_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, {_ROW}, boolean[::1], {_ROWS})",
-    _aim_at,
-)
-_follow = cached(
-    f"boolean({_ROWS}, {_ROWS}, {_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, boolean[::1], {_ROWS})",
-    _follow_all,
-)
+_aim = cached(f"int64(int64, int64, {_ROW}, int64, boolean)", _aim_at)
+_follow = cached("boolean(int64, float64)", _follow_all)
 _halt = cached(f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, {_ROW})", _halt_at)
