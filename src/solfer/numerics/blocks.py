@@ -1,17 +1,17 @@
 """Blocks: all that a compiled loop reads and writes, which it gets as one address.
 
-A layout names numbers and arrays with their shapes. In compiled code, `Layout.at(address)` is a named tuple of them:
+A layout names numbers and arrays with their shapes. `BlockLayout.at(address)` is a named tuple of them:
 
-    POLYGON = Layout("Polygon", count=int, margin=float, vertices=(float, "count", 3), lifted=(bool, "count"))
-    polygon_at = POLYGON.at
+    layout = BlockLayout("Polygon", count=int, margin=float, vertices=(float, "count", 3), lifted=(bool, "count"))
+    polygon_at = layout.at
 
     def _shift(address, distance):
         polygon = polygon_at(address)
         for index in range(polygon.count):
             polygon.vertices[index, 2] += distance
 
-The arrays are those of the caller, who keeps a `Block` of them; what a loop does not use costs nothing. Such a function
-runs without the compiler on `Block.values` in place of the named tuple.
+The arrays are those of the caller, who keeps a `MemoryBlock` of them; what a loop does not use costs nothing. At the
+address of a block such a function also runs without the compiler, under a debugger: `_shift(block.address, 0.1)`.
 """
 
 import re
@@ -26,13 +26,13 @@ from solfer.numerics.pointers import address, pointer_to
 _TYPES = {float: float64, int: int64, bool: boolean}
 
 
-class Layout:
+class BlockLayout:
     """The names, types and shapes of what a block holds.
 
     Args:
         name: Name of the tuples.
-        fields: `int` or `float` for a number, a NumPy record type for a record, and (type, *shape) for an array, in
-            which a text is made of numbers of the block, such as `(float, "count", 3)` or `(float, "3 * count")`.
+        fields: `int` or `float` for a number, and (type, *shape) for an array of numbers or NumPy records, in whose
+            shape a text is made of numbers of the block, such as `(float, "count", 3)` or `(float, "3 * count")`.
 
     Attributes:
         at: Compiled function that returns what is at an address.
@@ -48,12 +48,11 @@ class Layout:
         parts = []
         for field, kind in fields.items():
             place = f"record.{field}"
-            if not isinstance(kind, type):
-                base, *shape = kind if isinstance(kind, tuple) else (kind, 1)
+            if isinstance(kind, tuple):
+                base, *shape = kind
                 known[f"pointer_{field}"] = pointer_to(_TYPES.get(base) or from_dtype(np.dtype(base)))
                 sizes = [re.sub(r"([a-z]\w*)", r"record.\1", str(size)) for size in shape]
-                one = "" if isinstance(kind, tuple) else "[0]"
-                place = f"carray(pointer_{field}({place}), ({', '.join(sizes)},)){one}"
+                place = f"carray(pointer_{field}({place}), ({', '.join(sizes)},))"
             parts.append(place)
         text = (
             f"def at(address):\n    record = carray(pointer(address), (1,))[0]\n    return Tuple({', '.join(parts)})\n"
@@ -62,12 +61,11 @@ class Layout:
         self.at: Any = njit(inline="always")(known["at"])
 
     def shape(self, field: str, numbers: dict[str, Any]) -> tuple[int, ...]:
-        """Return the shape of an array of a block with these numbers; () for a record."""
-        kind = self.fields[field]
-        return tuple(eval(str(size), {}, numbers) for size in kind[1:]) if isinstance(kind, tuple) else ()
+        """Return the shape of an array of a block with these numbers."""
+        return tuple(eval(str(size), {}, numbers) for size in self.fields[field][1:])
 
 
-class Block:
+class MemoryBlock:
     """The numbers and arrays of a compiled loop; it keeps the arrays alive.
 
     Args:
@@ -80,23 +78,15 @@ class Block:
         address: What a compiled loop gets.
     """
 
-    def __init__(self, layout: Layout, **fields: Any):
-        self._layout = layout
+    def __init__(self, layout: BlockLayout, **fields: Any):
         self._arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
         self.record = np.zeros((), layout.record)
         for name, value in fields.items():
             if name not in self._arrays:
                 self.record[name] = 0 if value is None else value
         for name, array in self._arrays.items():
-            kind = layout.fields[name]
-            base = np.dtype(kind[0] if isinstance(kind, tuple) else kind)
+            base = np.dtype(layout.fields[name][0])
             shape = layout.shape(name, fields)
             assert array.dtype == base and array.shape == shape and array.flags.c_contiguous, (name, base, shape)
             self.record[name] = address(array)
         self.address = address(self.record)
-
-    @property
-    def values(self) -> Any:
-        """What a compiled loop sees, for the same loop without the compiler."""
-        arrays = {name: each.view(np.recarray) if each.dtype.names else each for name, each in self._arrays.items()}
-        return self._layout.tuple(*(arrays.get(name, self.record[name][()]) for name in self._layout.fields))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.numerics.blocks import Block, Layout
+from solfer.numerics.blocks import BlockLayout, MemoryBlock
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import UNIT_TOLERANCE
@@ -16,7 +16,7 @@ TAKEN, NOT_FINITE, NOT_A_ROTATION = range(3)
 """Outcomes of `ReferenceFilter.aim`."""
 
 
-REFERENCES = Layout(
+REFERENCES = BlockLayout(
     "References",
     size=int,
     limits=(float, "size", 4),
@@ -75,7 +75,7 @@ class ReferenceFilter:
         self._is_still = np.ones(size, dtype=np.bool_)
         self.all_still = True
         self._work = np.zeros((3, 7))
-        self._block = Block(
+        self._block = MemoryBlock(
             REFERENCES,
             size=size,
             limits=self.limits,

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import indices_at, release_fence
 from solfer.segments.header import CACHE_LINE
 from solfer.segments.slot import NEWEST, STAMP_WORD, STATE_WORD
 from solfer.telemetry import histograms
 
-ROW_RING = Layout(
+ROW_RING = BlockLayout(
     "RowRing",
     # addresses of the arrays, and their sizes
     pieces=int,

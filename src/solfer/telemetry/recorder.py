@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 from solfer.recording.log import LogSource
 from solfer.recording.model import Event
 from solfer.segments.header import CACHE_LINE
@@ -62,7 +62,7 @@ class Recorder:
         self._events = events_of(self._segment.data, own)
         self._arrays = [array for array in arrays if array.size]  # they live as long as the ring
         words = np.frombuffer(self._segment.data[:own], dtype=np.int64)
-        self._block = Block(
+        self._block = MemoryBlock(
             ROW_RING,
             arrays=np.array([array.ctypes.data for array in self._arrays], dtype=np.int64),
             sizes=np.array([array.size for array in self._arrays], dtype=np.int64),

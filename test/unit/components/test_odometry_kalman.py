@@ -15,7 +15,6 @@ from solfer.components.odometry.kalman import (
     WheelInertialFilter,
 )
 from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, TILT
-from solfer.numerics.blocks import Block
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
@@ -167,7 +166,7 @@ def values(**changed):
         "innovations": np.zeros((4, 3)),
         "rolling": np.ones(4),
     }
-    return Block(kernel.FILTER, size=size, count=4, **(arrays | changed)).values
+    return kernel.FILTER.tuple(size=size, count=4, **(arrays | changed))
 
 
 def jacobian(function, at):

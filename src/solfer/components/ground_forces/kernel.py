@@ -1,6 +1,6 @@
 """Compiled steps of `WeightedForces` and `TorqueOffsets`, number by number. Arrays are described there."""
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
@@ -36,7 +36,7 @@ def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
             rest[column] -= jacobian[i, column] * forces[i]
 
 
-OFFSETS = Layout(
+OFFSETS = BlockLayout(
     "Offsets",
     row_count=int,
     dofs=int,

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.components.ground_forces import kernel
 from solfer.components.ground_forces.tags import OffsetTags
 from solfer.components.ground_forces.weighted_forces import PRIOR_INFORMATION, weighed
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 from solfer.points.contact.contacts import Contact
 
 
@@ -45,7 +45,7 @@ class TorqueOffsets:
         count = len(self._joints)
         self._jacobian = np.zeros((rows, size))
         self._offsets = np.zeros(count)
-        self._block = Block(
+        self._block = MemoryBlock(
             kernel.OFFSETS,
             row_count=rows,
             dofs=size,

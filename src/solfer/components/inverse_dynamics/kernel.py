@@ -6,10 +6,10 @@ x_B = c + T z for as many *fixed* unknowns B, and z for the *free* ones.
 
 import numpy as np
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import REORDERED, cached, part
 
-WHOLE_BODY = Layout(
+WHOLE_BODY = BlockLayout(
     "WholeBody",
     dofs=int,
     force_count=int,

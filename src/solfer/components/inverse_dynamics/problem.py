@@ -7,7 +7,7 @@ from solfer.components.inverse_dynamics.demand import DemandedAccelerations
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.kernel import WHOLE_BODY, build, finish
 from solfer.dynamics import BIAS, INERTIA
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 from solfer.numerics.bounds.acceleration import AccelerationBounds
 from solfer.numerics.solvers.qp import QpSolver, QpStatus
 from solfer.robot import Robot
@@ -78,7 +78,7 @@ class WholeBodyProblem:
         self.force = np.zeros(forces)
         self.steps = 0
         self._status = QpStatus.SOLVED
-        self._block = Block(
+        self._block = MemoryBlock(
             WHOLE_BODY,
             dofs=size,
             force_count=forces,

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from solfer.components.inverse_dynamics.ground import Ground
-from solfer.numerics.blocks import Block, Layout
+from solfer.numerics.blocks import BlockLayout, MemoryBlock
 from solfer.numerics.compilation import cached, part
 from solfer.robot import Robot
 
-WATCH = Layout(
+WATCH = BlockLayout(
     "Watch",
     dofs=int,
     effort_count=int,
@@ -83,7 +83,7 @@ class DynamicsWatch:
         ground = self._ground
         contacts = self._robot.contacts
         self._force = force
-        self._block = Block(
+        self._block = MemoryBlock(
             WATCH,
             dofs=self._robot.size,
             effort_count=len(self._efforts),

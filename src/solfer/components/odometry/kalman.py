@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.components.odometry import kalman_kernel as kernel
 from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, RADIUS, SCRUB, SLOPE, TILT, VELOCITY
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 
 TILT_TIME_CONSTANT = 30.0
 """Time constant of the error of the tilt that an IMU measures [s]."""
@@ -125,7 +125,7 @@ class WheelInertialFilter:
         self.rolling = np.ones(count)
         self.innovations = np.zeros((count, 3))
         transition, noise_covariance, half = np.zeros((3, size, size))
-        self._block = Block(
+        self._block = MemoryBlock(
             kernel.FILTER,
             size=size,
             count=count,

@@ -2,7 +2,7 @@
 
 import math
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.dense import DENSE, cholesky, forward
 
@@ -43,7 +43,7 @@ SLIP_DENSITY = 1.0 / 4.0**3
 """Density of the velocity of a wheel that slips [s^3/m^3]."""
 
 
-FILTER = Layout(
+FILTER = BlockLayout(
     "Filter",
     size=int,
     count=int,  # number of wheels

@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
 from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, REST_ERROR, merge, nearest
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 
 REST_DISTANCE = 2.5e-3
@@ -54,14 +54,14 @@ WHEEL_DTYPE = np.dtype(
 [rad, m/s]; whether it rests, 1 or less as its error persists, how far it has to turn [rad], the desired direction of
 its contact point, and the rate of that direction [rad/s]."""
 
-WHEELS = Layout(
+WHEELS = BlockLayout(
     "Wheels",
     count=int,
     dofs=int,
     rows=int,
     # the steering: its law, the wheels, place and heading of the base in the last cycle, and the rows `ANGLES` to
     # `MEASURED`
-    law=LAW,
+    law=(LAW, 1),
     wheels=(WHEEL_DTYPE, "count"),
     before=(float, 3),
     steered=(float, 4, "count"),
@@ -168,7 +168,7 @@ def _keep(wheel, law, wx, wy, ex, ey):
 def _steer(start):
     """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
     block = _wheels_at(start)
-    law = block.law
+    law = block.law[0]
     before = block.before
     steered = block.steered
     velocities = block.velocities[0]
@@ -257,7 +257,7 @@ def _choose_rotations(block, angles):
     way unless another one is much better, also where both are equal.
     """
     most = block.largest_errors[0]
-    ahead = LEAD_CYCLES * block.law.period
+    ahead = LEAD_CYCLES * block.law[0].period
     for index in range(block.count):
         dof = block.turning_dofs[index]
         lower = block.lower[dof]
@@ -396,7 +396,7 @@ def _turn_ahead(block, pace):
 def _room(block, index):
     """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
     dof = block.turning_dofs[index]
-    rate = 1.0 / block.law.period
+    rate = 1.0 / block.law[0].period
     place = block.position[dof]
     by = rate * block.steering_rows[index, dof]
     first = by * min(block.lower[dof] - place, 0.0)
@@ -432,7 +432,7 @@ def _find_rates(start, is_paced, feeds_forward):
         rates[k] = block.gain[k] * block.error[k]
     if is_paced:
         away = block.away
-        period = block.law.period
+        period = block.law[0].period
         if block.of_base >= 0:
             turn_rise = period * block.turn_acceleration
             base_rise = period * block.base_acceleration

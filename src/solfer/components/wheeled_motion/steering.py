@@ -39,7 +39,7 @@ class Steering:
         speeds: Speeds of the vertices in the desired motion, shape (count,) [m/s]; live.
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
         steered: These four, shape (4, count).
-        law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
+        law: Numbers of the law, shape (1,), for `solfer.components.wheeled_motion.kernel`, which computes it.
         wheels: State of all wheels there, records `WHEEL_DTYPE`, shape (count,).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
@@ -47,7 +47,7 @@ class Steering:
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         self._given = period
         self._step = period
-        self.law = np.array((across, period / RELAXATION_LENGTH, rests, *self.numbers(tuning), period), dtype=LAW)
+        self.law = np.array([(across, period / RELAXATION_LENGTH, rests, *self.numbers(tuning), period)], dtype=LAW)
         self.wheels = np.zeros(count, WHEEL_DTYPE)
         self.before = np.zeros(3)
         self.steered = np.zeros((4, count))
@@ -88,7 +88,7 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
-        if not self.law["across"]:
+        if not self.law["across"][0]:
             heading = abs(math.remainder(heading, 2.0 * math.pi))
         self.before[:2] = place
         self.before[2] = heading

@@ -24,7 +24,7 @@ from solfer.components.wheeled_motion.tags import (
 )
 from solfer.components.wheeled_motion.wheels import DrivenWheels, rows_of
 from solfer.errors import ComponentError
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -90,7 +90,7 @@ class DrivingTasks:
         offsets = wheels.offsets
         points = wheels.points
         first = {name: rows.start for name, rows in self.rows.items()}
-        self.numbers = Block(
+        self.numbers = MemoryBlock(
             WHEELS,
             count=len(wheels.links),
             dofs=self._robot.size,

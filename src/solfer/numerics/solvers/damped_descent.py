@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.numerics.blocks import Block, Layout
+from solfer.numerics.blocks import BlockLayout, MemoryBlock
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.compilation import REORDERED, cached, part
 
@@ -166,7 +166,7 @@ def _farthest(columns, lower, upper, is_free, found, scale):
     return place
 
 
-DESCENT = Layout(
+DESCENT = BlockLayout(
     "Descent",
     level_count=int,
     row_count=int,
@@ -303,7 +303,7 @@ class DampedDescent:
         width = len(columns)
         self._unbounded = np.zeros((0, size))
         self.velocity = np.zeros(size)
-        self._block = Block(
+        self._block = MemoryBlock(
             DESCENT,
             level_count=len(ends) - 1,
             row_count=rows,

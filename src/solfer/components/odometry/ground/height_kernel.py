@@ -2,14 +2,14 @@
 
 import math
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 
 FLOOR_TOLERANCE = 0.008
 """How far a wheel may be above or below a floor and still be on it [m]: twice what floors are uneven (DIN 18202)."""
 
 
-HEIGHTS = Layout(
+HEIGHTS = BlockLayout(
     "Heights",
     count=int,  # number of wheels
     sample_count=int,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry.ground import height_kernel as kernel
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 
 
 class HeightMap:
@@ -32,7 +32,7 @@ class HeightMap:
         self._followed = np.zeros((count, 2), dtype=np.int64)
         self._leading = np.zeros(count)
         self._floor = np.array((math.nan, 0.0))
-        self._block = Block(
+        self._block = MemoryBlock(
             kernel.HEIGHTS,
             count=count,
             sample_count=samples,

@@ -2,7 +2,7 @@
 
 import math
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 
 LATERAL_SPEED = 4e-3
@@ -16,7 +16,7 @@ VALUE, LIMITED, HELD, LAGS, FOLLOWED, SPEED = range(6)
 that of joints at their bounds, that of a base that lags, that which all of them can follow, and the fastest vertex at
 it [m/s]."""
 
-GOING = Layout(
+GOING = BlockLayout(
     "Going",
     count=int,
     state=(float, 6),

@@ -8,7 +8,7 @@ from solfer.components.wheeled_motion.pace.kernel import FOLLOWED, GOING, HELD, 
 from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 
 
 class PathPace:
@@ -36,7 +36,7 @@ class PathPace:
     def __init__(self, references: References, steering: Steering, offsets: RollingOffsets, error: np.ndarray):
         self.is_found = True
         self._state = np.zeros(6)
-        self._block = Block(
+        self._block = MemoryBlock(
             GOING,
             count=len(references.lifted),
             state=self._state,

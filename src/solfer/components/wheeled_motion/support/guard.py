@@ -19,7 +19,7 @@ from solfer.components.wheeled_motion.support.kernel import (
 )
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, VERTICES
-from solfer.numerics.blocks import Block
+from solfer.numerics.blocks import MemoryBlock
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
@@ -88,7 +88,7 @@ class MotionGuard:
         ]
         self._watched = [(what, unit) for what, unit, _, _ in watched]
         self._state = np.zeros(STATE_SIZE)
-        self._block = Block(
+        self._block = MemoryBlock(
             GUARD,
             count=len(lifted),
             dofs=len(velocity),

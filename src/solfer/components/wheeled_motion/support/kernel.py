@@ -2,7 +2,7 @@
 
 import math
 
-from solfer.numerics.blocks import Layout
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import matrix_at, vector_at
 
@@ -15,7 +15,7 @@ MARGIN, REASON, AMOUNT, WORST, AGE, STATE_SIZE = range(6)
 NOTHING, POLYGON, FIRST_ROW = range(3)
 """What holds the motion: nothing, the margin, the first of the rows that are watched; joints of legs follow these."""
 
-GUARD = Layout(
+GUARD = BlockLayout(
     "Guard",
     count=int,
     dofs=int,
