@@ -1,10 +1,12 @@
-"""What a lower level says of requests and commands that it refuses, word for word, and of itself."""
+"""What a lower level refuses of requests and commands, and what it says of itself."""
 
 import numpy as np
 import pytest
 from support.unit.cart import DT, GAINS, GROUPS, RECORDS, URDF, bend, claim, make, turn
+from support.unit.declarations import named
+from support.unit.refusals import check_refusal
 
-from solfer.errors import SolferError
+from solfer.errors import ClaimRefused, CommandRefused, SolferError, UnknownName
 from solfer.lower_level import LowerLevelRecord, LowerLevelServer, build_lower_level
 from solfer.lower_level.records import RationRecord
 from solfer.lower_level.server.server import largest_request
@@ -12,14 +14,11 @@ from solfer.lower_level.server.services import lower_level_services
 from solfer.model import Description, Kinematics
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
-from solfer.transport.messages import JointMessage
-
-ACCEPTED = "position, velocity, effort, stiffness, damping"
 
 
-def arm(names=("shoulder",), **fields):
-    """Make the sending of a command for the arm."""
-    return lambda cart: cart.accept("arm", JointMessage(names, sender="/a", **fields))
+def asked(*arguments):
+    """Make a claim."""
+    return lambda cart: claim(cart, *arguments)
 
 
 def twice(cart):
@@ -28,53 +27,31 @@ def twice(cart):
     turn(cart, "/second")
 
 
-def asked(*arguments):
-    """Make a claim by a plugin."""
-    return lambda cart: claim(cart, "/a", *arguments)
+REFUSED = [
+    (asked("", ("arm",)), CommandRefused, "without an owner or without controllers"),
+    (asked("/a", ()), CommandRefused, "without an owner or without controllers"),
+    (asked("/a", ("arms",)), UnknownName, "unknown controller 'arms' (did you mean arm?"),
+    (asked("/a", ("arm",), ("positions",)), UnknownName, "'positions' (did you mean position"),
+    (asked("/a", ("wheel",), ("effort",)), CommandRefused, "does not accept 'effort' (expected: one or more of"),
+    (asked("/a", ("arm",), ("position", "effort")), CommandRefused, "2 modes for 1 controllers"),
+    (asked("/a", ("arm",), (), ("sholder",)), UnknownName, "did you mean shoulder"),
+    (asked("/a", ("arm",), (), ("roll",)), UnknownName, "unknown joint 'roll' (expected: joints of arm)"),
+    (asked("/a", ("wheel", "arm"), (), ("elbow",)), UnknownName, "(expected: joints of wheel, arm)"),
+    (twice, ClaimRefused, "'/second' cannot command roll of controller 'wheel': '/first' does (expected: joints"),
+]
 
 
-ONE, TWO = np.zeros(1), np.zeros(2)
-REFUSED = {
-    asked(()): "a claim without an owner or without controllers|the name of the plugin and at least one controller|",
-    lambda cart: claim(cart, "", ("arm",)): "a claim without an owner or without controllers"
-    "|the name of the plugin and at least one controller|",
-    asked(("arms",)): "unknown controller 'arms'||arm",
-    asked(("arm",), ("position", "effort")): "2 modes for 1 controllers|one for each, or none|",
-    asked(("arm",), ("positions",)): "unknown mode 'positions'||position, stiffness",
-    asked(("wheel",), ("position",)): "controller 'wheel' does not accept 'position'|one or more of velocity|",
-    asked(("arm",), (), ("roll",)): "unknown joint 'roll'|joints of arm|",
-    asked(("wheel", "arm"), (), ("elbow",)): "unknown joint 'elbow'|joints of wheel, arm|",
-    twice: "'/second' cannot command roll of controller 'wheel': '/first' does"
-    "|joints that are free: '/first' has to end or to send nothing for 0.3 s|",
-    arm(): f"the command carries no numbers|one or more of {ACCEPTED}|",
-    arm((), position=np.zeros(0)): f"the command carries no numbers|one or more of {ACCEPTED}|",
-    arm(interfaces=("force",)): f"the controller does not accept 'force'|one or more of {ACCEPTED}|",
-    arm(("sholder",), position=ONE): "unknown joint 'sholder'|joints of this controller: shoulder|shoulder",
-    arm(("shoulder",) * 2, position=TWO): "joint 'shoulder' is named 2 times|every joint once at most|",
-    arm(position=TWO): "'position' has the shape (2,) for 1 joints|1 numbers, one for each joint|",
-    arm(position=["a"]): "'position' is not an array of numbers|one number for each joint|",
-    arm(position=[3.0]): "position 3 of joint 'shoulder' is beyond its limit|from -2 to 2 [rad]|",
-    arm(effort=[np.nan]): "effort nan of joint 'shoulder' is not a finite number|from -40 to 40 [Nm]|",
-    arm(velocity=[4.0]): "velocity 4 of joint 'shoulder' is beyond its limit|from -3 to 3 [rad/s]|",
-    arm(stiffness=[-1.0]): "stiffness -1 of joint 'shoulder' is beyond its limit|from 0 to 100000 [Nm/rad]|",
-    arm(damping=[-1.0]): "damping -1 of joint 'shoulder' is beyond its limit|from 0 to 100000 [Nms/rad]|",
-    lambda cart: cart.switch(["arm"], ["arm"]): "controller 'arm' is to be started and stopped"
-    "|each controller in one of the two lists|",
-    lambda cart: cart.switch(["arm"], []): "controller 'arm' runs already|a controller that is stopped|",
-}
-
-
-@pytest.mark.parametrize(("refused", "text"), REFUSED.items(), ids=REFUSED.values())
-def test_refusals_say_what_is_expected(refused, text):
-    with pytest.raises(SolferError) as error:
-        refused(make())
-    assert f"{error.value.what}|{error.value.expected}|{', '.join(error.value.names)}" == text
+@pytest.mark.parametrize(("call", "error", "words"), REFUSED, ids=[words for *_, words in REFUSED])
+def test_what_is_refused_changes_nothing(call, error, words):
+    cart = make()
+    check_refusal(lambda: call(cart), error, "", words)
+    assert cart.claims.owners() in ((), ("/first",))
 
 
 def test_a_stopped_controller_refuses_and_says_so():
     cart = make()
     cart.switch([], ["wheel"])
-    listed = lower_level_services(cart)[2].handler(None)
+    listed = named(lower_level_services(cart), "list_controllers").handler(None)
     assert listed.states == ("running", "stopped") and listed.types == ("impedance", "velocity")
     assert listed.joints == ("shoulder", "roll") and listed.claimed_by == ("", "")
     for attempt, what in ((lambda: claim(cart, "/a", ("wheel",)), "claim"), (lambda: turn(cart, "/a"), "command")):
@@ -86,7 +63,7 @@ def test_a_stopped_controller_refuses_and_says_so():
     assert error.value.expected == "a controller that runs"
 
 
-class Reports:
+class LastReport:
     """A middleware that only keeps reports."""
 
     def __init__(self):
@@ -101,7 +78,7 @@ class Reports:
 
 def test_health_tells_owners_refusals_and_holding():
     """Each state of health once: good, a warning that clears when nothing new is refused, and the stop's reason."""
-    cart, node = make(), Reports()
+    cart, node = make(), LastReport()
     server = LowerLevelServer(cart, node, Inbox())
     server._queues.clear()
     turn(cart, "/driver")
@@ -167,7 +144,7 @@ def test_what_is_suspended_says_of_whom():
 
 @pytest.mark.parametrize("largest", [None, 5000])
 def test_services_take_requests_that_name_all_joints(largest):
-    class Offers(Reports):
+    class Offers(LastReport):
         def serve(self, owner, services, submit):
             sizes.update(service.largest for service in services)
 
