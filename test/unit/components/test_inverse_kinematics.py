@@ -6,6 +6,7 @@ import logging
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.declarations import named
 
 from solfer import Robot
 from solfer.components.inverse_kinematics import InverseKinematics
@@ -422,7 +423,7 @@ def test_wrong_numbers_of_a_pipe_are_held(arm, caplog):
 
 
 def test_messages_of_other_frames_are_refused(arm):
-    topic = next(topic for topic in arm.topics() if topic.name == "pose/reference")
+    topic = named(arm.topics(), "pose/reference")
     start = arm.references.targets["pose"].task.point.value
     pose = Pose(Vector(*start[:3]), Turn(*start[3:]))
     header = type(topic.message().header)
