@@ -37,7 +37,7 @@ class Computer:
         return time >= self._until[0]
 
 
-class Driver:
+class OverloadedDrive:
     """Watches the robot while a course is driven, and makes the computer busy in the middle of it."""
 
     def __init__(self, world, computer):
@@ -75,7 +75,7 @@ def test_it_rests_while_its_loops_starve_and_goes_on(seed, tmp_path, monkeypatch
     file.write_text(course(3.0, 0.0, 0.2, 0.4))
     with closing(Nodes(tmp_path)) as world:
         world.run(2.5)
-        driver = Driver(world, computer)
+        driver = OverloadedDrive(world, computer)
         with pytest.raises(StopIteration):
             world.play(read_scenario(file), driver.look)
         busy, free = DRIVES + STARVED, DRIVES + STARVED + LATER

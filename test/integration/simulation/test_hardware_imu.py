@@ -87,7 +87,7 @@ def test_the_numbers_of_the_calibration_undo_it(samples):
         np.testing.assert_allclose(turn @ raw_f - rotation.T @ beside, f, atol=1e-8)
 
 
-class HardwareWorld(World):
+class PerfectHardware(World):
     """CENTAURO as its hardware publishes it, with perfect sensors: only their mounting counts."""
 
     def offer(self, middleware):
@@ -110,7 +110,7 @@ def inertial(tmp_path, system, change=lambda text: text):
 
 
 @pytest.mark.daily(1)
-@pytest.mark.parametrize(("system", "kind"), [("SM", World), ("HW", HardwareWorld)])
+@pytest.mark.parametrize(("system", "kind"), [("SM", World), ("HW", PerfectHardware)])
 def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
     world = kind()
     request.addfinalizer(world.close)
@@ -129,7 +129,7 @@ def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
 
 def test_a_wrong_mounting_turns_the_robot(request, tmp_path):
     """The rotation of the IMU's mount is transposed in the file: the estimate must be visibly off, or it is unused."""
-    world = HardwareWorld()
+    world = PerfectHardware()
     request.addfinalizer(world.close)
     transposed = {
         "xy: 0.48": "xy: -0.8",
