@@ -64,6 +64,7 @@ class OverloadedDrive:
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("seed", [None, *range(50)])
 def test_it_rests_while_its_loops_starve_and_goes_on(seed, tmp_path, monkeypatch):
+    """Base and hand slow down while loops get no computing time, and go on after it; the robot does not tilt."""
     computer, every = Computer(seed), Bus.every
 
     def starved(self, period, work, start=None, cycles=False):

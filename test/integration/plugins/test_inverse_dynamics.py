@@ -115,6 +115,7 @@ def test_it_squats_where_odometry_says_that_it_is():
 
 
 def test_a_layer_squats_at_500_hz(tmp_path):
+    """The executor in shared memory keeps the accuracy and the limits that a node keeps."""
     with contextlib.closing(XbotWorld(tmp_path)) as world:
         world.run(1.0)
         node = world.node("squat")
@@ -210,6 +211,7 @@ def stretch(world):
     ],
 )
 def test_a_fault_is_named_and_the_robot_held(fault, text, caplog):
+    """The robot holds within its torque limits instead of falling, and the log has the reason."""
     with contextlib.closing(World()) as world:
         world.run(0.5)
         world.squatting = world.plugin("inverse_dynamics")

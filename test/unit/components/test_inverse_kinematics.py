@@ -337,6 +337,7 @@ def test_a_pose_is_reached_with_feedback(arm):
 
 
 def test_a_measurement_that_jumps_moves_no_hand_faster_than_its_reference(robot, tmp_path):
+    """A loop that is closed on measurements answers a jump with the speed of its `motion` at most."""
     file = tmp_path / "poses.yaml"
     file.write_text(
         POSES.replace("chain:", "closed_on: measurement\n  motion: {speed: 0.1, turn_speed: 0.2}\n  chain:")

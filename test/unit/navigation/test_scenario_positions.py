@@ -89,6 +89,7 @@ def test_it_stays_on_the_way_of_the_file(bus, tmp_path):
 
 
 def test_the_course_moves_with_an_odometry_that_jumps(bus, tmp_path):
+    """A jump of the estimated base must not be driven back: the rest of the course turns and shifts with it."""
     scenario, base = made(tmp_path, PATTERN, **TABLES), GuidedBase(bus)
     begin, at = base.pose.copy(), {}
 

@@ -30,6 +30,7 @@ def calibration():
 
 
 def test_measurements_are_converted_to_the_model(mapping, calibration):
+    """Signs and offsets apply to position, signs alone to velocity and effort; the received message is unchanged."""
     reader = StandInReader(
         JointMessage(
             HARDWARE, np.array([7.0, 0.5, 9.0, -1.5]), np.array([1.0, 2.0, 9.0, 3.0]), np.array([-4.0, 5.0, 9.0, -6.0])

@@ -76,6 +76,7 @@ def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
 
 @pytest.mark.parametrize("is_reset", [False, True])
 def test_a_contradiction_is_logged_unless_the_robot_was_reset(is_reset, caplog):
+    """A leap of positions is logged after a delay, in which a reset that explains it may still arrive."""
     bus = Bus()
     context = PipeContext(make_robot(), MemoryMiddleware(bus, "cart"), {}, RATE)
     record = received(function="state", message="sensor_msgs::JointState", dofs=dofs(type="actuated"))

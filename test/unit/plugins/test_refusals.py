@@ -54,6 +54,7 @@ def test_a_dry_run_connects_to_nothing(dry):
 
 
 def test_two_plugins_command_no_common_number():
+    """A pair is reported once, with its first common number; different fields of one joint are no conflict."""
     one, other, third, last = (
         (name, frozenset(("arm", field, joint) for field, joint in numbers), where)
         for name, numbers, where in (

@@ -230,6 +230,7 @@ def test_further_interfaces_are_what_genpy_reads_and_writes():
 
 @pytest.mark.parametrize("lacks", list(itertools.product((False, True), repeat=3)), ids=str)
 def test_an_imu_may_lack_each_quantity(lacks):
+    """A covariance of -1 marks what a driver does not measure: it is NaN here, and marked again when it is sent."""
     imu, message = codec("sensor_msgs/Imu"), sensor_messages.Imu()
     message.orientation.w, message.angular_velocity.z, message.linear_acceleration.x = 1.0, 0.3, 9.0
     names = ("orientation", "angular_velocity", "linear_acceleration")
