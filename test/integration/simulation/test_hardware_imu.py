@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from support.integration.world import CONFIG, ROBOT, World, perfect
+from support.simulation.hardware_plugin import configuration
 
 from solfer.config import read
 from solfer.errors import SimulationError
@@ -98,15 +99,9 @@ class PerfectHardware(World):
 
 def inertial(tmp_path, system, change=lambda text: text):
     """Write the shipped configuration with the robot that receives the IMU; `change` may alter hardware.yaml."""
-    folder = tmp_path / "config"
-    (folder / "support").mkdir(parents=True)
-    (folder / "robots").symlink_to(CONFIG / "robots")
-    for path in (CONFIG / "support").iterdir():
-        text = path.read_text()
-        (folder / "support" / path.name).write_text(change(text) if path.name == "hardware.yaml" else text)
-    text = (CONFIG / "centauro.yaml").read_text().replace("system: SM", f"system: {system}")
-    (folder / "centauro.yaml").write_text(text.replace("robot: joint_space", "robot: inertial"))
-    return folder / "centauro.yaml"
+    file = configuration(tmp_path, system, change)
+    file.write_text(file.read_text().replace("robot: joint_space", "robot: inertial"))
+    return file
 
 
 @pytest.mark.daily(1)
