@@ -6,7 +6,7 @@ from support.unit.cart import DT, GAINS, GROUPS, RECORDS, URDF, bend, claim, mak
 from support.unit.declarations import named
 from support.unit.refusals import check_refusal
 
-from solfer.errors import ClaimRefused, CommandRefused, SolferError, UnknownName
+from solfer.errors import ClaimRefused, CommandRefused, SolferError, Suspended, UnknownName
 from solfer.lower_level import LowerLevelRecord, LowerLevelServer, build_lower_level
 from solfer.lower_level.records import RationRecord
 from solfer.lower_level.server.server import largest_request
@@ -27,6 +27,8 @@ def twice(cart):
     turn(cart, "/second")
 
 
+CLAIM = "claim of '/a'"
+COMMAND = "command of '/a'"
 REFUSED = [
     (asked("", ("arm",)), CommandRefused, "without an owner or without controllers"),
     (asked("/a", ()), CommandRefused, "without an owner or without controllers"),
@@ -54,13 +56,12 @@ def test_a_stopped_controller_refuses_and_says_so():
     listed = named(lower_level_services(cart), "list_controllers").handler(None)
     assert listed.states == ("running", "stopped") and listed.types == ("impedance", "velocity")
     assert listed.joints == ("shoulder", "roll") and listed.claimed_by == ("", "")
-    for attempt, what in ((lambda: claim(cart, "/a", ("wheel",)), "claim"), (lambda: turn(cart, "/a"), "command")):
-        with pytest.raises(SolferError) as error:
-            attempt()
-        assert (error.value.what, error.value.where) == ("controller 'wheel' is stopped", f"{what} of '/a'")
-    with pytest.raises(SolferError) as error:
-        cart.switch([], ["wheel"])
-    assert error.value.expected == "a controller that runs"
+    for call, error, place, words in (
+        (lambda: claim(cart, "/a", ("wheel",)), Suspended, CLAIM, "controller 'wheel' is stopped"),
+        (lambda: turn(cart, "/a"), Suspended, COMMAND, "controller 'wheel' is stopped"),
+        (lambda: cart.switch([], ["wheel"]), CommandRefused, "", "(expected: a controller that runs)"),
+    ):
+        check_refusal(call, error, place, words)
 
 
 class LastReport:
@@ -133,13 +134,8 @@ def test_effort_at_a_bound_is_accepted():
 def test_what_is_suspended_says_of_whom():
     cart = make()
     cart.emergency_stop("smoke")
-    for attempt, where in (
-        (lambda: turn(cart, "/a"), "command of '/a'"),
-        (lambda: claim(cart, "/b", ("arm",)), "claim of '/b'"),
-    ):
-        with pytest.raises(SolferError) as error:
-            attempt()
-        assert error.value.where == where and "smoke" in error.value.what
+    check_refusal(lambda: turn(cart, "/a"), Suspended, COMMAND, "smoke")
+    check_refusal(lambda: claim(cart, "/a", ("arm",)), Suspended, CLAIM, "smoke")
 
 
 @pytest.mark.parametrize("largest", [None, 5000])

@@ -7,12 +7,10 @@ from support.unit.joint_pipes import RATE, dofs, make_robot, published, received
 from support.unit.refusals import check_refusal
 
 from solfer.config.kinds.body import BodyControllerRecord
-from solfer.config.records.pipes import InterfaceRecord
 from solfer.errors import PipeError, UnknownName, Unrelated
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description, Kinematics, Semantics
 from solfer.pipes import PipeContext, factory
-from solfer.pipes.context import fields_of
 from solfer.pipes.name_order import NameOrder
 from solfer.robot import Robot
 from solfer.transport import JointMessage
@@ -43,7 +41,6 @@ def make(record, robot=None):
     return (factory.controller if hasattr(record, "sink") else factory.feedback)(record, context)
 
 
-MOTOR = {"type": "velocity", "sink": None, "interface": {"velocity": True, "effort": True}}
 REFUSED = [
     (received(source=None), "feedback 'pipe' has no source (expected: source: a topic)"),
     (published(sink=None), "controller 'pipe' has no sink (expected: sink: a topic)"),
@@ -51,8 +48,6 @@ REFUSED = [
     (received(interface={}), "pipe 'pipe' carries no interface"),
     (received(message="sensor_msgs::JointState", interface={"stiffness": True}), "carries no 'stiffness'"),
     (published(type="impedance", sink="command"), "the sink 'command' follows the name of the controller 'pipe'"),
-    (published(**MOTOR), "the lower level's controller 'pipe' takes no 'effort'"),
-    (received(dofs=dofs(type="unactuated", mapping="ACTUATED")), "carries no DoF: none of chain 'all'"),
     (base(dofs=dofs()), "type 'all' in operational space"),
     (base(dofs=dofs(type="body", name="bse")), "unknown link 'bse' (did you mean base?)"),
     (base(dofs=LINK | {"mapping": "ACTUATED"}), "the map 'ACTUATED' lacks DoFs of the floating base"),
@@ -77,10 +72,6 @@ def test_a_fixed_robot_has_no_base_to_receive():
     description = Description.from_text(URDF.replace('type="floating"', 'type="fixed"'))
     robot = Robot(Kinematics(description), Semantics.from_text('<robot name="cart"/>', description))
     check_refusal(lambda: make(base(), robot), PipeError, "", f"a floating base, but '{robot.name}' has none")
-
-
-def test_an_interface_has_to_carry_something():
-    check_refusal(lambda: fields_of(InterfaceRecord(), "pipe"), PipeError, "", "pipe 'pipe' carries no interface")
 
 
 def test_names_of_a_message_are_compared():
