@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, settings
 from support import needs
 from support.suite.repeat import MOST, Repeat
 from support.suite.report import Report
-from support.suite.stalls import Watcher
+from support.suite.stalls import StallRecorder
 
 from solfer.supervision import supervise
 
@@ -65,7 +65,7 @@ def pytest_configure(config):
         return
     folder = Path(tempfile.mkdtemp(prefix="solfer-tests-"))
     config.add_cleanup(lambda: shutil.rmtree(folder))
-    config.add_cleanup(Watcher(folder).close)
+    config.add_cleanup(StallRecorder(folder).close)
     config.pluginmanager.register(Report(TESTS.parent, config))
 
 

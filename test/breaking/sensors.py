@@ -105,7 +105,7 @@ def logged(handler: logging.Handler) -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-class Driven:
+class DrivenRobot:
     """A robot that is driven and waves.
 
     Args:
@@ -138,9 +138,9 @@ class Driven:
 
 
 @cache
-def driven(motion: str) -> Driven:
+def driven(motion: str) -> DrivenRobot:
     """Return the robot with which all trials of a motion begin: made once, and continued in copies of this process."""
-    return Driven(motion, Nodes(None))
+    return DrivenRobot(motion, Nodes(None))
 
 
 def in_a_copy(work: Callable[[], Outcome]) -> Outcome:
@@ -185,14 +185,14 @@ class SensorTrial:
         robot = driven(self.motion)
         return in_a_copy(lambda: self._run(robot))
 
-    def begin(self, robot: Driven) -> None:
+    def begin(self, robot: DrivenRobot) -> None:
         """Let the fault begin."""
         self.world, self.joints = robot.world, robot.joints
         self.begin_of_fault = robot.world.bus.time
         if self.fault:
             FAULTS[self.fault](self)
 
-    def _run(self, robot: Driven) -> Outcome:
+    def _run(self, robot: DrivenRobot) -> Outcome:
         world, outcome, saying = robot.world, Outcome(), Saying(lambda: robot.world.bus.time)
         speeds: list[float] = []
         look = self._looks(robot, outcome)
@@ -220,7 +220,7 @@ class SensorTrial:
         outcome.advice = (reasons or [text for _, text in saying.said[-1:]] or [""])[0]
         return outcome
 
-    def _looks(self, robot: Driven, outcome: Outcome) -> Callable[[], float]:
+    def _looks(self, robot: DrivenRobot, outcome: Outcome) -> Callable[[], float]:
         """Return what notes the largest figures, and returns the speed of the base [m/s]."""
         simulation, bus = robot.world.simulation, robot.world.bus
         v, limits = simulation.v, simulation.kinematics.velocity_limit[6:]
@@ -303,7 +303,7 @@ class Messages:
         self._pipes = {topic: pipes[topic] for topic in ("imu", "joint_states")}
         for topic in self._pipes:
             self._listen(topic)
-        robot = self._robot = Driven(motion, self._world)
+        robot = self._robot = DrivenRobot(motion, self._world)
         self._begin = self._world.bus.time
         robot.go(SOON)
         self._heard = [each for each in self._heard if each[1].stamp > self._begin - EARLIER]

@@ -5,7 +5,7 @@ from solfer.components import Component, Port
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
-class Balance(Component):
+class BodyPoints(Component):
     """Publishes `center_of_mass` and `wheels`, the origins of their links, of the measured Robot."""
 
     def __init__(self, robot, tags=None, name=""):

@@ -32,7 +32,7 @@ BLEND = 1000
 PAGE = Path(__file__).resolve().parents[2] / "docs/reference/compensation.md"
 
 
-class Sent:
+class SentCommands:
     """What is commanded."""
 
     def __init__(self):
@@ -69,7 +69,7 @@ class CompensationTest(unittest.TestCase):
 
         Each command sent equals that of the same plugin in memory.
         """
-        robot, recording, sent = Robot(), Recording(("/desired_state",)), Sent()
+        robot, recording, sent = Robot(), Recording(("/desired_state",)), SentCommands()
         lines = re.findall(r"^rosservice call .*$", PAGE.read_text(), re.MULTILINE)
         self.assertEqual([line.split()[2].rpartition("/")[2] for line in lines], ["trajectory", "lift", "lift"])
         for line in lines:

@@ -19,7 +19,14 @@ from solfer.transport.fixed_rate import FixedRateLoop
 
 REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
 sys.path.append(str(REPOSITORY / "test"))
-from support.paper.one_schedule import COURSE_RATE, FIELDS, PLUGINS_RATE, InMemory, Outside, check_equal  # noqa: E402
+from support.paper.one_schedule import (  # noqa: E402
+    COURSE_RATE,
+    FIELDS,
+    PLUGINS_RATE,
+    Outside,
+    ScheduledNodes,
+    check_equal,
+)
 
 DURATION = float(os.environ.get("SOLFER_FIGURE_5_SECONDS", "4"))
 """Simulated time that is compared [s]."""
@@ -27,7 +34,7 @@ DURATION = float(os.environ.get("SOLFER_FIGURE_5_SECONDS", "4"))
 CONTROLLERS = ("position_controller", "velocity_controller")
 
 
-class Sent:
+class SentToLowerLevel:
     """What was sent to the lower level: by step, its numbers by controller, field and joint."""
 
     def __init__(self):
@@ -54,7 +61,7 @@ class Figure5LockstepTest(unittest.TestCase):
     def test_nodes_send_what_memory_sends(self):
         """The transport must not change the control: every command of the course is compared, step by step."""
         with closing(RosMiddleware(RosNode("driver", sys.argv))) as middleware:
-            sent, outside = Sent(), Outside(middleware)
+            sent, outside = SentToLowerLevel(), Outside(middleware)
             FixedRateLoop(middleware, COURSE_RATE).run(
                 outside.cycle, lambda: middleware.running() and middleware.now() < DURATION
             )
@@ -62,7 +69,7 @@ class Figure5LockstepTest(unittest.TestCase):
             steps = [1 + round(cycle / PLUGINS_RATE / STEP) for cycle in range(cycles)]
             wait_for(lambda: sent.at(steps[-1]) is not None, START, "the last commands")
             rows = [sent.at(step) for step in steps]
-        with closing(InMemory().play(DURATION)) as memory:
+        with closing(ScheduledNodes().play(DURATION)) as memory:
             self.assertGreater(outside.navigation.elapsed, 0.5 * DURATION)
             self.assertEqual(rows[-1].keys(), set(memory.names))
             begin = next(index for index, row in enumerate(rows) if row is not None)

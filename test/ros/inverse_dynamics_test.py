@@ -19,6 +19,7 @@ class InverseDynamicsTest(unittest.TestCase):
     """The launch file of the page."""
 
     def test_a_killed_plugin_leaves_the_robot_standing(self):
+        """The lower level holds the joints of a plugin that is killed in the middle of a squat."""
         rospy.init_node("killer")
         robot = Robot()
 

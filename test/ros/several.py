@@ -26,7 +26,7 @@ from solfer.transport.middleware import TRIGGER, Flag, NoFields
 COSTS = 400  # cycles
 
 
-class Several:
+class PluginsOfANode:
     """The plugins of a node, and its loop.
 
     Attributes:
@@ -88,7 +88,7 @@ def main(argv: list[str]) -> int:
     """Run until the end is requested."""
     file, *names = arguments(argv)
     with closing(RosMiddleware(RosNode("limbs", argv))) as middleware:
-        return Several(file, names, middleware).run()
+        return PluginsOfANode(file, names, middleware).run()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from bodies_parts import Bullet
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from support.table_1 import FILE, GRAVITY, System, Table1
+from support.table_1 import FILE, GRAVITY, Table1, Table1System
 from system import START, numbers, wait_for
 
 from solfer.config import load
@@ -32,7 +32,7 @@ PERIOD = 0.005
 """Simulated time between two joint states [s]."""
 
 
-class RosSystem(System):
+class RosTable1(Table1System):
     """Simulator and Speaker are nodes of their own, Listener runs here."""
 
     def __init__(self):
@@ -108,7 +108,7 @@ class Table1Test(Table1, unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.system = RosSystem()
+        cls.system = RosTable1()
 
 
 if __name__ == "__main__":

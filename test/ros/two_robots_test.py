@@ -56,6 +56,7 @@ class TwoRobotsTest(unittest.TestCase):
         cls.places[robot] = message.pose.pose.position.x, message.pose.pose.position.y
 
     def test_each_robot_goes_its_own_way(self):
+        """The commands of the page: each of two robots drives, stops and ends while the other one is not affected."""
         *launches, red_goes, blue_goes, blue_drives, stop = map(shlex.split, self.commands)
         with contextlib.ExitStack() as stack:
             red, blue = (stack.enter_context(started(*each)) for each in launches)

@@ -64,7 +64,7 @@ class Listener(Component):
         }
 
 
-class System(abc.ABC):
+class Table1System(abc.ABC):
     """The simulated robot, Speaker and Listener on one middleware.
 
     Attributes:
@@ -126,7 +126,7 @@ class System(abc.ABC):
 class Table1:
     """The rows; `system` is that of a middleware."""
 
-    system: System
+    system: Table1System
 
     def robot(self):
         """Return the Robot of the listener."""

@@ -40,10 +40,3 @@ def test_classes_have_few_attributes():
     for path in sorted(PACKAGES.rglob("*.py")):
         counts |= {name: count for name, count in attributes(path.read_text()).items() if count > MOST}
     assert counts == MORE
-
-
-def test_each_attribute_counts_once():
-    text = (
-        "class A:\n    def f(self):\n        self.a, self.b = 1, 2\n        self.a += self.c\n        self.d[0] = 1\n"
-    )
-    assert attributes(text) == {"A": 2}

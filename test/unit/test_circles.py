@@ -1,4 +1,4 @@
-"""No circle of imports: neither what loads with a file leads back to it, nor what is imported later."""
+"""No circle of imports: neither what loads with a file leads back to it, nor what is imported later or for types."""
 
 import ast
 from graphlib import TopologicalSorter
@@ -9,66 +9,31 @@ PACKAGES = Path(__file__).resolve().parents[2] / "src"
 
 def module_of(path) -> str:
     """Return the dotted name of a source file; a package has that of its folder."""
-    parts = path.relative_to(PACKAGES).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    return ".".join(path.relative_to(PACKAGES).with_suffix("").parts).removesuffix(".__init__")
 
 
-MODULES = {module_of(path): ast.parse(path.read_text()) for path in PACKAGES.rglob("*.py")}
+def imports(text, module, known) -> set[str]:
+    """Return the modules that a text imports: of `from a import b` the module a.b if there is one, else a."""
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            package = module.split(".")[: -node.level] if node.level else []
+            base = ".".join([*package, *([node.module] if node.module else [])])
+            below = (f"{base}.{alias.name}" for alias in node.names)
+            found |= {name if name in known else base for name in below}
+    return (found & known) - {module}
 
 
-def statements(node, later, inside=False):
-    """Yield the imports below a node: those that run when the file loads, or with `later` also all others."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.expr):
-            continue
-        if isinstance(child, ast.Import | ast.ImportFrom) and (later or not inside):
-            yield child
-        function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef)
-        for_types = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test)
-        yield from statements(child, later, inside or function or for_types)
-
-
-def named(statement, module, known):
-    """Yield the modules that an import names: of `from a import b` the module a.b if there is one, else a."""
-    if isinstance(statement, ast.Import):
-        yield from (alias.name for alias in statement.names)
-        return
-    package = module.split(".")[: -statement.level] if statement.level else []
-    base = ".".join([*package, *([statement.module] if statement.module else [])])
-    for alias in statement.names:
-        yield f"{base}.{alias.name}" if f"{base}.{alias.name}" in known else base
-
-
-def imports(later) -> dict[str, set[str]]:
-    """Return what each module imports of the package."""
-    return {
-        module: {name for each in statements(tree, later) for name in named(each, module, MODULES) if name in MODULES}
-        - {module}
-        for module, tree in MODULES.items()
-    }
-
-
-def test_loading_a_file_never_leads_back():
-    graph = imports(later=False)
-    assert "solfer.errors" in graph["solfer.config.records.record"] | graph["solfer.config.yaml.files"]
+def test_no_import_leads_back():
+    texts = {module_of(path): path.read_text() for path in PACKAGES.rglob("*.py")}
+    graph = {module: imports(text, module, set(texts)) for module, text in texts.items()}
+    assert "solfer.errors" in graph["solfer.config.yaml.files"]
     TopologicalSorter(graph).prepare()  # raises with the circle, if there is one
 
 
-def test_no_other_import_leads_back():
-    TopologicalSorter(imports(later=True)).prepare()
-
-
 def test_every_kind_of_import_is_seen():
-    text = (
-        "import a.b\nfrom a import c, d\nfrom typing import TYPE_CHECKING\n"
-        "if TYPE_CHECKING:\n    from a import e\n"
-        "def f():\n    from .g import h\n"
-        "try:\n    import i\nfinally:\n    pass\n"
-    )
     known = {"a", "a.b", "a.c", "a.e", "a.g", "i"}
-
-    def names(later):
-        return {name for each in statements(ast.parse(text), later) for name in named(each, "a.x", known)} & known
-
-    assert names(later=False) == {"a", "a.b", "a.c", "i"}
-    assert names(later=True) == known
+    text = "import a.b\nfrom a import c, d\nif T:\n    from a import e\ndef f():\n    from .g import h\n    import i\n"
+    assert imports(text, "a.x", known) == known

@@ -50,17 +50,3 @@ def changeable(text: str) -> set[str]:
 def test_dataclasses_are_frozen():
     found = {str(path.relative_to(PACKAGES)): changeable(path.read_text()) for path in sorted(PACKAGES.rglob("*.py"))}
     assert {file: names for file, names in found.items() if names} == CHANGED
-
-
-@pytest.mark.parametrize(
-    ("decorator", "names"),
-    [
-        ("dataclass", {"A"}),
-        ("dataclasses.dataclass(order=True)", {"A"}),
-        ("dataclass(frozen=False)", {"A"}),
-        ("dataclass(frozen=True)", set()),
-        ("final", set()),
-    ],
-)
-def test_a_changeable_dataclass_is_found(decorator, names):
-    assert changeable(f"@{decorator}\nclass A:\n    x: int\n") == names

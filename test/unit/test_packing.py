@@ -20,8 +20,4 @@ def packed(text):
 def test_assignments_pack_no_values():
     counts = [packed(path.read_text()) for path in sorted(PACKAGES.rglob("*.py"))]
     assignments, several = (sum(column) for column in zip(*counts, strict=True))
-    assert assignments > 10_000 and several < MOST * assignments
-
-
-def test_only_what_packs_is_counted():
-    assert packed("a = 1\nb, c = point\nd, e = 2, 3\n") == (3, 1)
+    assert assignments > 10_000 and 0 < several < MOST * assignments

@@ -83,7 +83,7 @@ def test_a_node_logs_to_its_output(monkeypatch, capsys):
     assert capsys.readouterr().out == "[INFO] [solfer.arm]: moves\n"
 
 
-class Kept(logging.Handler):
+class KeptRecords(logging.Handler):
     """Keeps messages and the threads that wrote them."""
 
     def __init__(self, level):
@@ -95,7 +95,7 @@ class Kept(logging.Handler):
 
 
 def test_another_thread_writes_the_log():
-    root, every, errors = logging.getLogger(), Kept(logging.INFO), Kept(logging.ERROR)
+    root, every, errors = logging.getLogger(), KeptRecords(logging.INFO), KeptRecords(logging.ERROR)
     root.handlers[:] = [every, errors]
     root.setLevel(logging.INFO)
     with pytest.raises(ZeroDivisionError), logged_apart():

@@ -21,6 +21,7 @@ def test_a_recording_is_replayed_to_the_same_commands(capsys):
 
 @pytest.mark.slow
 def test_a_package_of_a_component_passes(repository, tmp_path):
+    """The tests and the configuration of a package that an earlier version wrote still pass."""
     shutil.unpack_archive(FILES / "swing_joint.zip", tmp_path)
     package = tmp_path / "swing_joint"
     paths = {"PYTHONPATH": f"{package / 'src'}{os.pathsep}{SOURCES}", "ROS_PACKAGE_PATH": str(repository)}

@@ -174,6 +174,7 @@ def test_the_robot_moves_without_its_source(clean, space, tmp_path):
 
 
 def test_an_overlay_moves_the_robot_by_a_component_of_its_own(clean, tmp_path):
+    """A component of a workspace above the installed one is found by its launch file, and moves joints."""
     setup, overlay = clean / "devel" / "setup.sh", tmp_path / "over"
     script = f"""set -e
 . {setup}

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.full_control import FRAME, PERIOD, Layer, Nodes, course
+from support.paper.full_control import FRAME, PERIOD, Figure5Layer, Nodes, course
 
 from solfer.middleware.memory import read_faults
 from solfer_tools.scenarios import Player, read_scenario
@@ -44,7 +44,7 @@ class Course:
     Args:
         faults: Of transport and loops.
         file: Scenario of the course.
-        kind: World of the plugins, `Nodes` or `Layer`.
+        kind: World of the plugins, `Nodes` or `Figure5Layer`.
         folder: Where a layer has its files.
 
     Attributes:
@@ -150,7 +150,7 @@ def test_hands_are_where_they_are_to_be(undisturbed):
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("kind", [Nodes, Layer])
+@pytest.mark.parametrize("kind", [Nodes, Figure5Layer])
 @pytest.mark.parametrize("name", ["", "quiet", "busy", "skip"])
 def test_the_course_of_figure_5_ends_as_its_file(tmp_path, repository, name, kind):
     """The whole course of the demonstration, with its circle, ends within 1 % of its way and 1 degree.

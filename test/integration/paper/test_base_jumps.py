@@ -28,7 +28,7 @@ def drawn(seed):
 JUMPS = {"place": (5.0, -3.0, 0.0, None), "heading": (None, None, 0.0, 2.0), **{f"{k}": drawn(k) for k in range(8)}}
 
 
-class Driver:
+class JumpingDrive:
     """Sends velocities of the base to a world of Fig. 5, and notes where it truly is."""
 
     def __init__(self, world, motion):
@@ -60,7 +60,7 @@ class Driver:
 def driven(tmp_path, motion, jump=None):
     """Drive, let the estimate jump if `jump` is given, and go on; return the driver."""
     with closing(Nodes(tmp_path)) as world:
-        driver = Driver(world, MOTIONS[motion])
+        driver = JumpingDrive(world, MOTIONS[motion])
         driver.drive(BEFORE)
         if jump is not None:
             odometry = world.plugins["odometry"].component

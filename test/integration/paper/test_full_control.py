@@ -4,7 +4,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.full_control import PERIOD, Layer, Nodes, course
+from support.paper.full_control import PERIOD, Figure5Layer, Nodes, course
 from support.plugins.plugin_claims import kill, owners
 
 from solfer.middleware.memory import MemoryMiddleware
@@ -64,7 +64,10 @@ pattern:
 """
 
 
-@pytest.fixture(scope="module", params=[Nodes, pytest.param(Layer, marks=pytest.mark.soak)], ids=["nodes", "layer"])
+KINDS = [pytest.param(Nodes, id="nodes"), pytest.param(Figure5Layer, id="layer", marks=pytest.mark.soak)]
+
+
+@pytest.fixture(scope="module", params=KINDS)
 def world(request, tmp_path_factory):
     with closing(request.param(tmp_path_factory.mktemp("layer"))) as world:
         world.run(2.5)

@@ -5,7 +5,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from support.integration.world import CONFIG, World
-from support.paper.full_control import Driven, Layer
+from support.paper.full_control import Driven, Figure5Layer
 
 from solfer.config import load_shared
 from solfer.middleware.memory import MemoryMiddleware
@@ -32,7 +32,7 @@ class Listed(Driven, World):
         self.plugins = {managed.name: managed.plugin for managed in together.plugins}
 
 
-class ListedLayer(Layer):
+class ListedLayer(Figure5Layer):
     """As a real-time layer does it."""
 
     def __init__(self, folder):

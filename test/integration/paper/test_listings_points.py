@@ -26,7 +26,7 @@ STEPS, RESOLUTION = 6, 1e-6  # [m]
 
 
 @dataclass
-class Reference:
+class PinocchioRobot:
     """A robot in Pinocchio, with its base on three prismatic and three revolute joints."""
 
     model: pin.Model
@@ -81,7 +81,7 @@ def reference(request):
         moved = model.joints[model.getJointId(joint.get("name"))]
         if moved.nq == 1:
             q[moved.idx_q] = float(joint.get("value"))
-    return Reference(model, q, LINKS[name])
+    return PinocchioRobot(model, q, LINKS[name])
 
 
 def on_a_floating_base(text):

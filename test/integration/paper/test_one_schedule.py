@@ -7,14 +7,14 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.one_schedule import InLayer, InMemory
+from support.paper.one_schedule import ScheduledLayer, ScheduledNodes
 
 DURATION = 4.0  # [s]
 
 
 @pytest.mark.soak
 def test_a_layer_sends_what_nodes_send(tmp_path):
-    with closing(InMemory()) as memory, closing(InLayer(tmp_path)) as layer:
+    with closing(ScheduledNodes()) as memory, closing(ScheduledLayer(tmp_path)) as layer:
         for world in (memory, layer):
             world.play(DURATION)
             assert world.outside.navigation.elapsed > 0.5 * DURATION

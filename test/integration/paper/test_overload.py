@@ -37,7 +37,7 @@ class Computer:
         return time >= self._until[0]
 
 
-class Driver:
+class OverloadedDrive:
     """Watches the robot while a course is driven, and makes the computer busy in the middle of it."""
 
     def __init__(self, world, computer):
@@ -64,6 +64,7 @@ class Driver:
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("seed", [None, *range(50)])
 def test_it_rests_while_its_loops_starve_and_goes_on(seed, tmp_path, monkeypatch):
+    """Base and hand slow down while loops get no computing time, and go on after it; the robot does not tilt."""
     computer, every = Computer(seed), Bus.every
 
     def starved(self, period, work, start=None, cycles=False):
@@ -75,7 +76,7 @@ def test_it_rests_while_its_loops_starve_and_goes_on(seed, tmp_path, monkeypatch
     file.write_text(course(3.0, 0.0, 0.2, 0.4))
     with closing(Nodes(tmp_path)) as world:
         world.run(2.5)
-        driver = Driver(world, computer)
+        driver = OverloadedDrive(world, computer)
         with pytest.raises(StopIteration):
             world.play(read_scenario(file), driver.look)
         busy, free = DRIVES + STARVED, DRIVES + STARVED + LATER

@@ -41,7 +41,7 @@ class LayerSystem(MemorySystem):
         self.world.run(1.0)
 
     def ask(self, **request):
-        """See `System.ask`; the request goes over the bridge."""
+        """See `Table1System.ask`; the request goes over the bridge."""
         reply = self.world.bus.call("speaker/trajectory", MoveJoints(**request))
         self.world.run(0.02)
         assert reply.result(0).success, reply.result(0).message

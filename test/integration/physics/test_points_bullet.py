@@ -24,7 +24,7 @@ ROBOTS = {
 STATES = 100
 
 
-class Bullet:
+class PlacedRobot:
     """A robot in PyBullet, placed by its joints and the pose and twist of its base."""
 
     def __init__(self, robot: Robot):
@@ -89,11 +89,11 @@ def without_shapes_and_floating_joint(robot: Robot) -> str:
 def test_links_move_as_in_pybullet(name):
     urdf, floating_base = ROBOTS[name]
     robot = Robot.load(urdf, floating_base=floating_base)
-    with closing(Bullet(robot)) as bullet:
+    with closing(PlacedRobot(robot)) as bullet:
         compare(robot, bullet)
 
 
-def compare(robot: Robot, bullet: Bullet) -> None:
+def compare(robot: Robot, bullet: PlacedRobot) -> None:
     random = np.random.default_rng(11)
     positions = Handler(LinearPoint(link, robot) for link in bullet.links)
     orientations = Handler(FrameOrientation(link, robot) for link in bullet.links)

@@ -12,7 +12,7 @@ from solfer.plugins import PluginState, check_file
 from solfer_tools.cli.main import main
 
 WHEELS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
-ROBOT = {"class": "support.plugins.contact_pipes:Watcher", "kinematics": True, "controller": []}
+ROBOT = {"class": "support.plugins.body_pipes:Watcher", "kinematics": True, "controller": []}
 
 
 def file_of(tmp_path, change=None, **tags):

@@ -20,7 +20,7 @@ WHEELS, GRIP = tuple(f"wheel_{leg}" for leg in range(1, 5)), 0.8
 """Wheels of CENTAURO, and the friction below them."""
 
 
-class Watch:
+class SquatWatch:
     """What a robot does while it squats.
 
     Args:
@@ -54,7 +54,7 @@ def test_centauro_squats_within_friction_and_torques():
         world.run(1.0)
         plugin, before = world.plugin("squat"), world.simulation.torque.copy()
         world.run(0.01)
-        watch = Watch(world.bus, plugin, world.simulation)
+        watch = SquatWatch(world.bus, plugin, world.simulation)
         world.run(5.0)
         watch.check(GRIP, 0.1)
         assert set(world.simulation.contacts()) == set(WHEELS)
@@ -73,7 +73,7 @@ SQUATS = {"talos": 0.05, "solo": 0.02, "anymal": 0.05, "hyq": 0.05, "go2": 0.03,
 def test_other_robots_squat_by_their_files_alone(name, amplitude, tmp_path):
     with opened(name, tmp_path, amplitude) as robot:
         robot.run(0.5)
-        watch = Watch(robot.bus, robot.plugin, robot.simulation)
+        watch = SquatWatch(robot.bus, robot.plugin, robot.simulation)
         robot.run(4.5)
         watch.check(FRICTION, 2.0 * amplitude)
         assert robot.plugin.life is PluginState.RUNNING and not robot.plugin.component.is_holding
@@ -115,6 +115,7 @@ def test_it_squats_where_odometry_says_that_it_is():
 
 
 def test_a_layer_squats_at_500_hz(tmp_path):
+    """The executor in shared memory keeps the accuracy and the limits that a node keeps."""
     with contextlib.closing(XbotWorld(tmp_path)) as world:
         world.run(1.0)
         node = world.node("squat")
@@ -126,7 +127,7 @@ def test_a_layer_squats_at_500_hz(tmp_path):
         world.bus.every(1.0 / executor.rate, executor.cycle)
         world.run(0.5)
         assert executor.rate == 500.0
-        watch = Watch(world.bus, plugin, world.simulation)
+        watch = SquatWatch(world.bus, plugin, world.simulation)
         world.run(3.0)
         watch.check(GRIP, 0.1)
         assert executor.plugins[0].state is PluginState.RUNNING and not plugin.component.is_holding
@@ -210,6 +211,7 @@ def stretch(world):
     ],
 )
 def test_a_fault_is_named_and_the_robot_held(fault, text, caplog):
+    """The robot holds within its torque limits instead of falling, and the log has the reason."""
     with contextlib.closing(World()) as world:
         world.run(0.5)
         world.squatting = world.plugin("inverse_dynamics")
@@ -381,7 +383,7 @@ def test_all_contacts_of_the_whole_robot_may_be_tracked(tmp_path):
         file = more(tmp_path, "\n    whole: {<<: *squat, track: all}")
         plugin = world.plugin("whole", file, target="solfer.components.inverse_dynamics:InverseDynamics")
         world.run(0.01)
-        watch = Watch(world.bus, plugin, world.simulation)
+        watch = SquatWatch(world.bus, plugin, world.simulation)
         world.run(5.0)
         watch.check(GRIP, 0.1)
         ground = plugin.component.ground

@@ -42,7 +42,7 @@ CASES = {
 TOO_FAST = 1.0 + 1e-6
 
 
-class Watch:
+class SpeedWatch:
     """The largest speed of a joint, as a share of its limit, commanded and measured."""
 
     def __init__(self, world, plugin):
@@ -171,7 +171,7 @@ def other(value, maximum):
 def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
     """Within its range it is taken over and logged, beyond it is refused, and no joint exceeds its speed."""
     plugin = running(world, name)
-    watch, wrong = Watch(world, plugin), []
+    watch, wrong = SpeedWatch(world, plugin), []
     component = plugin.component
     reply = world.ask(f"{name}/get_parameters")
     assert reply.names
@@ -230,7 +230,7 @@ def test_a_gain_from_nothing_to_its_maximum_makes_no_joint_leap(world, monkeypat
     world.run(0.6)
     service, fields = CASES[name][2]
     assert world.ask(f"{name}/{service}", **fields).success
-    watch = Watch(world, plugin)
+    watch = SpeedWatch(world, plugin)
     assert main(["params", "set", name, f"{gain}={most}"]) == 0
     world.run(1.5)
     assert plugin.running

@@ -13,7 +13,7 @@ from solfer.plugins import PluginState
 MEASURED, RELAYED = "joint_states", "relayed_states"
 
 
-class Relay:
+class SilentRelay:
     """Publishes joint states on another topic, until it does not; the robot itself goes on."""
 
     def __init__(self, world):
@@ -34,7 +34,7 @@ def start(world, tmp_path, on_timeout):
     tree["mwoibn"]["feedback"]["link_side_online"]["on_timeout"] = on_timeout
     tree["mwoibn"]["ros"]["feedback"]["link_side_online"]["source"] = RELAYED
     path.write_text(yaml.safe_dump(tree))
-    relay, plugin = Relay(world), world.plugin("test", path)
+    relay, plugin = SilentRelay(world), world.plugin("test", path)
     world.run(0.5)
     assert world.ask("test/trajectory", joints=WHEELS, velocities=(2.0,) * 4).success
     world.run(1.5)

@@ -36,6 +36,7 @@ def places(world):
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("end", ENDS)
 def test_arms_without_springs_stay(tmp_path, end, seed):
+    """When their plugin ends, springs take arms over that gravity compensation alone carried: no fall, no jump."""
     world = CarriedWorld(joints=drawn(seed))
     try:
         plugin = world.plugin("soft_compensation", free_arms(tmp_path))

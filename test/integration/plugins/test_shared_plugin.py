@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.shared.figure_5 import ORDER, SharedWorld, write
+from support.shared.figure_5 import ORDER, Figure5World, write
 
 from solfer.plugins import CycleTrace, PluginState
 from solfer.transport.plugin_state import FAILED_STATES
@@ -23,7 +23,7 @@ def shared(tmp_path):
     worlds = []
 
     def make(**modules):
-        world = SharedWorld(write(tmp_path, **modules))
+        world = Figure5World(write(tmp_path, **modules))
         worlds.append(world)
         world.run(0.5)
         return world
@@ -67,7 +67,7 @@ def test_separate_plugins_command_the_same(tmp_path):
     """Sharing one robot saves computations and changes no command, compared to plugins of their own over topics."""
     file, commands, counts = write(tmp_path), [], []
     for shared in (True, False):
-        world = SharedWorld(file, shared)
+        world = Figure5World(file, shared)
         world.move()
         assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}
         robots = {id(plugin.robot.kinematics): plugin.robot for plugin in world.plugins.values()}

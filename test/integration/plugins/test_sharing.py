@@ -29,7 +29,7 @@ def files(tmp_path):
     return path
 
 
-class Process:
+class SharedProcess:
     """Plugins that cycle one after the other, in one process; they share their Robots if `together`."""
 
     def __init__(self, world, path, names, together=True):
@@ -39,7 +39,7 @@ class Process:
         world.bus.every(1.0 / self.plugins[0].rate, self.cycle)
 
     def _made(self, name, settings):
-        target = settings.module.class_ if name == "joint_states" else "support.plugins.sharing:Witness"
+        target = settings.module.class_ if name == "joint_states" else "support.plugins.sharing:StateWitness"
         generator = Registry().find(name, target)
         return generate(settings, MemoryMiddleware(self.world.bus, name), generator, self.sharing)
 
@@ -55,7 +55,7 @@ def test_each_sees_bitwise_the_same_as_alone(files):
     runs = []
     for together in (False, True):
         world = World()
-        process = Process(world, files, ("joint_states", "test", "other"), together)
+        process = SharedProcess(world, files, ("joint_states", "test", "other"), together)
         world.run(0.5)
         assert world.ask(**MOTION).success
         world.run(1.0)
@@ -68,7 +68,7 @@ def test_each_sees_bitwise_the_same_as_alone(files):
 
 
 def test_messages_and_kinematics_are_processed_once(files, world):
-    process = Process(world, files, ("test", "other"))
+    process = SharedProcess(world, files, ("test", "other"))
     world.run(0.2)
     first, second = process.plugins
     pipe, computed = first.feedbacks[0].source.pipe, []
@@ -85,7 +85,7 @@ def test_messages_and_kinematics_are_processed_once(files, world):
 
 
 def test_a_stopped_plugin_blocks_no_other(files, world):
-    process = Process(world, files, ("test", "other"))
+    process = SharedProcess(world, files, ("test", "other"))
     world.run(0.2)
     first, second = process.plugins
     first.stop()
@@ -102,7 +102,7 @@ def test_a_stopped_plugin_blocks_no_other(files, world):
 
 @pytest.mark.parametrize("name", ["changes", "hears_more"])
 def test_measurements_of_a_group_are_united(files, world, name):
-    process = Process(world, files, ("test", name))
+    process = SharedProcess(world, files, ("test", name))
     world.run(0.2)
     first, second = process.plugins
     assert first.robot.shares_measurement(second.robot)
@@ -112,7 +112,7 @@ def test_measurements_of_a_group_are_united(files, world, name):
 
 
 def test_a_different_model_is_not_shared(files, world):
-    process = Process(world, files, ("test", "lower"))
+    process = SharedProcess(world, files, ("test", "lower"))
     first, second = (plugin.robot for plugin in process.plugins)
     assert not first.shares_measurement(second) and first.kinematics is not second.kinematics
     second.state.position[:] = 7.0

@@ -13,7 +13,7 @@ from solfer.transport.messages import FieldsMessage
 SPEED, TURN = 0.2, 0.3  # [m/s], [rad/s]
 
 
-class Driven(World):
+class DrivenWorld(World):
     """A `World` whose robot receives where to go."""
 
     def __init__(self):
@@ -49,7 +49,7 @@ class Driven(World):
 
 @pytest.fixture(scope="module")
 def driven():
-    with closing(Driven()) as world:
+    with closing(DrivenWorld()) as world:
         yield world
 
 

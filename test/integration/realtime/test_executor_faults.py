@@ -4,7 +4,7 @@ import signal
 import time
 
 import pytest
-from support.integration.xbot_system import REPOSITORY, WAIT, System, system, until
+from support.integration.xbot_system import REPOSITORY, WAIT, XbotSystem, system, until
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401 (a fixture)
 
 from solfer.plugins import PluginState
@@ -17,7 +17,7 @@ REST = 0.5
 """Bound of the simulated time from a fault until the wheels rest [s]."""
 
 
-def ask(robot: System, service: str, interface: str, request: object) -> Answer:
+def ask(robot: XbotSystem, service: str, interface: str, request: object) -> Answer:
     """Ask a service of the layer."""
     return robot.middleware.call(service, interface, request, Answer, WAIT)
 

@@ -24,7 +24,7 @@ GROWTH = 2_000_000
 """What all cycles together may keep beyond Python's objects: less than a number in each [B]."""
 
 
-class Robot(XbotWorld):
+class MovingRobot(XbotWorld):
     """A robot that moves; after `replace` without the simulation, which allocates and frees memory itself."""
 
     def replace(self) -> None:
@@ -65,7 +65,7 @@ def anonymous_memory() -> int:
 
 def test_ten_thousand_moving_cycles_keep_no_memory(tmp_path):
     """A leak of any size would page-fault the loop in the end: neither Python nor malloc may grow while wheels turn."""
-    robot = Robot(tmp_path)
+    robot = MovingRobot(tmp_path)
     node, configuration = robot.node(PLUGIN), load(CONFIG / "centauro.yaml", PLUGIN, middleware="XBOT", layer="RT")
     plugin = generate(configuration, node, Registry().find(PLUGIN))
     rules = ExecutorRules(blend=0.1, budget=1.0, overruns=10**9)

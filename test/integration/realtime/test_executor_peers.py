@@ -47,6 +47,7 @@ executor: {{start: [joint_states], blend: 0.2, overruns: 1000000, schedule: {{pr
 
 @pytest.mark.soak
 def test_commands_show_each_pipe_of_a_layer_and_change_a_parameter(system, tmp_path, capsys):
+    """`solfer top` and `solfer params` reach the plugins of a real-time layer as they reach those of nodes."""
     layer = tmp_path / "layer.yaml"
     layer.write_text(f"""
 XBotRTPlugins: {{plugins: [joint_states]}}

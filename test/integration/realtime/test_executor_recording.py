@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.integration.world import CONFIG
-from support.integration.xbot_system import REPOSITORY, WHEELS, System, system, until
+from support.integration.xbot_system import REPOSITORY, WHEELS, XbotSystem, system, until
 from support.realtime.executor_faults import SPEED, begin
 
 from solfer.errors import RecordingError, UnknownName
@@ -41,7 +41,7 @@ executor: {{start: [joint_states], blend: 0.1, overruns: 1000000, schedule: {{lo
     return make
 
 
-def recorder(robot: System, file: Path, *arguments: str) -> subprocess.Popen:
+def recorder(robot: XbotSystem, file: Path, *arguments: str) -> subprocess.Popen:
     """`solfer rt record` as a process."""
     return robot.start(
         REPOSITORY / "nodes" / "solfer", "rt", "--namespace", robot.name, "record", str(file), *arguments

@@ -18,7 +18,7 @@ from solfer.transport.messages import ROBOT_POINTS, BodyMessage, JointMessage, P
 INWARDS = [Route("commands", "solfer/JointCommand"), Route("goals", ROBOT_POINTS)]
 
 
-class Layer:
+class BridgedNodes:
     """A node in shared memory, one on a bus, and the bridge between them."""
 
     def __init__(self, folder):
@@ -39,7 +39,7 @@ class Layer:
 
 @pytest.fixture
 def layer(tmp_path):
-    layer = Layer(tmp_path)
+    layer = BridgedNodes(tmp_path)
     yield layer
     layer.close()
 

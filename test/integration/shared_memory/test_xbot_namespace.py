@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from support.integration.xbot_system import HELD, REPOSITORY, WAIT, System, until
+from support.integration.xbot_system import HELD, REPOSITORY, WAIT, XbotSystem, until
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401  (a fixture)
 
 from solfer.plugins import PluginState
@@ -19,7 +19,7 @@ REST = 1.2
 """Bound of the time from the removal to wheels at rest [s]: it is noticed within 0.1 s."""
 
 
-def replace(robot: System) -> None:
+def replace(robot: XbotSystem) -> None:
     """Another one makes a namespace of the same name."""
     shutil.rmtree(robot.namespace.folder)
     Namespace(robot.name)
@@ -35,14 +35,14 @@ def solfer_rt(name: str, *arguments: str) -> subprocess.CompletedProcess:
     )
 
 
-def check_that_it_came_to_rest(robot: System, moment: float) -> None:
+def check_that_it_came_to_rest(robot: XbotSystem, moment: float) -> None:
     """Check that the wheels stopped in time and stayed so, and no joint moved faster than it may."""
     assert robot.samples[-1][0] - moment >= 0.9  # the simulator ends 1 s after it holds
     assert robot.rest_after(moment) <= REST
     assert robot.largest_step(moment) <= HELD
 
 
-def watch_to_the_end(robot: System) -> None:
+def watch_to_the_end(robot: XbotSystem) -> None:
     """Look at the robot until the simulator has ended."""
 
     def ended() -> bool:
@@ -67,7 +67,7 @@ def output_at_the_end(process: subprocess.Popen) -> str:
     [(lambda robot: shutil.rmtree(robot.namespace.folder), False), (replace, True)],
     ids=["removed", "replaced"],
 )
-def test_a_process_that_loses_the_namespace_ends(robot: System, layer, remove, watched):  # noqa: F811
+def test_a_process_that_loses_the_namespace_ends(robot: XbotSystem, layer, remove, watched):  # noqa: F811
     process, _ = begin(robot, layer)
     others = [robot.watchdog()] if watched else []
     for each in others:
@@ -82,7 +82,7 @@ def test_a_process_that_loses_the_namespace_ends(robot: System, layer, remove, w
 
 
 @pytest.mark.soak
-def test_a_commander_without_checks_is_refused(robot: System):
+def test_a_commander_without_checks_is_refused(robot: XbotSystem):
     robot.driver(SPEED)
     moment = robot.samples[-1][0]
     shutil.rmtree(robot.namespace.folder)
@@ -92,7 +92,7 @@ def test_a_commander_without_checks_is_refused(robot: System):
 
 
 @pytest.mark.soak
-def test_an_emergency_stop_reports_whether_obeyed(robot: System, layer):  # noqa: F811
+def test_an_emergency_stop_reports_whether_obeyed(robot: XbotSystem, layer):  # noqa: F811
     begin(robot, layer)
     robot.drive(SPEED)
     wrong = f"{robot.name}0"

@@ -7,7 +7,7 @@ import os
 import signal
 
 import pytest
-from support.integration.xbot_system import HELD, V_MAX, WHEELS, System, insist, until
+from support.integration.xbot_system import HELD, V_MAX, WHEELS, XbotSystem, insist, until
 
 from solfer.middleware.shared_memory.discovery import published_topics, services
 
@@ -16,13 +16,13 @@ SAFE = 0.15
 """Bound of the time from a fault to wheels at rest [s]: it is noticed after 20 cycles of 2 ms."""
 
 
-def now(robot: System) -> float:
+def now(robot: XbotSystem) -> float:
     """Return the robot's time [s]."""
     robot.look()
     return robot.samples[-1][0]
 
 
-def check_that_it_came_to_rest(robot: System, moment: float) -> None:
+def check_that_it_came_to_rest(robot: XbotSystem, moment: float) -> None:
     """Check that the wheels stopped in time and stay so, and no joint moved faster than it may."""
     robot.watch(0.5)
     assert robot.rest_after(moment) <= SAFE

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from support.integration.world import CONFIG, ROBOT, World, perfect
+from support.simulation.hardware_plugin import configuration
 
 from solfer.config import read
 from solfer.errors import SimulationError
@@ -87,7 +88,7 @@ def test_the_numbers_of_the_calibration_undo_it(samples):
         np.testing.assert_allclose(turn @ raw_f - rotation.T @ beside, f, atol=1e-8)
 
 
-class HardwareWorld(World):
+class PerfectHardware(World):
     """CENTAURO as its hardware publishes it, with perfect sensors: only their mounting counts."""
 
     def offer(self, middleware):
@@ -98,19 +99,13 @@ class HardwareWorld(World):
 
 def inertial(tmp_path, system, change=lambda text: text):
     """Write the shipped configuration with the robot that receives the IMU; `change` may alter hardware.yaml."""
-    folder = tmp_path / "config"
-    (folder / "support").mkdir(parents=True)
-    (folder / "robots").symlink_to(CONFIG / "robots")
-    for path in (CONFIG / "support").iterdir():
-        text = path.read_text()
-        (folder / "support" / path.name).write_text(change(text) if path.name == "hardware.yaml" else text)
-    text = (CONFIG / "centauro.yaml").read_text().replace("system: SM", f"system: {system}")
-    (folder / "centauro.yaml").write_text(text.replace("robot: joint_space", "robot: inertial"))
-    return folder / "centauro.yaml"
+    file = configuration(tmp_path, system, change)
+    file.write_text(file.read_text().replace("robot: joint_space", "robot: inertial"))
+    return file
 
 
 @pytest.mark.daily(1)
-@pytest.mark.parametrize(("system", "kind"), [("SM", World), ("HW", HardwareWorld)])
+@pytest.mark.parametrize(("system", "kind"), [("SM", World), ("HW", PerfectHardware)])
 def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
     world = kind()
     request.addfinalizer(world.close)
@@ -129,7 +124,7 @@ def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
 
 def test_a_wrong_mounting_turns_the_robot(request, tmp_path):
     """The rotation of the IMU's mount is transposed in the file: the estimate must be visibly off, or it is unused."""
-    world = HardwareWorld()
+    world = PerfectHardware()
     request.addfinalizer(world.close)
     transposed = {
         "xy: 0.48": "xy: -0.8",

@@ -175,6 +175,7 @@ print(robot.mass(), *pybullet.getJointInfo(robot.number, 0, robot._client)[8:12]
 
 @pytest.mark.slow
 def test_a_locale_with_decimal_commas_changes_nothing(tmp_path):
+    """PyBullet reads numbers by the locale of the process: a URDF has to mean the same in all of them."""
     if shutil.which("localedef") is None:
         pytest.skip("no localedef")
     made = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(tmp_path / "de_DE.UTF-8")]

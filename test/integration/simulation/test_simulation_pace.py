@@ -5,7 +5,7 @@ import pytest
 from solfer.simulation.server.pace import Pace
 
 
-class Clock:
+class SleepingClock:
     """A clock that moves when a process sleeps or works."""
 
     def __init__(self):
@@ -23,7 +23,7 @@ class Clock:
 @pytest.fixture
 def clock():
     """Make a clock that does not start at zero."""
-    return Clock()
+    return SleepingClock()
 
 
 def run(pace, clock, steps, work, begin=0):

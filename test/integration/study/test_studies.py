@@ -177,6 +177,7 @@ def test_a_scheduler_that_is_not_there_is_one_error(tmp_path):
 
 
 def test_what_exceeds_its_limits_has_failed_and_the_others_go_on(tmp_path):
+    """A run that is too slow, too large or raises is a row with its reason; the study completes and exits with 1."""
     (tmp_path / "greedy.py").write_text(
         "import time\n"
         "def move(run, record):\n"
@@ -350,6 +351,7 @@ def test_a_full_disk_is_one_error_and_the_study_goes_on_when_there_is_room(undis
 
 @pytest.mark.soak
 def test_a_scheduler_that_goes_away_is_one_error_and_the_study_goes_on(undisturbed, tmp_path):
+    """A study whose Dask scheduler is killed can be continued, and has the table of an undisturbed one."""
     pytest.importorskip("distributed")
     place = tmp_path / "scheduler.json"
     scheduler = subprocess.Popen(

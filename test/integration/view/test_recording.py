@@ -47,7 +47,7 @@ def write(path, study):
     writer.finish()
 
 
-class Reference:
+class LinkPoses:
     """Poses of links at a time, of the rows of a file; two plugins measure as many joints, and the first one counts."""
 
     def __init__(self, recording, urdf):
@@ -83,7 +83,7 @@ def test_each_link_is_where_the_file_has_it(repository, tmp_path):
     playback.plays = False
     node = MemoryMiddleware(bus, "view")
     scene = LiveScene(robot, node)
-    reference = Reference(recording, robot.description.text)
+    reference = LinkPoses(recording, robot.description.text)
     places = []
     with closing(PageServer(0)) as server:
         page = Page(server, robot.description, node, playback=playback)

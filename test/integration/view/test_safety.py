@@ -31,7 +31,7 @@ WHEEL = SPEED / 0.078
 """Of a wheel then [rad/s]."""
 
 
-class Driven:
+class DrivenPage:
     """CENTAURO in memory at the pace of the clock, its page, and a page in a process of its own that drives it."""
 
     def __init__(self):
@@ -93,7 +93,7 @@ def end(process):
 
 @pytest.fixture(scope="module")
 def driven():
-    with closing(Driven()) as made:
+    with closing(DrivenPage()) as made:
         yield made
 
 

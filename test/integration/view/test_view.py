@@ -16,6 +16,7 @@ TIME = 120.0
 
 @pytest.mark.slow
 def test_a_study_drives_and_is_tuned_on_the_page(repository):
+    """The command of the documentation shows a moving robot, and a parameter that one page sets changes on another."""
     begin = time.monotonic()
     (line,) = re.findall(
         r"^solfer view (--run \S+ --control)$", (repository / "docs/how-to/view.md").read_text(), re.MULTILINE

@@ -55,7 +55,7 @@ def insist(act: Callable[[], None], condition: Callable[[], object], what: str) 
                 raise
 
 
-class System:
+class XbotSystem:
     """A namespace, the processes in it, and the robot's joint states.
 
     Attributes:
@@ -196,9 +196,9 @@ class System:
 
 
 @contextlib.contextmanager
-def system() -> Iterator[System]:
+def system() -> Iterator[XbotSystem]:
     """Make a system, and clean it up."""
-    made = System()
+    made = XbotSystem()
     try:
         yield made
     finally:

@@ -127,7 +127,7 @@ class HardwareNodes(Nodes):
         return mocked(middleware)
 
 
-class Layer(Driven, BridgedWorld):
+class Figure5Layer(Driven, BridgedWorld):
     """As a layer does it, by default config/figures/figure_5.yaml; navigation and waving are outside of it."""
 
     def __init__(self, folder, file=CONFIG / "figures" / "figure_5.yaml", faults=None):

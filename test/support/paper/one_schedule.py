@@ -137,7 +137,7 @@ class _Scheduled:
         self.sent.append(np.concatenate(self._numbers))
 
 
-class InMemory(_Scheduled, World):
+class ScheduledNodes(_Scheduled, World):
     """As nodes, of which `full_control` has several plugins."""
 
     def _pause(self, paused):
@@ -156,7 +156,7 @@ class InMemory(_Scheduled, World):
         ]
 
 
-class InLayer(_Scheduled, BridgedWorld):
+class ScheduledLayer(_Scheduled, BridgedWorld):
     """As the layer of config/figures/figure_5.yaml under its executor, at the rate of the nodes."""
 
     def __init__(self, folder):

@@ -2,10 +2,10 @@
 
 import numpy as np
 from support.bullet import raw_bullet
-from support.table_1 import FILE, GRAVITY, System
+from support.table_1 import FILE, GRAVITY, Table1System
 
 
-class MemorySystem(System):
+class MemorySystem(Table1System):
     """All in one process, on a virtual clock.
 
     Args:

@@ -8,7 +8,7 @@ from solfer.components import Component, Port
 GOALS = np.array([[0.1, -0.2, 0.8], [0.7, 0.5, 0.0], [-0.7, 0.5, 0.0]])  # [m]
 
 
-class Follower(Listener):
+class OutsideListener(Listener):
     """Receives, in the RT layer, also what comes from outside."""
 
     def __init__(self, robot, tags=None, name=""):

@@ -1,4 +1,4 @@
-"""What several tests of body pipes share."""
+"""What tests of pipes that measure need of a plugin."""
 
 from solfer.components import Component
 

@@ -5,7 +5,7 @@ from solfer.components import Component
 MOTION, WATCHED = {"joints": ("torso_yaw", "j_arm1_4"), "positions": (0.4, -0.6)}, "arm1_7"
 
 
-class Witness(Component):
+class StateWitness(Component):
     """Records the measured State, and where a link is."""
 
     def init(self):

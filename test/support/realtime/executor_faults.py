@@ -2,7 +2,7 @@
 
 import pytest
 from support.integration.world import CONFIG
-from support.integration.xbot_system import REPOSITORY, System, until
+from support.integration.xbot_system import REPOSITORY, XbotSystem, until
 
 from solfer.plugins import PluginState
 from solfer.telemetry.statistics import RuntimeStatistics
@@ -21,7 +21,7 @@ executor: {{start: [joint_states], blend: 0.1, overruns: 1000000, schedule: {{lo
     return file
 
 
-def begin(robot: System, file) -> tuple:
+def begin(robot: XbotSystem, file) -> tuple:
     """Start the node, and wait until its plugin runs; returns its process and its statistics."""
     process = robot.start(REPOSITORY / "nodes" / "xbot", str(file), "--namespace", robot.name)
     until(lambda: robot.state() is PluginState.RUNNING, "a plugin that runs")

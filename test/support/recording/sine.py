@@ -131,7 +131,7 @@ class Slow(Follower):
         self.plugin.robot_time.advance = lambda now: 0.6 / self.plugin.rate
 
 
-class Kept(Follower):
+class EveryMessage(Follower):
     """The same with every message of the joints."""
 
     @staticmethod

@@ -182,7 +182,7 @@ def module(component, robot, controller, **tags):
     } | tags
 
 
-class SharedWorld(World):
+class Figure5World(World):
     """CENTAURO that hangs, and the components of Fig. 5: in a shared plugin, or each by itself on the same bus.
 
     Args:

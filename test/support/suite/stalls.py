@@ -41,7 +41,7 @@ class Stall(NamedTuple):
         return f"processor {self.processor} stood still for {self.duration:.2f} s ({self.steal:.2f} s of it stolen)"
 
 
-class Watcher:
+class StallRecorder:
     """Starts the process that records stalls, and ends it."""
 
     def __init__(self, folder: Path):

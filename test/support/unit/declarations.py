@@ -119,6 +119,11 @@ class CountingNode:
                 publish()
 
 
+def named(declared, name):
+    """Return the declaration of a topic, a service or an action that has a name."""
+    return next(each for each in declared if each.name == name)
+
+
 def counting_client(middleware, name="abacus/count"):
     """Make a client of the node's action."""
     return ActionClient(middleware, name, COUNT, CountGoal, CountFeedback, result=CountResult)

@@ -34,7 +34,7 @@ class StandInReader(Reader):
         return 0.0
 
 
-class Kept(Writer):
+class KeptWriter(Writer):
     """Keeps copies of what is written."""
 
     topic = "kept"

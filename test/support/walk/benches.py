@@ -219,7 +219,7 @@ def simulation(folder: Path) -> str:
     return digest.text()
 
 
-class Listening(MemoryMiddleware):
+class LimitKeeper(MemoryMiddleware):
     """Keeps the limits of what is received, which have no meaning in memory."""
 
     limits: list[tuple] = []
@@ -238,7 +238,7 @@ class Listening(MemoryMiddleware):
 def server(folder: Path) -> str:
     """Flood the lower level with commands, of a sender with a lease and of others."""
     bus, lower_level = Bus(), load_bundle(folder / "bundle.yaml").lower_level
-    node = Listening(bus, "cart")
+    node = LimitKeeper(bus, "cart")
     node.limits = []
     offered = LowerLevelServer(lower_level, node, Inbox(ration=lower_level.ration.requests))
     lower_level.start(np.zeros(9))

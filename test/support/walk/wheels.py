@@ -4,6 +4,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
+from support.unit.declarations import named
 from support.walk.changes import Change, each
 
 from solfer import Robot
@@ -50,7 +51,7 @@ def lifting(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
     component = made(folder, kind)
     component.model.update()
     component.update()
-    component.services()[0].handler(LiftContacts(("front_left_leg",)))
+    named(component.services(), "lift").handler(LiftContacts(("front_left_leg",)))
     return str(component._lifting.shift.goal)
 
 

@@ -31,7 +31,7 @@ class Place:
     point: Vector = field(default_factory=Vector)
 
 
-class Publishing(Component):
+class PlacePublisher(Component):
     """Declares a topic out."""
 
     def topics(self):
@@ -121,7 +121,7 @@ def test_a_declared_topic_leads_to_those_that_receive_it(tmp_path):
     changed["feedback"]["goal"] = {"space": "POINT", "quantity": "position"}
     listening = changed["robot"]["deaf"] | {"feedback": {"list": ["goal"]}}
     changed["robot"]["listening"] = listening
-    changed["modules"]["first"] |= {"class": f"{__name__}:Publishing", "robot": "deaf"}
+    changed["modules"]["first"] |= {"class": f"{__name__}:PlacePublisher", "robot": "deaf"}
     changed["modules"]["second"] |= {"class": f"{__name__}:Receiving", "robot": "listening"}
     file = tmp_path / "main.yaml"
     file.write_text(yaml.safe_dump({"mwoibn": changed}))

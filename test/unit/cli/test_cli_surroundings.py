@@ -79,6 +79,7 @@ def special(kind, folder):
 
 @pytest.mark.parametrize("kind", ["fifo", "device", "kernel", "folder", "socket", "large"])
 def test_what_is_no_file_is_one_error_at_once(tmp_path, monkeypatch, capsys, kind):
+    """No command waits for a FIFO or a device, or reads one to its end, and none has a traceback."""
     monkeypatch.chdir(tmp_path)  # sockets have short names
     path = special(kind, Path())
     urdf = str(Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf")

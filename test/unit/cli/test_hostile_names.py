@@ -30,6 +30,7 @@ NAMES = [
 @pytest.mark.parametrize("floating", [False, True])
 @pytest.mark.parametrize("name", NAMES)
 def test_files_of_a_robot_hold_any_name(tmp_path, name, floating):
+    """Names with quotes, markup or line ends are quoted in each file that `solfer new robot` writes."""
     link = quoteattr(name, {"\n": "&#10;"})
     urdf = tmp_path / ("a 'b\" & #c.urdf" if len(name) < 100 else "long.urdf")
     urdf.write_text(

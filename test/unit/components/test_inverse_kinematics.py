@@ -6,6 +6,7 @@ import logging
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.declarations import named
 
 from solfer import Robot
 from solfer.components.inverse_kinematics import InverseKinematics
@@ -336,6 +337,7 @@ def test_a_pose_is_reached_with_feedback(arm):
 
 
 def test_a_measurement_that_jumps_moves_no_hand_faster_than_its_reference(robot, tmp_path):
+    """A loop that is closed on measurements answers a jump with the speed of its `motion` at most."""
     file = tmp_path / "poses.yaml"
     file.write_text(
         POSES.replace("chain:", "closed_on: measurement\n  motion: {speed: 0.1, turn_speed: 0.2}\n  chain:")
@@ -422,7 +424,7 @@ def test_wrong_numbers_of_a_pipe_are_held(arm, caplog):
 
 
 def test_messages_of_other_frames_are_refused(arm):
-    topic = next(topic for topic in arm.topics() if topic.name == "pose/reference")
+    topic = named(arm.topics(), "pose/reference")
     start = arm.references.targets["pose"].task.point.value
     pose = Pose(Vector(*start[:3]), Turn(*start[3:]))
     header = type(topic.message().header)

@@ -1,71 +1,28 @@
 """The component `wheeled_motion` with wheels that are lifted."""
 
-import json
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.declarations import named
 from support.unit.golden import lower_body
+from support.unit.wheeled import LOWER, RATE, cycle, recorded, robot  # noqa: F401, fixtures
+from support.unit.wheeled import make as make_any  # noqa: F401
 
-from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
 from solfer.errors import ComponentError, UnknownName
-from solfer.interfaces.geometry import Vector
 from solfer.interfaces.support import LiftContacts
 from solfer.points import SupportVertex
 from solfer.tasks.task import updated_in_order
 
-RATE, LOWER = 200.0, 30  # [Hz], DoFs of the lower body and the base
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
 
 
 @pytest.fixture
-def recorded(repository):
-    return json.loads((repository / "test/data/original_wheels.json").read_text())
-
-
-@pytest.fixture
-def robot(repository, recorded):
-    folder = repository / "config/robots/centauro"
-    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
-    robot.state.position[:] = recorded["q0"]
-    robot.update()
-    return robot
-
-
-@pytest.fixture
-def make(repository, robot):
-    """Make the component of the shipped configuration with other tags, at its start."""
-
-    def make(**tags):
-        record = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
-        component = WheeledMotion(
-            robot, record.model_copy(update={"base": "center_of_mass", **tags}).placed_as(record), "wheels"
-        )
-        component.set_rate(RATE)
-        component.init()
-        return component
-
-    return make
-
-
-def cycle(component, count=1, velocity=None):
-    """Run cycles in which the robot does what is commanded; `cmd_vel` comes at 20 Hz."""
-    robot = component.model
-    for index in range(count):
-        if velocity is not None and index % 10 == 0:
-            x, y, turn = velocity
-            component.topics()[0].handler(Twist(Vector(x, y), Vector(0.0, 0.0, turn)))
-        robot.update()
-        component.update()
-        component.send()
-        robot.state.position[:LOWER], robot.state.velocity[:LOWER] = (
-            robot.command.position[:LOWER],
-            robot.command.velocity[:LOWER],
-        )
+def make(make_any):
+    """Make the component with the centre of mass as its base."""
+    return lambda **tags: make_any(**{"base": "center_of_mass"} | tags)
 
 
 def update(robot, point):
@@ -76,8 +33,8 @@ def update(robot, point):
 
 def ask(component, *contacts, lifted=True):
     """Call the service; return its answer, which may take a while."""
-    service = component.services()[0]
-    assert (service.name, service.interface) == ("lift", "solfer/LiftContacts")
+    service = named(component.services(), "lift")
+    assert service.interface == "solfer/LiftContacts"
     return service.handler(LiftContacts(contacts, lifted))
 
 

@@ -29,7 +29,7 @@ motions = arrays(float, 10, elements=st.floats(-0.08, 0.08))
 ways = arrays(float, 26, elements=st.floats(-1.0, 1.0)).filter(lambda way: np.linalg.norm(way) > 0.1)
 
 
-class Bench:
+class GuardedPlaces:
     """A guard of places that move freely in the plane: four vertices and the centre of mass, then three joints."""
 
     def __init__(self, shifts=0.0, center=(0.0, 0.0)):
@@ -66,7 +66,7 @@ def inside(way, edge):
 @given(places, motions, arrays(float, 2, elements=st.floats(-0.35, 0.35)), st.sampled_from([(), (0,), (3,)]))
 def test_velocities_leave_the_margin(shifts, motion, center, lifted):
     """Velocities are shortened to what uses up the margin in 0.25 s; rates are differences of the distances."""
-    bench, tiny = Bench(shifts, center), 1e-7
+    bench, tiny = GuardedPlaces(shifts, center), 1e-7
     bench.lifted[list(lifted)] = True
     bench.velocity[:10] = motion
     bench.update()
@@ -83,7 +83,7 @@ def test_velocities_leave_the_margin(shifts, motion, center, lifted):
 @pytest.mark.slow
 @given(places, motions)
 def test_no_commanded_motion_uses_up_the_margin(shifts, motion):
-    bench = Bench(shifts)
+    bench = GuardedPlaces(shifts)
     bench.rates.forward[:] = 1.0
     for _ in range(600):
         bench.velocity[:10] = np.concatenate((0.3 * motion[:8], 2.5 * motion[8:]))
@@ -98,7 +98,7 @@ def test_no_commanded_motion_uses_up_the_margin(shifts, motion):
 @given(st.sampled_from(LIMITS), st.integers(0, 3), st.floats(0.5, 2.0), st.sampled_from([-1.0, 1.0]), ways)
 def test_an_error_beyond_its_bound_is_named(limit, wheel, share, sign, forward):
     name, most, unit, row = limit
-    bench = Bench()
+    bench = GuardedPlaces()
     bench.rates.forward[:] = forward
     bench.rates.error[row + wheel] = sign * share * most
     is_held = bench.update()
@@ -111,7 +111,7 @@ forwards = st.just(0.0) | st.floats(1e-3, 0.1)
 
 @given(st.floats(0.0, 3.0), st.floats(0.0, 8.0), st.floats(0.0, 1.0), forwards, st.sampled_from([-1.0, 1.0]))
 def test_legs_that_are_nearly_straight_are_named(speed, turning, pace, forward, sign):
-    bench = Bench()
+    bench = GuardedPlaces()
     bench.rates.forward[0] = forward
     bench.velocity[10:] = 0.5 * speed, sign * speed, -sign * turning
     is_straight = speed > max(0.5, 25.0 * pace * forward, 0.25 * turning)
@@ -125,7 +125,7 @@ def test_other_ways_are_free(held, other):
     """What is held one way goes on along others, more than 60 degrees away, unless these are worse by a tenth."""
     cosine = held @ other / np.linalg.norm(held) / np.linalg.norm(other)
     for share, is_worse in ((1.05, False), (1.15, True)):
-        bench = Bench()
+        bench = GuardedPlaces()
         bench.rates.forward[:] = held
         bench.rates.error[18] = 0.5 * 1.2
         assert bench.update()
@@ -139,7 +139,7 @@ def test_other_ways_are_free(held, other):
 @given(ways, st.integers(1, 150))
 def test_a_motion_is_tried_again(forward, gone):
     """It is held for 1 s after its reason has gone, and as long as the reason is there."""
-    bench = Bench()
+    bench = GuardedPlaces()
     bench.rates.forward[:] = forward
     bench.rates.error[22] = 0.6
     assert all(bench.update() for _ in range(gone + 200))
@@ -154,7 +154,7 @@ def test_a_motion_is_tried_again(forward, gone):
 def test_joints_at_their_bounds_hold_what_lags(forward, away):
     """A motion is held where joints are at bounds and errors grow by more than 1 mm/s along what is desired."""
     forward[abs(forward) < 1e-3] = 0.0
-    bench = Bench()
+    bench = GuardedPlaces()
     bench.rates.forward[:18], bench.rates.away[:18] = forward, away
     lag = away @ forward / max(np.linalg.norm(forward), 1e-9)
     assert not bench.update(is_bound=False)

@@ -249,6 +249,7 @@ def test_the_jacobian_of_the_process_is_that_of_its_equations():
 
 
 def test_the_covariance_is_propagated_and_corrected_as_matrices_are():
+    """The kernel, which uses symmetry and considered states, agrees with full matrices."""
     random, size = np.random.default_rng(6), len(STATE)
     root = random.normal(size=(size, size))
     covariance = root @ root.T

@@ -30,7 +30,7 @@ of_wheels = arrays(float, 4, elements=angles)
 speeds = arrays(float, 4, elements=st.floats(0.01, 0.2))
 
 
-class Course:
+class PacedWheels:
     """References, and a pace of four wheels that point to where they aim."""
 
     def __init__(self):
@@ -53,7 +53,7 @@ class Course:
 @pytest.mark.slow
 @given(velocities, st.floats(-2.0, 2.0), of_vertices)
 def test_no_velocity_is_above_its_bound(velocity, turn, vertices):
-    course = Course()
+    course = PacedWheels()
     references = course.references
     references.velocity[:], references.angular[2], references.vertex_velocity[:] = velocity, turn, vertices
     pace, fastest = course.cycle(is_first=True), np.linalg.norm(vertices, axis=1).max()
@@ -65,7 +65,7 @@ def test_no_velocity_is_above_its_bound(velocity, turn, vertices):
 @pytest.mark.slow
 @given(velocities, velocities, of_vertices, angles, angles)
 def test_references_integrate_velocities_at_the_pace(velocity, turn, vertices, tilt, heading):
-    course = Course()
+    course = PacedWheels()
     references, base = course.references, Rotation.from_euler("ZX", (heading, 0.3 * tilt))
     references.start(np.ones(3), heading, base.as_quat())
     references.velocity[:], references.angular[:], references.vertex_velocity[:] = velocity, turn, vertices
@@ -84,7 +84,7 @@ def test_references_integrate_velocities_at_the_pace(velocity, turn, vertices, t
 @given(st.integers(0, 40), st.integers(1, 300), velocities)
 def test_a_held_motion_rests_and_goes_on(held, free, velocity):
     """The pace falls by 8 and rises by 1 a second, and references of a motion that rests stay where they are."""
-    course = Course()
+    course = PacedWheels()
     course.references.velocity[:] = velocity
     full = course.cycle(is_first=True)
     for _ in range(held):
@@ -103,7 +103,7 @@ def test_a_held_motion_rests_and_goes_on(held, free, velocity):
 @given(st.floats(0.0, 0.6), angles, st.floats(-1.0, 1.0))
 def test_references_wait_for_a_base_that_does_not_follow(distance, direction, turn):
     """They slow down from 0.1 m or 0.15 rad on, and rest at twice that; a base that sinks does not count."""
-    course = Course()
+    course = PacedWheels()
     course.references.velocity[:] = 0.2, 0.0, 0.0
     course.error[2] = math.sin(turn / 2.0)
     course.error[3:] = distance * math.cos(direction), distance * math.sin(direction), 0.5
@@ -119,7 +119,7 @@ def test_references_wait_for_a_base_that_does_not_follow(distance, direction, tu
 @pytest.mark.slow
 @given(speeds, of_wheels, angles)
 def test_no_vertex_leaves_its_way_faster(speeds, away, heading):
-    course = Course()
+    course = PacedWheels()
     course.point(speeds, away, heading)
     for _ in range(200):
         pace = course.cycle()
@@ -131,7 +131,7 @@ def test_no_vertex_leaves_its_way_faster(speeds, away, heading):
 @given(st.lists(st.tuples(speeds, of_wheels, st.integers(1, 30), st.booleans()), min_size=1, max_size=6))
 def test_accelerations_of_vertices_are_bounded(parts):
     """The fastest vertex rises by 2, starts by 3, and brakes by 4 times the acceleration, the pace within [0, 1]."""
-    course, before, share = Course(), 0.0, 1.0
+    course, before, share = PacedWheels(), 0.0, 1.0
     for speeds, away, count, is_held in parts:
         course.point(speeds, away)
         for index in range(count):
@@ -144,7 +144,7 @@ def test_accelerations_of_vertices_are_bounded(parts):
 
 
 def test_accelerations_are_reached():
-    course, paces = Course(), []
+    course, paces = PacedWheels(), []
     for away in (0.0,) * 100 + (math.pi / 2.0,) * 2 + (0.0,) * 2:
         course.point(0.1, away)
         paces.append(course.cycle())
@@ -156,7 +156,7 @@ def test_accelerations_are_reached():
 
 def test_a_largest_pace_counts_whatever_else_does():
     """It is reached within what vertices may brake, kept, and left as slowly as after any other stop."""
-    course = Course()
+    course = PacedWheels()
     course.point(0.1)
     paces = [course.cycle(most=most) for most in [1.0] * 400 + [0.3] * 400 + [0.0] * 400 + [1.0] * 400]
     assert paces[399] == 1.0 and paces[799] == 0.3 and paces[1199] == 0.0 and paces[1599] == 1.0
@@ -164,7 +164,7 @@ def test_a_largest_pace_counts_whatever_else_does():
 
 
 def test_a_pace_of_others_stays():
-    course = Course()
+    course = PacedWheels()
     course.references.pace, course.references.velocity[:] = 0.25, (1.0, 0.0, 0.0)
     course.pace.advance(False, False, True, 1.0, PERIOD)
     assert course.references.pace == 0.25

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import nnls
+from support.unit.declarations import named
 
 from solfer import Robot
 from solfer.components.support_shaping import SupportShaping
@@ -76,7 +77,7 @@ def cycle(component, count=1, support=None):
     robot = component.model
     for index in range(count):
         if support is not None and index % 10 == 0:
-            component.topics()[2].handler(WheelsSupport(velocity=support))
+            named(component.topics(), "wheels_support").handler(WheelsSupport(velocity=support))
         robot.update()
         component.update()
         component.send()
@@ -85,7 +86,8 @@ def cycle(component, count=1, support=None):
 
 
 def reserve(component, name):
-    message = next(message for message in iter(component.topics()[-1].collect, 0) if message is not None)
+    collect = named(component.topics(), "support_margins").collect
+    message = next(message for message in iter(collect, 0) if message is not None)
     return dict(zip(message.names, message.reserves, strict=True))[name]
 
 

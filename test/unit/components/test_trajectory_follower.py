@@ -34,7 +34,7 @@ RATE = 200.0  # [Hz]
 NECK = ("neck_yaw", "neck_pitch")
 
 
-class Scene:
+class FollowingClient:
     """The component in a loop, a robot that is where it is commanded, and a client."""
 
     def __init__(self):
@@ -84,7 +84,7 @@ class Scene:
 
 @pytest.fixture
 def scene():
-    return Scene()
+    return FollowingClient()
 
 
 def through(*points, names=NECK, stamp=0.0):

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from support.allocations import check_that_it_keeps_no_memory
 from support.estimation import part
+from support.unit.declarations import named
 
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
@@ -50,7 +51,7 @@ def drive(component, cycle, course):
         velocity = (0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2
         component.targets.receive(WheelsSupport(velocity=velocity))
     if cycle == 40 and course == "lifted":
-        component.services()[0].handler(LiftContacts(("rear_left_leg",), True))
+        named(component.services(), "lift").handler(LiftContacts(("rear_left_leg",), True))
     if course == "singular":
         references.velocity[2] = 0.3  # legs are stretched
     robot.update()
@@ -119,7 +120,8 @@ def test_a_cycle_of_driving_keeps_no_memory(make):
 def test_the_pace_is_published(make):
     """The share of the velocities of others is published every 0.1 s, and where it changes by 0.02."""
     component = make({"pace": True})
-    _, state, _, pace = component.topics()
+    state = named(component.topics(), "wheels_state")
+    pace = named(component.topics(), "pace")
     assert pace.collect().data == 1.0 and pace.collect() is None  # at the beginning, then where it changes
     messages = []
     for cycle in range(500):

@@ -1,72 +1,28 @@
 """The component `wheeled_motion`, without any transport: the original's motion, its mends, `cmd_vel`, mistakes."""
 
-import json
 import math
 import re
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.declarations import named
+from support.unit.wheeled import LOWER, RATE, cycle, make, move, recorded, robot  # noqa: F401, fixtures
 
-from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
-from solfer.config import load, read
+from solfer.config import read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
 from solfer.interfaces.geometry import Vector
 from solfer.interfaces.support import LEAD
 from solfer.interfaces.task_references import GetReference
 from solfer.numerics.solvers.damped_descent import DampedDescent
 
-RATE, PERIOD, LOWER = 200.0, 0.005, 30  # [Hz], [s], DoFs of the lower body and the base
+PERIOD = 1.0 / RATE  # [s]
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 TRACKING = 1e-6  # [rad]
-
-
-@pytest.fixture
-def recorded(repository):
-    return json.loads((repository / "test/data/original_wheels.json").read_text())
-
-
-@pytest.fixture
-def robot(repository, recorded):
-    folder = repository / "config/robots/centauro"
-    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
-    robot.state.position[:] = recorded["q0"]
-    robot.update()
-    return robot
-
-
-@pytest.fixture
-def make(repository, robot):
-    """Make the component of the shipped configuration with other tags, at its start."""
-
-    def make(**tags):
-        record = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
-        component = WheeledMotion(robot, record.model_copy(update=tags).placed_as(record), "wheels")
-        component.set_rate(RATE)
-        component.init()
-        return component
-
-    return make
-
-
-def cycle(component, count=1, velocity=None):
-    """Run cycles in which the robot does what is commanded; `cmd_vel` comes at 20 Hz."""
-    robot = component.model
-    for index in range(count):
-        if velocity is not None and index % 10 == 0:
-            x, y, turn = velocity
-            component.topics()[0].handler(Twist(Vector(x, y), Vector(0.0, 0.0, turn)))
-        robot.update()
-        component.update()
-        component.send()
-        robot.state.position[:LOWER], robot.state.velocity[:LOWER] = (
-            robot.command.position[:LOWER],
-            robot.command.velocity[:LOWER],
-        )
 
 
 def begin(component, motion):
@@ -123,7 +79,7 @@ def test_the_base_goes_where_it_is_desired(make, velocity):
     component = make()
     cycle(component, 400, velocity)
     references, robot = component.references, component.model
-    pose = component.stack.tasks[4].point.pose.value
+    pose = named(component.stack.tasks, "BASE").point.pose.value
     assert_allclose(pose[:2], references.position[:2], atol=2e-4)
     rows = component.stack.jacobian[:12]
     assert abs(rows @ robot.command.velocity).max() < 1e-5  # no wheel slips
@@ -313,7 +269,7 @@ def test_vertices_without_messages_are_reported(make, caplog):
 def test_a_velocity_that_is_not_finite_is_refused(make):
     component = make()
     with pytest.raises(NotFinite, match="a velocity of"):
-        component.topics()[0].handler(Twist(Vector(np.nan), Vector()))
+        move(component, np.nan, 0.0, 0.0)
     cycle(component, 10)
     assert_allclose(component.references.velocity, 0.0)
 
@@ -450,7 +406,7 @@ def test_a_position_that_jumps_is_named_and_ignored(make, caplog):
 
 def test_it_says_where_its_references_are(make):
     component = make()
-    _, get = component.services()
+    get = named(component.services(), "get_reference")
     references = component.references
     base = get.handler(GetReference("base")).values
     assert_allclose(base[:3], references.position)
@@ -462,7 +418,8 @@ def test_it_says_where_its_references_are(make):
 
 def test_vertices_by_the_originals_topic(make):
     component = make()
-    support, references = component.topics()[2], component.references
+    support = named(component.topics(), "wheels_support")
+    references = component.references
     start = references.vertices.copy()
     for _ in range(10):
         support.handler(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2))
@@ -477,7 +434,8 @@ def test_vertices_by_the_originals_topic(make):
 
 def test_the_base_by_the_originals_topic(make):
     component = make()
-    state, references = component.topics()[1], component.references
+    state = named(component.topics(), "wheels_state")
+    references = component.references
     references.heading, start = 0.0, references.position.copy()
     for _ in range(20):
         state.handler(WheelsState(x=0.05, z=-0.01, rz=0.2, cs=(0.02, -0.02, 0.02, -0.02)))
@@ -489,8 +447,8 @@ def test_the_base_by_the_originals_topic(make):
 
 def test_velocities_are_bounded(make):
     component = make()
-    component.topics()[0].handler(Twist(Vector(3.0, 4.0), Vector(0.0, 0.0, -7.0)))
-    component.topics()[2].handler(WheelsSupport(velocity=(1.0, 0.0, 0.0) * 4))
+    move(component, 3.0, 4.0, -7.0)
+    named(component.topics(), "wheels_support").handler(WheelsSupport(velocity=(1.0, 0.0, 0.0) * 4))
     for _ in range(100):
         component._take_over(0.0)
     assert_allclose(component.references.velocity, (0.09, 0.12, 0.0))  # 0.3 m/s2 for 0.5 s
@@ -504,19 +462,19 @@ def test_velocities_are_bounded(make):
 @pytest.mark.parametrize(
     ("topic", "message", "kind"),
     [
-        (1, WheelsState(x=np.inf), NotFinite),
-        (1, WheelsState(x=0.1, cs=(0.1, 0.1)), SizeMismatch),
-        (2, WheelsSupport(position=(0.1,) * 11), SizeMismatch),
-        (2, WheelsSupport(velocity=(np.nan,) * 12), NotFinite),
-        (2, WheelsSupport(velocity=(1e20,) * 12), NotFinite),
-        (2, WheelsSupport(position=(1e308,) * 12), NotFinite),
-        (0, Twist(Vector(1.7e308, 1.7e308), Vector()), ComponentError),
+        ("wheels_state", WheelsState(x=np.inf), NotFinite),
+        ("wheels_state", WheelsState(x=0.1, cs=(0.1, 0.1)), SizeMismatch),
+        ("wheels_support", WheelsSupport(position=(0.1,) * 11), SizeMismatch),
+        ("wheels_support", WheelsSupport(velocity=(np.nan,) * 12), NotFinite),
+        ("wheels_support", WheelsSupport(velocity=(1e20,) * 12), NotFinite),
+        ("wheels_support", WheelsSupport(position=(1e308,) * 12), NotFinite),
+        ("cmd_vel", Twist(Vector(1.7e308, 1.7e308), Vector()), ComponentError),
     ],
 )
 def test_messages_that_do_not_fit_change_nothing(make, topic, message, kind):
     component = make()
     with pytest.raises(kind):
-        component.topics()[topic].handler(message)
+        named(component.topics(), topic).handler(message)
     cycle(component, 5)
     assert not component.references.velocity.any() and not component.references.vertex_velocity.any()
 

@@ -207,6 +207,7 @@ def test_any_mistake_in_a_shipped_configuration(repository, tmp_path, capfd):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["urdf", "srdf"])
 def test_any_mistake_in_a_description_of_a_robot(repository, tmp_path, capfd, kind):
+    """All readers of URDF and SRDF answer any mutated file with an error of solfer, or accept it."""
     files = [file for file in shipped(repository, tmp_path) if file.name == f"centauro.{kind}"]
     robot_of_files = [f"--{each}={tmp_path}/robots/centauro/centauro.{each}" for each in ("urdf", "srdf")]
     place = tmp_path / "robots/centauro"

@@ -16,7 +16,7 @@ def folder(repository, monkeypatch):
 pytestmark = pytest.mark.usefixtures("folder")
 
 
-class Mover(Record):
+class MoverRecord(Record):
     """Tags of a component."""
 
     speed: float = Field(description="speed [rad/s]")
@@ -32,8 +32,8 @@ def test_the_modules_of_a_file_are_listed():
 
 def test_later_files_win_and_values_keep_places():
     configuration = load("main.yaml", "mover")
-    tags = configuration.tags(Mover)
-    assert tags == Mover(speed=1.0, depth=3, from_system=1, from_layer=2, from_secondary=3)
+    tags = configuration.tags(MoverRecord)
+    assert tags == MoverRecord(speed=1.0, depth=3, from_system=1, from_layer=2, from_secondary=3)
     assert configuration.rate == 200.0
     assert tags.where("speed") == "system.yaml:4:20: mwoibn.modules.mover.speed"
     assert tags.where("from_layer") == "layer.yaml:4:25: mwoibn.modules.mover.from_layer"

@@ -19,7 +19,7 @@ class Spring(Record):
     stages: int = Field(default=1, description="stages")
 
 
-class Arm(Record):
+class SpringArm(Record):
     """An arm with springs."""
 
     name: str = Field(description="name of the arm")
@@ -49,7 +49,7 @@ def write(tmp_path, monkeypatch):
 
 def test_a_record_holds_values_and_knows_their_places(write):
     file = write("robot:\n  arm:\n    name: left\n    gains: [1, 2e0]\n    springs:\n      elbow: {stiffness: 1e3}\n")
-    arm = read(file, Arm, ("robot", "arm"))
+    arm = read(file, SpringArm, ("robot", "arm"))
     assert (arm.name, arm.gains, arm.offset) == ("left", (1.0, 2.0), (0.0, 0.0, 0.0))
     assert arm.springs["elbow"].stiffness == 1000.0
     assert arm.springs["elbow"].where("stiffness") == "arm.yaml:6:26: robot.arm.springs.elbow.stiffness"
@@ -59,33 +59,33 @@ def test_a_record_holds_values_and_knows_their_places(write):
 
 
 def test_records_are_equal_by_value_not_by_place(write):
-    first = read(write("name: a\n"), Arm)
-    second = read(write("\n\nname: a\n"), Arm)
-    assert first == second == Arm(name="a")
-    assert first != read(write("name: b\n"), Arm)
+    first = read(write("name: a\n"), SpringArm)
+    second = read(write("\n\nname: a\n"), SpringArm)
+    assert first == second == SpringArm(name="a")
+    assert first != read(write("name: b\n"), SpringArm)
     assert hash(Spring(stiffness=1.0)) == hash(Spring(stiffness=1.0))
 
 
 def test_a_key_without_value_is_not_given(write):
-    arm = read(write("name: a\nactive:\nsprings:\n  elbow: {stiffness: 1, kind: }\n"), Arm)
+    arm = read(write("name: a\nactive:\nsprings:\n  elbow: {stiffness: 1, kind: }\n"), SpringArm)
     assert arm.active is True
     assert arm.springs["elbow"].kind == "SEA"
 
 
 def test_an_obsolete_key_is_reported(write, caplog):
     with caplog.at_level(logging.WARNING):
-        read(write("name: a\nold: 3\n"), Arm)
+        read(write("name: a\nold: 3\n"), SpringArm)
     assert "arm.yaml:2:1: old: has no effect: nothing uses it" in caplog.text
 
 
 def test_a_key_of_an_earlier_version_names_what_takes_its_place(write, caplog):
     with caplog.at_level(logging.WARNING):
-        arm = read(write("name: a\nis_active: false\n"), Arm)
+        arm = read(write("name: a\nis_active: false\n"), SpringArm)
     assert not arm.active
     assert "arm.yaml:2:1: is_active: the key 'is_active' is no more: `active: False` takes its place" in caplog.text
     for line, successor in (("reach: 2", "`offset` takes its place"), ("is_active: [1]", "it is `active`")):
         with pytest.raises(ConfigError, match=f"2:1: .* is no more: {successor}"):
-            read(write(f"name: a\n{line}\n"), Arm)
+            read(write(f"name: a\n{line}\n"), SpringArm)
 
 
 @pytest.mark.parametrize(
@@ -118,26 +118,26 @@ def test_a_key_of_an_earlier_version_names_what_takes_its_place(write, caplog):
 def test_errors_contain_place_expected_and_got(write, line, where, what, names):
     text = f"\n{line}\n" if line.startswith("name") else f"name: a\n{line}\n"
     with pytest.raises(ConfigError) as caught:
-        read(write(text), Arm)
+        read(write(text), SpringArm)
     assert (caught.value.where, caught.value.what, caught.value.names) == (f"arm.yaml:{where}", what, names)
 
 
 def test_an_unknown_key_names_the_nearest(write):
     with pytest.raises(UnknownName) as caught:
-        read(write("name: a\nsprings:\n  e: {stiffnes: 1, stiffness: 2}\n"), Arm)
+        read(write("name: a\nsprings:\n  e: {stiffnes: 1, stiffness: 2}\n"), SpringArm)
     assert caught.value.where == "arm.yaml:3:7: springs.e.stiffnes"
     assert caught.value.names[0] == "stiffness"
 
 
 def test_a_missing_key_is_explained(write):
     with pytest.raises(ConfigError) as caught:
-        read(write("active: true\n"), Arm)
+        read(write("active: true\n"), SpringArm)
     assert caught.value.expected == "name of the arm"
 
 
 def test_all_mistakes_are_reported_from_top_to_bottom(write):
     with pytest.raises(SolferErrors) as caught:
-        read(write("springs:\n  e: {stiffness: x, kind: y}\nnam: b\nactive: 3\n"), Arm)
+        read(write("springs:\n  e: {stiffness: x, kind: y}\nnam: b\nactive: 3\n"), SpringArm)
     places = [error.where.split(":")[1] for error in caught.value.errors]
     assert places == ["2", "2", "3", "4"]  # `nam` is a misspelt `name`, which is not missing besides
 
@@ -145,7 +145,7 @@ def test_all_mistakes_are_reported_from_top_to_bottom(write):
 def test_a_missing_file_names_its_neighbours(write):
     write("name: a\n")
     with pytest.raises(ConfigError) as caught:
-        read("arms.yaml", Arm)
+        read("arms.yaml", SpringArm)
     assert caught.value.what == "there is no file 'arms.yaml'"
     assert caught.value.names == ("arm.yaml",)
 
@@ -153,20 +153,20 @@ def test_a_missing_file_names_its_neighbours(write):
 @pytest.mark.parametrize(("path", "what"), [("no/arm.yaml", "nor a folder 'no'"), (".", "'.' is a folder"), ("\0", "")])
 def test_paths_that_are_no_files(write, path, what):
     with pytest.raises(ConfigError) as caught:
-        read(path, Arm)
+        read(path, SpringArm)
     assert what in caught.value.what
 
 
 def test_a_binary_file_is_placed(write, tmp_path):
     (tmp_path / "arm.yaml").write_bytes(b"name: a\nx: \xff\xfe\n")
     with pytest.raises(ConfigError) as caught:
-        read("arm.yaml", Arm)
+        read("arm.yaml", SpringArm)
     assert (caught.value.where, caught.value.what) == ("arm.yaml:2:4", "not a text in UTF-8")
 
 
 def test_a_missing_root_names_the_found_keys(write):
     with pytest.raises(ConfigError) as caught:
-        read(write("robto:\n  arm: {name: a}\n"), Arm, ("robot", "arm"))
+        read(write("robto:\n  arm: {name: a}\n"), SpringArm, ("robot", "arm"))
     assert caught.value.what == "there is no 'robot' here; robto found instead"
 
 

@@ -10,6 +10,7 @@ HANDS = {"left": np.array((0.5, 0.3, 0.1)), "right": np.array((0.5, -0.3, 0.1))}
 
 
 def test_hands_are_mirror_images_half_a_turn_apart():
+    """The hands wave where the demonstration says, as wide as it says, and never both on the same side."""
     bus = Bus()
     reader = MemoryMiddleware(bus, "hands").reader("hands/left/reference", "geometry_msgs/PointStamped")
     waving = Waving(MemoryMiddleware(bus, "demo"), "hands", HANDS)

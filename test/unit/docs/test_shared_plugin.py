@@ -22,7 +22,7 @@ from solfer_tools.cli.main import main
 FORCE = "geometry_msgs/Vector3Stamped"
 
 
-class Listening(Generator):
+class ListeningGenerator(Generator):
     """Receives what the page's component publishes."""
 
     def init_callbacks(self, component):
@@ -106,7 +106,7 @@ def test_its_component_publishes_in_the_same_cycle(page, tmp_path, monkeypatch):
     (tmp_path / "cart.urdf").write_text(URDF)
     changed["ros"]["source"] = {"urdf": {"file": str(tmp_path / "cart.urdf")}}
     changed["modules"]["first"] |= {"class": "pushing:Pushing", "robot": "deaf"}
-    changed["modules"]["second"] |= {"class": f"{__name__}:Listening", "robot": "deaf"}
+    changed["modules"]["second"] |= {"class": f"{__name__}:ListeningGenerator", "robot": "deaf"}
     changed["modules"]["shared"] = {"layer": "NRT", "plugins": ["any::first", "any::second", "any::first"]}
     file = tmp_path / "main.yaml"
     file.write_text(yaml.safe_dump({"mwoibn": changed}))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.unit.cart import advance, bend, claim, make, turn
 
-from solfer.errors import ClaimRefused, CommandRefused, UnknownName
+from solfer.errors import ClaimRefused, CommandRefused
 from solfer.lower_level.claims.claims import ClaimedJoints, Claims
 from solfer.transport.lower_level import claimant, node_of
 
@@ -85,25 +85,6 @@ def test_a_claim_is_granted_whole_or_not(lower_level):
     bend(lower_level, "/third", position=0.1)
     claim(lower_level, "/fourth", ("arm",), ("stiffness",), ("shoulder",))
     assert lower_level.claims.describe("arm") == "/third: position; /fourth: stiffness"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "text"),
-    [
-        (("", ("arm",)), CommandRefused, "without an owner"),
-        (("/a", ()), CommandRefused, "without controllers"),
-        (("/a", ("arms",)), UnknownName, "did you mean: arm"),
-        (("/a", ("arm",), ("positions",)), UnknownName, "did you mean: position"),
-        (("/a", ("wheel",), ("effort",)), CommandRefused, "does not accept 'effort'"),
-        (("/a", ("arm",), ("position", "effort")), CommandRefused, "2 modes for 1 controllers"),
-        (("/a", ("arm",), (), ("sholder",)), UnknownName, "did you mean: shoulder"),
-    ],
-)
-def test_a_wrong_claim_is_refused(lower_level, arguments, error, text):
-    with pytest.raises(error) as refusal:
-        claim(lower_level, *arguments)
-    assert text in str(refusal.value)
-    assert lower_level.claims.owners() == ()
 
 
 def test_a_release_frees_joints_and_refuses_late_commands(lower_level):

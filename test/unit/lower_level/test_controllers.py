@@ -83,6 +83,7 @@ def test_joints_are_mapped_by_name(springs):
         (JointMessage(("hip",), interfaces=("bias",), values=np.zeros((1, 1))), ["does not accept 'bias'", "position"]),
         (JointMessage(("hip",), damping=np.array([-1.0])), ["damping -1", "hip", "from 0"]),
         (JointMessage(("hip",)), ["no numbers"]),
+        (JointMessage((), position=np.zeros(0)), ["no numbers"]),
     ],
 )
 def test_a_wrong_command_is_refused_whole(springs, message, published):

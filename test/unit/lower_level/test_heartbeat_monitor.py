@@ -7,7 +7,7 @@ from solfer.errors import Suspended
 from solfer.lower_level.server.heartbeat_monitor import HeartbeatMonitor
 
 
-class Process:
+class BeatingProcess:
     """A process with a heartbeat each millisecond, and a cart that it commands."""
 
     period = 0.001
@@ -37,7 +37,7 @@ class Process:
 
 @pytest.fixture
 def process():
-    made = Process()
+    made = BeatingProcess()
     claim(made.cart, "/plugin", ("wheel", "arm"))
     turn(made.cart, "/plugin", 2.0)
     bend(made.cart, "/plugin", position=0.5)
@@ -91,7 +91,7 @@ def test_every_loss_is_counted_once(process):
 
 
 def test_before_the_first_beat_nothing_is_lost():
-    process = Process(beats=None)
+    process = BeatingProcess(beats=None)
     turn(process.cart, "/other", 2.0)
     process.run(100, beats=False)
     assert process.speed == 2.0

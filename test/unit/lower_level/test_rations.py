@@ -22,7 +22,7 @@ from solfer.transport.messages import JointMessage
 RATION = RationRecord(owners=4, others=2, requests=3, waiting=8)
 
 
-class Stage:
+class RationedCart:
     """A cart whose lower level is on a bus."""
 
     def __init__(self):
@@ -50,7 +50,7 @@ def speed(value, name="roll"):
 @pytest.mark.parametrize("owner", ["/owner", "/node#owner"])
 def test_a_flood_costs_no_owner_its_lease(owner):
     """Strangers flood the queue in every cycle: the owner's command still acts in the same cycle, within the ration."""
-    stage = Stage()
+    stage = RationedCart()
     claim(stage.lower_level, owner, ("wheel",))
     node, _, component = owner.partition("#")
     mine, strangers = stage.writer(node), [stage.writer(f"/stranger_{index}") for index in range(2 * SENDERS)]
@@ -82,7 +82,7 @@ def test_all_senders_have_their_turn():
 
 
 def test_requests_are_rationed_but_no_emergency_stop():
-    stage = Stage()
+    stage = RationedCart()
     replies = [stage.bus.call("lower_level/list_controllers") for _ in range(20)]
     stop = stage.bus.call("lower_level/emergency_stop")
     assert sum(reply.done() for reply in replies) == 20 - RATION.waiting
@@ -104,7 +104,7 @@ def test_sizes_follow_from_the_joints():
 
 @pytest.mark.slow
 def test_names_of_strangers_use_no_memory():
-    stage, numbers = Stage(), count()
+    stage, numbers = RationedCart(), count()
     for _ in range(2000):
         stage.bus.call("lower_level/release", owner=f"/unknown_{next(numbers)}")
         stage.writer(f"/stranger_{next(numbers)}").write(speed(1.0, "rol"))

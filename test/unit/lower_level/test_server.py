@@ -10,7 +10,7 @@ from solfer.transport.lower_level import ALL_OWNERS, REFUSALS_TOPIC
 from solfer.transport.messages import REFUSALS, JointMessage
 
 
-class Stage:
+class ServedCart:
     """A cart whose lower level is on a bus, a node that receives its refusals, and one that commands its wheel."""
 
     def __init__(self):
@@ -31,7 +31,7 @@ class Stage:
 
 
 def test_a_new_beginning_ends_all_claims_once():
-    stage = Stage()
+    stage = ServedCart()
     claim(stage.lower_level, "/driver", ("wheel",))
     assert stage.receive() == []
     stage.lower_level.start(np.zeros(8))
@@ -42,7 +42,7 @@ def test_a_new_beginning_ends_all_claims_once():
 
 
 def test_refusals_wait_for_their_turn():
-    stage, counts = Stage(), []
+    stage, counts = ServedCart(), []
     for wait in (0.1, 0.119, 0.121, 0.13, 0.142):  # [s] since the beginning
         stage.drive("rol")
         stage.bus.run_until(wait)
@@ -51,7 +51,7 @@ def test_refusals_wait_for_their_turn():
 
 
 def test_a_wrong_command_leaves_its_claim():
-    stage = Stage()
+    stage = ServedCart()
     claim(stage.lower_level, "/driver", ("wheel",))
     stage.drive("rol")
     assert stage.receive() == [(("/driver",), (False,))]

@@ -19,7 +19,7 @@ def wrapped(angle):
     return math.pi - (math.pi - angle) % math.tau
 
 
-class Scene:
+class TurningWheel:
     """The lower level of a robot with the wheel `roll`."""
 
     def __init__(self):
@@ -46,7 +46,7 @@ COUNTS = {"wraps": wrapped, "counts on": float, "counts on, far away": lambda an
 @pytest.mark.parametrize("desired", COUNTS.values(), ids=COUNTS)
 @pytest.mark.parametrize("measured", [wrapped, float], ids=["wraps", "counts on"])
 def test_torques_do_not_depend_on_the_count(measured, desired):
-    usual, other = Scene(), Scene()
+    usual, other = TurningWheel(), TurningWheel()
     for step in range(4000):
         angle = SPEED * PERIOD * step
         expected = usual.step(angle, angle + 0.1)
@@ -54,7 +54,7 @@ def test_torques_do_not_depend_on_the_count(measured, desired):
 
 
 def test_a_command_of_another_turn_is_no_way():
-    scene = Scene()
+    scene = TurningWheel()
     scene.step(0.0, 6.0 * math.tau + 0.1)
     assert scene.controller.position[0] == pytest.approx(0.1)
     name, distance = scene.controller.away(np.array([0]), {"position": np.array([math.tau - 0.1])})

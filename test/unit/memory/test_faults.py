@@ -203,6 +203,7 @@ def test_a_topic_that_nobody_uses_is_a_mistake(tmp_path):
 
 @pytest.mark.parametrize("profile", ["quiet", "busy", "bad"])
 def test_plugins_on_a_transport_with_faults_repeat_to_the_bit(tmp_path, profile):
+    """Faults are drawn by their seed alone, or runs with faults could not be compared."""
     changed = tree()
     changed["feedback"]["joints"]["history"] = 32
 

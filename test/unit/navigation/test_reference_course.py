@@ -169,6 +169,7 @@ def test_joints_follow_by_trajectories(bus, upper, play):
 
 @pytest.mark.slow
 def test_joints_of_a_killed_navigation_rest_at_its_last_message(bus, upper, play):
+    """Without the last message of an ordered end, joints stop within their limits instead of going on."""
     moving = Working(bus, "joint_states", JointStates(upper))
     joint = upper.dof("torso_yaw")
     navigation = play(joints={"sine": {"amplitude": {"torso_yaw": 0.3}, "period": 2.0}})

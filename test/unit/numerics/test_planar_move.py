@@ -9,6 +9,7 @@ from solfer.numerics.planar_move import PlanarMove
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_move_is_that_of_a_homogeneous_matrix(seed):
+    """Points, vectors, orientations and headings move as Pinocchio moves them."""
     draw = np.random.default_rng(seed)
     before, after, place, vector = draw.uniform(-5.0, 5.0, (4, 3))
     turn, heading = draw.uniform(-3.0, 3.0, 2)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from support.unit.body_feedback import DESCRIPTION, DESCRIPTION_DOFS, Q, V, make, truth
-from support.unit.endpoints import Kept
+from support.unit.endpoints import KeptWriter
 
 from solfer.config.records.conventions import ConventionRecord
 from solfer.model import Kinematics, State
@@ -24,7 +24,7 @@ CONVENTIONS = [
 
 def publish(message, **tags):
     """Return the message that a pipe sends for a link of a moving robot."""
-    state, writer = State(DESCRIPTION_DOFS), Kept()
+    state, writer = State(DESCRIPTION_DOFS), KeptWriter()
     state.position[:], state.velocity[:] = Q, V
     convention = ConventionRecord.model_validate(tags)
     pipe = BodyCommandPipe(
@@ -46,7 +46,7 @@ def test_odometry_holds_pose_and_twist_in_the_world():
 
 
 def test_odometry_carries_the_covariances_of_who_estimates_the_base():
-    state, writer = State(DESCRIPTION_DOFS), Kept()
+    state, writer = State(DESCRIPTION_DOFS), KeptWriter()
     known = state.add(POSE_COVARIANCE, 36), state.add(TWIST_COVARIANCE, 36)
     kinematics, names = Kinematics(DESCRIPTION), ("nav_msgs/Odometry", LINK)
     pipe = BodyCommandPipe(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.endpoints import Kept, StandInReader
+from support.unit.endpoints import KeptWriter, StandInReader
 
 from solfer.errors import SizeMismatch
 from solfer.model import BidirectionalMap, State
@@ -30,6 +30,7 @@ def calibration():
 
 
 def test_measurements_are_converted_to_the_model(mapping, calibration):
+    """Signs and offsets apply to position, signs alone to velocity and effort; the received message is unchanged."""
     reader = StandInReader(
         JointMessage(
             HARDWARE, np.array([7.0, 0.5, 9.0, -1.5]), np.array([1.0, 2.0, 9.0, 3.0]), np.array([-4.0, 5.0, 9.0, -6.0])
@@ -64,7 +65,7 @@ def test_names_of_the_model_are_refused(mapping, calibration):
 
 def test_commands_are_converted_to_the_hardware(mapping, calibration):
     """Hardware receives its own names, signs and offsets, while the gate checks the model's values."""
-    state, writer = State(DOFS), Kept()
+    state, writer = State(DOFS), KeptWriter()
     state.position[:], state.torque[:] = (9.0, -0.2, 1.0, 7.0), (9.0, -5.0, 6.0, -4.0)
     pipe = JointCommandPipe(
         "joints", writer, mapping, state, ("position", "effort"), receiver=JointReceiver(calibration)
@@ -84,7 +85,7 @@ def test_commands_are_converted_to_the_hardware(mapping, calibration):
 
 
 def test_changes_of_a_gate_are_sent(mapping, calibration):
-    writer = Kept()
+    writer = KeptWriter()
     pipe = JointCommandPipe(
         "joints", writer, mapping, State(DOFS), ("position", "effort"), receiver=JointReceiver(calibration)
     )
@@ -95,7 +96,7 @@ def test_changes_of_a_gate_are_sent(mapping, calibration):
 
 
 def test_gains_have_neither_sign_nor_zero(mapping, calibration):
-    state, writer = State(DOFS), Kept()
+    state, writer = State(DOFS), KeptWriter()
     for name, numbers in (("stiffness", (9.0, 300.0, 400.0, 500.0)), ("acceleration", (9.0, 1.0, 2.0, 3.0))):
         if name not in state:
             state.add(name)

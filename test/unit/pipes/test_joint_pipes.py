@@ -59,11 +59,6 @@ def test_unknown_dofs_are_refused(context, changes, error, match):
         factory.feedback(received(dofs=dofs(**changes)), context)
 
 
-def test_a_reference_needs_a_sink(context):
-    with pytest.raises(PipeError, match="controller 'pipe' has no sink"):
-        factory.controller(published(sink=None), context)
-
-
 @pytest.mark.parametrize("numbers, words", [(None, "nothing in 'velocity'"), (np.zeros(1), "1 numbers in 'velocity'")])
 def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
     interface = {"position": True, "velocity": True}
@@ -76,6 +71,7 @@ def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
 
 @pytest.mark.parametrize("is_reset", [False, True])
 def test_a_contradiction_is_logged_unless_the_robot_was_reset(is_reset, caplog):
+    """A leap of positions is logged after a delay, in which a reset that explains it may still arrive."""
     bus = Bus()
     context = PipeContext(make_robot(), MemoryMiddleware(bus, "cart"), {}, RATE)
     record = received(function="state", message="sensor_msgs::JointState", dofs=dofs(type="actuated"))

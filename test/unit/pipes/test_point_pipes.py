@@ -21,7 +21,7 @@ from solfer.transport.messages import PointsMessage, VectorMessage, WrenchMessag
 NAMES = ("left", "right", "rear")
 
 
-class Sender(Component):
+class OutputComponent(Component):
     """Has one output."""
 
     def __init__(self, robot, quantity, count=None):
@@ -55,7 +55,7 @@ def receiving(middleware, port="position", size=None, **tags):
 
 def publishing(middleware, port="position", size=None, **tags):
     """Make a component, and the pipe that publishes its output on the topic `goal`."""
-    component = Sender(make_robot(), port, size)
+    component = OutputComponent(make_robot(), port, size)
     record = {
         "name": "goal",
         "space": "POINT" if size is None else "POINTS",

@@ -47,7 +47,7 @@ def groups():
         yield
 
 
-class Scene:
+class DriverScene:
     """The plugin, its robot, and a client that counts angles in (-pi, pi]."""
 
     def __init__(self, folder, driver):
@@ -83,7 +83,7 @@ def trajectory(*rolls):
 def expected(tmp_path_factory, groups):
     """Return what the joint does on a driver that counts on, by the name of a motion."""
     return {
-        name: motion(Scene(tmp_path_factory.mktemp("counts_on"), "counts on"))
+        name: motion(DriverScene(tmp_path_factory.mktemp("counts_on"), "counts on"))
         for name, motion in (("goal", by_goal), ("topic", by_topic), ("stuck", by_a_stuck_joint))
     }
 
@@ -123,6 +123,6 @@ def by_a_stuck_joint(scene):
     "name, motion, end", [("goal", by_goal, 3.1), ("topic", by_topic, 3.5), ("stuck", by_a_stuck_joint, FIRST)]
 )
 def test_all_drivers_follow_in_the_same_way(tmp_path, expected, driver, name, motion, end):
-    rolls = motion(Scene(tmp_path, driver))
+    rolls = motion(DriverScene(tmp_path, driver))
     np.testing.assert_allclose(rolls, expected[name], atol=1e-9)
     assert rolls[-1] == pytest.approx(end, abs=0.02)

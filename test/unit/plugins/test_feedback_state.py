@@ -65,7 +65,7 @@ class Pipe:
         pass
 
 
-class Reading:
+class ReadFeedback:
     """A feedback that is read once a cycle."""
 
     def __init__(self, required, action):
@@ -129,7 +129,7 @@ EVENTS = {
 def reading_in(state, configuration="required"):
     """Return a reading whose feedback is in a state."""
     required, _, keeps = configuration.partition(", ")
-    reading = Reading(required == "required", keeps or "hold")
+    reading = ReadFeedback(required == "required", keeps or "hold")
     for event in EVENTS[state]:
         reading.happen(event)
     assert reading.feedback.state is state

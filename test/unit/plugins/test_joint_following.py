@@ -12,7 +12,7 @@ PERIOD = 0.005
 DOFS = ("x", "shoulder", "elbow", "roll")
 
 
-class Arm:
+class FollowedJoints:
     """Two joints with position controllers, a wheel with a velocity controller, and what watches them."""
 
     def __init__(self, measured=(True, True, True, True), stiffness=None):
@@ -36,7 +36,7 @@ class Arm:
 
 def test_joints_that_follow_are_no_fault():
     """Springs that give way, a swing for a moment, a wheel that lags behind, turns back, or coasts a little."""
-    arm = Arm()
+    arm = FollowedJoints()
 
     def moves(time):
         arm.place[:] = math.sin(3.0 * time), 0.2
@@ -49,7 +49,7 @@ def test_joints_that_follow_are_no_fault():
 
 @pytest.mark.parametrize("place", [0, 1])
 def test_a_joint_that_stays_away_is_named(place):
-    arm = Arm()
+    arm = FollowedJoints()
     arm.place[place] = -1.1
     fault, time = arm.run(1.0)
     assert time == pytest.approx(0.5, abs=0.011)
@@ -58,17 +58,17 @@ def test_a_joint_that_stays_away_is_named(place):
 
 @pytest.mark.parametrize(("desired", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (2.5, 0.4)])
 def test_a_wheel_that_is_jammed_or_dead_is_named(desired, measured):
-    arm = Arm()
+    arm = FollowedJoints()
     arm.speed[0], arm.state["velocity"][3] = desired, measured
     fault, time = arm.run(2.0)
     assert time < 0.5 and "joint 'roll' does not follow 'legs': it has turned by" in fault.what
 
 
 def test_what_is_not_measured_or_has_no_stiffness_is_not_watched():
-    unknown = Arm(measured=(True, True, False, False))
+    unknown = FollowedJoints(measured=(True, True, False, False))
     unknown.place[1], unknown.speed[0] = 2.0, 5.0
     assert unknown.run(2.0)[0] is None
-    carried = Arm(stiffness=(0.0, 100.0))
+    carried = FollowedJoints(stiffness=(0.0, 100.0))
     carried.place[0] = 2.0
     assert carried.run(2.0)[0] is None
     carried.place[1] = 2.0
@@ -76,7 +76,7 @@ def test_what_is_not_measured_or_has_no_stiffness_is_not_watched():
 
 
 def test_a_start_forgets():
-    arm = Arm()
+    arm = FollowedJoints()
     arm.speed[0] = 2.5
     for _ in range(10):
         assert arm.run(0.15) == (None, 0.15)
@@ -85,7 +85,7 @@ def test_a_start_forgets():
 
 @pytest.mark.parametrize("speed", [2.5, -10.0])
 def test_a_wheel_that_jams_while_it_turns_is_named_by_what_it_has_not_turned_since(speed):
-    arm = Arm()
+    arm = FollowedJoints()
     arm.speed[0] = arm.state["velocity"][3] = speed
     assert arm.run(5.0) == (None, 5.0)
     arm.state["velocity"][3] = 0.0

@@ -15,7 +15,7 @@ from solfer.plugins.outputs.start_blend import StartBlend
 SHORTEST = 0.5  # [s]
 
 
-class Sender:
+class CartOutputs:
     """Pipes of a cart to its lower level, and to others.
 
     Args:
@@ -74,7 +74,7 @@ class Sender:
 
 
 def test_a_start_without_a_gap_is_not_blended():
-    sender = Sender(("position", "velocity", "effort"))
+    sender = CartOutputs(("position", "velocity", "effort"))
     shoulder = sender.dof("shoulder")
     sender.robot.state.position[shoulder] = sender.robot.command.position[shoulder] = 0.7
     sender.outputs.start()
@@ -90,7 +90,7 @@ def test_a_start_without_a_gap_is_not_blended():
 
 
 def test_a_start_uses_a_fifth_of_the_speed():
-    sender = Sender()
+    sender = CartOutputs()
     sender.robot.state.position[:] = 0.2
     sender.robot.command.position[sender.dof("shoulder")] = 1.2  # 3 rad/s
     sender.robot.command.position[sender.dof("roll")] = -0.8  # 10 rad/s
@@ -108,7 +108,7 @@ def test_a_start_uses_a_fifth_of_the_speed():
 
 def test_a_joint_that_follows_its_command_starts_there():
     """One that springs hold below its command goes on from the command; one that is elsewhere starts where it is."""
-    sender = Sender()
+    sender = CartOutputs()
     shoulder, roll = sender.dof("shoulder"), sender.dof("roll")
     sender.robot.state.position[[shoulder, roll]] = sender.robot.command.position[[shoulder, roll]] = 0.5
     sender.outputs.start()
@@ -130,7 +130,7 @@ def test_a_joint_that_follows_its_command_starts_there():
 )
 def test_a_joint_that_was_moved_meanwhile(there, starts):
     """It hung 0.13 rad below its command when the plugin began to wait; further away it is another robot's."""
-    sender = Sender()
+    sender = CartOutputs()
     shoulder = sender.dof("shoulder")
     sender.robot.state.position[shoulder] = sender.robot.command.position[shoulder] = 0.5
     sender.outputs.start()
@@ -144,7 +144,7 @@ def test_a_joint_that_was_moved_meanwhile(there, starts):
 
 @pytest.mark.parametrize("joint, gap", [("shoulder", 1e-3), ("roll", -1e-3)])
 def test_a_short_way_takes_the_shortest_time(joint, gap):
-    sender = Sender()
+    sender = CartOutputs()
     sender.robot.command.position[sender.dof(joint)] = gap
     sender.outputs.start()
     sent = sender.cycles(SHORTEST + 0.1)["position"][:, sender.place(joint)]
@@ -153,7 +153,7 @@ def test_a_short_way_takes_the_shortest_time(joint, gap):
 
 
 def test_speeds_and_efforts_begin_at_zero():
-    sender = Sender(("velocity", "effort"))
+    sender = CartOutputs(("velocity", "effort"))
     roll = sender.dof("roll")
     sender.robot.command.velocity[roll], sender.robot.command.torque[roll] = 2.0, -8.0
     sender.outputs.start()
@@ -164,7 +164,7 @@ def test_speeds_and_efforts_begin_at_zero():
 
 
 def test_commanded_efforts_begin_with_measured_ones():
-    sender = Sender(("effort",), efforts=True)
+    sender = CartOutputs(("effort",), efforts=True)
     roll, shoulder = sender.dof("roll"), sender.dof("shoulder")
     sender.robot.state.torque[roll], sender.robot.state.torque[shoulder] = 4.0, 2.0
     sender.robot.command.torque[roll] = -8.0
@@ -175,7 +175,7 @@ def test_commanded_efforts_begin_with_measured_ones():
 
 
 def test_who_commands_no_efforts_sends_none():
-    sender = Sender(("position", "effort"), efforts=True)
+    sender = CartOutputs(("position", "effort"), efforts=True)
     sender.robot.state.torque[:] = 4.0
     sender.robot.command.position[sender.dof("roll")] = 0.1
     sender.outputs.start()
@@ -183,7 +183,7 @@ def test_who_commands_no_efforts_sends_none():
 
 
 def test_blended_commands_stay_between_measured_and_desired():
-    sender, random = Sender(), np.random.default_rng(3)
+    sender, random = CartOutputs(), np.random.default_rng(3)
     shoulder = sender.dof("shoulder")
     sender.robot.state.position[shoulder] = 0.3
     desired = []
@@ -199,7 +199,7 @@ def test_blended_commands_stay_between_measured_and_desired():
 
 
 def test_an_unmeasured_joint_is_not_blended():
-    sender = Sender(measured=["roll"])
+    sender = CartOutputs(measured=["roll"])
     sender.robot.state.position[sender.dof("roll")] = 0.5
     sender.robot.command.position[sender.dof("shoulder")] = 1.0
     sender.outputs.start()
@@ -209,7 +209,7 @@ def test_an_unmeasured_joint_is_not_blended():
 
 
 def test_a_joint_beyond_its_limit_begins_at_it():
-    sender = Sender()
+    sender = CartOutputs()
     sender.robot.state.position[sender.dof("shoulder")] = 2.03
     sender.robot.command.position[sender.dof("shoulder")] = 1.9
     sender.outputs.start()
@@ -219,7 +219,7 @@ def test_a_joint_beyond_its_limit_begins_at_it():
 
 @pytest.mark.parametrize("beyond, said", [(1e-9, False), (1e-3, True)])
 def test_rounding_at_a_limit_is_no_news(caplog, beyond, said):
-    sender = Sender()
+    sender = CartOutputs()
     limit = sender.robot.upper_limits.position[sender.dof("shoulder")]
     sender.robot.state.position[sender.dof("shoulder")] = limit
     sender.outputs.start()
@@ -231,7 +231,7 @@ def test_rounding_at_a_limit_is_no_news(caplog, beyond, said):
 
 
 def test_each_start_forgets_the_efforts_before_it():
-    sender = Sender(("position", "effort"), efforts=True)
+    sender = CartOutputs(("position", "effort"), efforts=True)
     effort, torque = sender.robot.command.torque, sender.robot.state.torque
     for commanded in (3.0, 0.0):
         effort[:], torque[:] = commanded, 5.0
@@ -241,7 +241,7 @@ def test_each_start_forgets_the_efforts_before_it():
 
 
 def test_each_start_begins_anew():
-    sender = Sender()
+    sender = CartOutputs()
     shoulder = sender.dof("shoulder")
     sender.robot.command.position[shoulder] = 0.4
     sender.outputs.start()
@@ -256,7 +256,7 @@ def test_each_start_begins_anew():
 
 def test_a_hold_repeats_the_last_command_without_velocity():
     """A failed component leaves NaN in its command: the hold must use the last one sent, half-way in its blend."""
-    sender = Sender(("position", "velocity", "effort"))
+    sender = CartOutputs(("position", "velocity", "effort"))
     sender.outputs.start()
     sender.outputs.hold(0.0)
     assert not sender.commands.drain() and not sender.published.drain()
@@ -292,7 +292,7 @@ def test_a_hold_publishes_points_as_they_are_now():
 
 
 def test_rest_sends_no_velocity_despite_a_filter():
-    sender = Sender(("position", "velocity"), filter={"frequency": 2.0})
+    sender = CartOutputs(("position", "velocity"), filter={"frequency": 2.0})
     sender.robot.command.velocity[:] = 1.5
     sender.outputs.start()
     sender.cycles(1.0)
@@ -302,8 +302,8 @@ def test_rest_sends_no_velocity_despite_a_filter():
 
 
 def test_an_idle_plugin_commands_nothing_but_counts():
-    sender = Sender(idle=True)
-    assert sender.outputs.commanding == () and len(Sender().outputs.commanding) == 1
+    sender = CartOutputs(idle=True)
+    assert sender.outputs.commanding == () and len(CartOutputs().outputs.commanding) == 1
     sender.robot.command.position[sender.dof("shoulder")] = 7.0
     sender.outputs.start()
     sender.outputs.collect()
@@ -311,7 +311,7 @@ def test_an_idle_plugin_commands_nothing_but_counts():
 
 
 def test_nothing_is_sent_if_a_value_is_nan():
-    sender = Sender()
+    sender = CartOutputs()
     sender.robot.command.position[sender.dof("shoulder")] = np.nan
     sender.outputs.start()
     with pytest.raises(NotFinite, match="shoulder"):

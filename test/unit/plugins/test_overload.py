@@ -1,5 +1,7 @@
 """A loop that is too slow for its robot: found within a second, and motions slow down for it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.unit.watch import PERIOD as CYCLE
@@ -14,18 +16,11 @@ from solfer.transport.plugin_state import PluginState
 PERIOD = 0.005
 
 
-class Measured:
-    """A feedback that measures the robot."""
-
-    measures = True
-    accepted = 0
-
-
-class Loop:
+class PacedLoop:
     """Cycles that come when a test says, and the paces that follow."""
 
     def __init__(self, **limits):
-        self.feedback = Measured()
+        self.feedback = SimpleNamespace(measures=True, accepted=0)
         self.overload = Overload("walker", [self.feedback], PERIOD, OverloadRecord(**limits))
 
     def run(self, duration, gaps=(PERIOD,), receives=True):
@@ -40,26 +35,26 @@ class Loop:
 
 
 def test_a_loop_in_time_goes_on_in_full():
-    loop = Loop()
+    loop = PacedLoop()
     assert set(loop.run(5.0)) == {1.0} and not loop.overload.reason
     assert set(loop.run(5.0, (PERIOD,) * 19 + (2 * PERIOD,))) == {1.0}  # a twentieth is left out
 
 
 def test_measurements_in_bunches_overload_nothing():
     """A slow simulation lets the robot's time pass in steps of several periods, with none in between."""
-    loop = Loop()
+    loop = PacedLoop()
     assert set(loop.run(5.0, (4 * PERIOD, 0.01 * PERIOD, 0.01 * PERIOD, 0.01 * PERIOD))) == {1.0}
     assert not loop.overload.reason and loop.overload.figures[0] < 0.02
 
 
 def test_what_components_bridge_does_not_slow_them_down():
-    loop = Loop()
+    loop = PacedLoop()
     assert set(loop.run(5.0, (PERIOD / 0.6,))) == {1.0} and "leaves out" in loop.overload.reason
 
 
 @pytest.mark.parametrize(("gap", "rests"), [(2.4, False), (3.0, True), (15.0, True), (40.0, True)])
 def test_periods_left_out_slow_down_and_stop(gap, rests):
-    loop = Loop()
+    loop = PacedLoop()
     loop.run(2.0)
     paces = loop.run(5.0, (gap * PERIOD,))
     assert f"walker is {loop.overload.reason}".startswith("walker is overloaded: it leaves out")
@@ -69,7 +64,7 @@ def test_periods_left_out_slow_down_and_stop(gap, rests):
 
 def test_what_rests_does_not_creep_on():
     """A loop about the limit, a little better and a little worse in turn, stays at rest until half of it is kept."""
-    loop = Loop()
+    loop = PacedLoop()
     loop.run(5.0, (3.2 * PERIOD,))
     assert set(loop.run(5.0, (*(2.3 * PERIOD,) * 40, *(3.2 * PERIOD,) * 40))) == {0.0}
     assert loop.run(5.0, (1.8 * PERIOD,))[-1] == 1.0
@@ -77,7 +72,7 @@ def test_what_rests_does_not_creep_on():
 
 @pytest.mark.parametrize("gap", [3.0, 15.0])
 def test_it_goes_on_within_two_seconds(gap):
-    loop = Loop()
+    loop = PacedLoop()
     loop.run(3.0, (gap * PERIOD,))
     paces = loop.run(2.0)
     assert np.argmax(np.array(paces) > 0.0) * PERIOD < 1.0 and paces[-1] > 0.6
@@ -86,7 +81,7 @@ def test_it_goes_on_within_two_seconds(gap):
 
 
 def test_an_old_measurement_slows_down_and_stops():
-    loop = Loop()
+    loop = PacedLoop()
     loop.run(1.0)
     assert set(loop.run(0.045, receives=False)) == {1.0}
     loop.run(0.3, receives=False)
@@ -96,14 +91,14 @@ def test_an_old_measurement_slows_down_and_stops():
 
 
 def test_limits_are_tags():
-    loop = Loop(left_out=0.4, age=0.5)
+    loop = PacedLoop(left_out=0.4, age=0.5)
     assert set(loop.run(3.0, (1.5 * PERIOD,))) == {1.0} and not loop.overload.reason
     loop.run(3.0, (2.4 * PERIOD,))
     assert loop.overload.reason and loop.overload.pace < 1.0
 
 
 def test_a_start_begins_in_full():
-    loop = Loop()
+    loop = PacedLoop()
     loop.run(3.0, (0.1,))
     loop.overload.restart()
     assert loop.overload.figures.tolist() == [0.0, 0.0, 1.0] and not loop.overload.reason

@@ -17,7 +17,7 @@ def fleet(tmp_path):
     return Fleet(tmp_path, changed, ("first",), together=False)
 
 
-class Loop:
+class ReportedLoop:
     """The loop of a plugin, cycle by cycle, and what is reported."""
 
     def __init__(self, fleet):
@@ -38,7 +38,7 @@ class Loop:
 
 
 def test_pipes_and_process_are_reported_beside_the_plugin(fleet):
-    reports = Loop(fleet).run(2.5)
+    reports = ReportedLoop(fleet).run(2.5)
     levels = {name: (report.level, report.summary) for name, report in reports.items()}
     assert levels == {
         "first": (Health.GOOD, "running"),
@@ -52,7 +52,7 @@ def test_pipes_and_process_are_reported_beside_the_plugin(fleet):
 
 def test_what_is_missing_is_named(fleet):
     fleet.plugins[0].feedbacks[0].required = True
-    loop = Loop(fleet)
+    loop = ReportedLoop(fleet)
     report = loop.run(1.5, moving=False)["first feedback joints"]
     assert report.level is Health.WARNING and report.summary == "nothing received on joint_states yet"
     loop.run(2.5)
@@ -65,7 +65,7 @@ def test_what_is_missing_is_named(fleet):
 
 
 def test_skipped_periods_are_a_warning_of_the_process(fleet):
-    loop = Loop(fleet)
+    loop = ReportedLoop(fleet)
     report = loop.run(2.5, skipped=1)["first process"]
     assert report.level is Health.WARNING and report.summary.endswith("periods skipped")
     assert loop.run(2.5)["first process"].level is Health.GOOD

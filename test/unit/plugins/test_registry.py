@@ -40,6 +40,9 @@ def test_a_configuration_of_any_name_is_a_plugin():
     ("target", "error", "text"),
     [
         ("solfer.components.joint_states", ComponentError, "is not the name of a class"),
+        (":Component", ComponentError, "is not the name of a class"),
+        ("solfer.components:", ComponentError, "is not the name of a class"),
+        ("solfer.components:No-Name", ComponentError, "is not the name of a class"),
         ("solfer.components.joint_stats:JointStates", ComponentError, "cannot be imported"),
         ("solfer.components.joint_states:JointState", UnknownName, "did you mean: JointStates"),
         ("solfer.errors:SolferError", ComponentError, "is not a component"),

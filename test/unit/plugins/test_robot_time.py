@@ -1,5 +1,7 @@
 """How much time passes for the robot: by the clock, or less in a simulation that is slower."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,13 +10,7 @@ from solfer.plugins.timing.robot_time import LATEST, RobotTime
 PERIOD = 0.005
 
 
-class Measured:
-    """A feedback that measures the robot."""
-
-    measures, stamp = True, 0.0
-
-
-class Bench:
+class StampedClock:
     """A plugin's clock, and stamps that arrive as a test says.
 
     Attributes:
@@ -22,7 +18,9 @@ class Bench:
     """
 
     def __init__(self, epoch=1.7e9):
-        self.feedback, self.time, self._epoch = Measured(), 0.0, epoch
+        self.feedback = SimpleNamespace(measures=True, stamp=0.0)
+        self.time = 0.0
+        self._epoch = epoch
         self.robot_time, self.passed, self.lost = RobotTime([object_without(), self.feedback], PERIOD), [], 0.0
         self.robot_time.restart(0.0)
 
@@ -48,7 +46,7 @@ def object_without():
 @pytest.mark.parametrize("late", [0.0, 0.015])
 def test_the_clock_counts_as_it_is_while_messages_come(late):
     """Jitter, losses and left-out cycles change nothing, to the bit."""
-    bench, random = Bench(), np.random.default_rng(2)
+    bench, random = StampedClock(), np.random.default_rng(2)
     for _ in range(2000):
         periods = int(random.choice((1, 1, 1, 2, 4)))
         stamp = bench.time + periods * PERIOD - random.uniform(0.0, late)
@@ -59,7 +57,7 @@ def test_the_clock_counts_as_it_is_while_messages_come(late):
 @pytest.mark.parametrize("factor", [0.1, 0.45, 0.9, 1.5])
 def test_time_follows_a_robot_that_is_slower_or_faster(factor):
     """As soon as it is seen, as much time passes as the stamps show, and none in between."""
-    bench, real = Bench(), 0.0
+    bench, real = StampedClock(), 0.0
     for k in range(4000):
         real += factor * PERIOD
         bench.cycle(real if k % 3 == 0 else None)
@@ -72,7 +70,7 @@ def test_time_follows_a_robot_that_is_slower_or_faster(factor):
 
 def test_a_robot_that_stood_still_for_a_moment_is_waited_for():
     """A pause of the transport: time stops within 0.1 s, what was left out follows, and then the clock counts again."""
-    bench = Bench()
+    bench = StampedClock()
     for k in range(100):
         bench.cycle(PERIOD * k)
     for _ in range(60):
@@ -87,7 +85,7 @@ def test_a_robot_that_stood_still_for_a_moment_is_waited_for():
 @pytest.mark.parametrize("stamps", ["none", "frozen", "set"])
 def test_stamps_that_mean_nothing_do_not_stop_it(stamps):
     """A driver without stamps, with one stamp for ever, and a clock that is set by an hour."""
-    bench = Bench(0.0 if stamps == "none" else 1.7e9)
+    bench = StampedClock(0.0 if stamps == "none" else 1.7e9)
     for k in range(400):
         bench.cycle({"none": 0.0, "frozen": 1.0, "set": PERIOD * k + 3600.0 * (k > 200)}[stamps])
     late = bench.passed[round(0.5 / PERIOD) + 1 :]

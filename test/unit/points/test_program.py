@@ -27,7 +27,7 @@ CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 LINKS = ("arm1_7", "arm2_7", "pelvis", "torso_2", "wheel_1")
 
 
-class Counted(LinearPoint):
+class CountedPoint(LinearPoint):
     """A compiled point that counts how often its instructions are made."""
 
     made = 0
@@ -60,7 +60,7 @@ def check(handler):
 
 def test_other_handlers_keep_their_programs(robot):
     """What one plugin changes costs another one nothing in its cycles."""
-    mine, theirs = Handler(Counted(link, robot) for link in LINKS), Handler([LinearPoint("pelvis", robot)])
+    mine, theirs = Handler(CountedPoint(link, robot) for link in LINKS), Handler([LinearPoint("pelvis", robot)])
     reference = theirs.add(Constant(3))
     for change in (
         lambda: theirs.add(LinearPoint("arm1_7", robot)),
@@ -105,17 +105,17 @@ def test_compiled_points_are_one_call(robot, monkeypatch):
 
 @pytest.mark.slow
 def test_a_program_grows_by_new_points_only(robot):
-    handler = Handler(Counted("pelvis", robot) for _ in range(1000))
+    handler = Handler(CountedPoint("pelvis", robot) for _ in range(1000))
     handler.update()
     for link in LINKS:
-        handler.add(Counted(link, robot))
+        handler.add(CountedPoint(link, robot))
         handler.update()
     assert made(handler) == [1] * (1000 + len(LINKS))
     check(handler)
 
 
 def test_a_removed_point_has_its_program_made_anew(robot):
-    handler = Handler(Counted(link, robot) for link in LINKS)
+    handler = Handler(CountedPoint(link, robot) for link in LINKS)
     handler.update()
     handler.remove(1)
     handler.update()
@@ -133,7 +133,7 @@ def test_points_are_added_between_updates(robot):
 
     handler = Handler()
     for index in range(30):
-        kind = Own if index % 7 == 3 else Counted
+        kind = Own if index % 7 == 3 else CountedPoint
         handler.add(kind(LINKS[index % len(LINKS)], robot))
         handler.update()
         check(handler)

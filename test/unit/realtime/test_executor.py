@@ -76,7 +76,7 @@ def test_a_cycle_that_was_kept_from_running_is_no_overrun(tmp_path, interrupted)
     executor.close()
 
 
-class Layer:
+class TwoPlugins:
     """An executor of two plugins that need no feedback, on a clock that a test sets, and one that records."""
 
     def __init__(self, folder, **rules):
@@ -108,7 +108,7 @@ class Layer:
 
 @pytest.fixture
 def layer(tmp_path):
-    made = Layer(tmp_path)
+    made = TwoPlugins(tmp_path)
     yield made
     made.executor.close()
 
@@ -226,7 +226,7 @@ def test_work_beside_is_done_ten_times_a_second(tmp_path):
 
 
 def test_grace_forgives_the_first_cycles(tmp_path):
-    layer = Layer(tmp_path, grace=4, overruns=2)
+    layer = TwoPlugins(tmp_path, grace=4, overruns=2)
     layer.start()
     for count in (0, 0, 0, 0, 1):
         layer.executor.cycle(LATE)

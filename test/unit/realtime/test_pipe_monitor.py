@@ -28,7 +28,7 @@ class Peers:
         return self._warnings[self.looks - 1]
 
 
-class Reports:
+class AllReports:
     """Keeps health reports."""
 
     def __init__(self):
@@ -51,7 +51,7 @@ def _look_often(monkeypatch):
 
 
 def test_each_new_warning_is_reported_once():
-    reports = Reports()
+    reports = AllReports()
     peers = {"one": Peers("no topic", "no topic", "no node", ""), "two": Peers("", ""), "three": Peers("late")}
     seen = PipeMonitor(peers, reports, ())
     until(lambda: all(each.done for each in peers.values()))
@@ -69,13 +69,13 @@ def test_each_new_warning_is_reported_once():
 def test_close_ends_a_monitor_that_still_looks(monkeypatch):
     monkeypatch.setattr(PipeMonitor, "PERIOD", WAIT)
     peers = Peers("missing", "missing")
-    seen = PipeMonitor({"one": peers}, Reports(), ())
+    seen = PipeMonitor({"one": peers}, AllReports(), ())
     seen.close()
     assert peers.looks == 0 and not seen._thread.is_alive()
 
 
 def test_pipes_are_reported_again_and_again_also_when_all_peers_are_found():
-    reports, figures = Reports(), iter(range(1000))
+    reports, figures = AllReports(), iter(range(1000))
 
     def pipes():
         yield "one feedback imu", HealthReport(Health.WARNING, "late", {"messages": next(figures)})

@@ -9,6 +9,7 @@ from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel
 
 
 def test_arrays_are_declared_with_names_and_units():
+    """Defaults of names, units and kind follow from the shape and the kind of what is added."""
     log = Logger("arm")
     log.section("log").add("error", np.zeros(2), ("x", "y"), ("m", "m/s"), "world")
     log.add("position", np.zeros(2), ("a", "b"), "rad", kind=JOINTS_KIND)

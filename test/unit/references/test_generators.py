@@ -106,6 +106,7 @@ def test_velocities_are_differences_of_positions(made, name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_evaluation_allocates_nothing(made, name):
+    """References are evaluated in the control cycle, which must not allocate."""
     quantity, content = CASES[name]
     reference = made(quantity, content)
     reference.start(START[quantity])

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from support.plugins.fleet import loaded
-from support.recording.sine import WRENCH, Kept, Pressed, Slow, recorded, tree
+from support.recording.sine import WRENCH, EveryMessage, Pressed, Slow, recorded, tree
 
 from solfer.recording.reader import read
 from solfer.recording.writer import save
@@ -41,7 +41,7 @@ def test_wrenches_of_contacts_are_recorded_and_replayed(tmp_path, capsys):
 
 
 def test_a_history_is_replayed_with_the_message_of_each_cycle(tmp_path, capsys):
-    file = recorded(tmp_path, "Averaging", 120, Kept)
+    file = recorded(tmp_path, "Averaging", 120, EveryMessage)
     assert main(["replay", str(file), "-n", "first"]) == 0, capsys.readouterr()
 
 

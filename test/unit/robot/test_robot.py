@@ -58,7 +58,7 @@ mwoibn:
 """
 
 
-class Outside:
+class NotedMiddleware:
     """A middleware with some parameters, topics and controllers, that notes the requested waits."""
 
     def __init__(self, parameters):
@@ -96,7 +96,7 @@ def parts(whole):
 
 @pytest.fixture
 def outside(whole, parts):
-    return Outside(
+    return NotedMiddleware(
         {
             "/urdf": whole.text,
             "/srdf": SRDF.read_text(),

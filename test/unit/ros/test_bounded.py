@@ -20,7 +20,7 @@ def packed(text):
     return MESSAGE_LENGTH.pack(len(body)) + body
 
 
-class Reading:
+class ReceivingThread:
     """Reads a connection as rospy's receiving thread does."""
 
     def __init__(self, bind):
@@ -51,7 +51,7 @@ class Reading:
 
 def test_a_large_message_is_thrown_away_unread():
     sizes = []
-    reading = Reading(lambda protocol: bound_messages(protocol, 100, sizes.append))
+    reading = ReceivingThread(lambda protocol: bound_messages(protocol, 100, sizes.append))
     reading.send(packed("first") + packed(5_000_000 * "x") + packed("second") + packed(3000 * "y") + packed("third"))
     got = [text for text in reading.all() if len(text) < 100]
     assert got == ["first", "second", "third"]
@@ -59,13 +59,14 @@ def test_a_large_message_is_thrown_away_unread():
 
 
 def test_a_large_request_is_answered_instead():
-    reading = Reading(lambda protocol: bound_requests(protocol, 100, Rate(1e6, 10), lambda size: f"no {size}", "busy"))
+    answer = "no {}".format
+    reading = ReceivingThread(lambda protocol: bound_requests(protocol, 100, Rate(1e6, 10), answer, "busy"))
     reading.send(packed(5_000_000 * "x") + packed("second"))
     assert reading.all() == ["no 5000004", "second"]
 
 
 def test_a_message_of_no_end_closes_its_connection():
-    reading = Reading(lambda protocol: bound_messages(protocol, 100, lambda size: None))
+    reading = ReceivingThread(lambda protocol: bound_messages(protocol, 100, lambda size: None))
     reading.send(MESSAGE_LENGTH.pack(2**32 - 1) + 1000 * b"x")
     recv_buff(reading.sock, reading.buffer, 4096)
     with pytest.raises(TransportTerminated, match="4294967295 bytes"):

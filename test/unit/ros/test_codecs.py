@@ -1,6 +1,5 @@
 """The ROS codecs against genpy's own serialisation, and against SciPy's rotations."""
 
-import io
 import itertools
 
 import geometry_msgs.msg as geometry_messages
@@ -11,6 +10,7 @@ import rospy
 import sensor_msgs.msg as sensor_messages
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
+from support.unit.genpy_messages import clock, packed  # noqa: F401, a fixture
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.table import codec
@@ -18,14 +18,6 @@ from solfer.msg import JointCommand
 from solfer.transport import BodyMessage, ImuMessage, JointMessage, WrenchMessage
 
 NAMES = ("hip", "knie_ä", "wheel")
-
-
-@pytest.fixture(autouse=True)
-def clock():
-    """ROS time without a node."""
-    rospy.rostime.set_rostime_initialized(True)
-    yield
-    rospy.rostime.set_rostime_initialized(False)
 
 
 @pytest.fixture
@@ -42,13 +34,6 @@ def sent(frame) -> bytes:
     """Return the bytes on the wire, without their length, which is checked."""
     assert int.from_bytes(frame.bytes[:4], "little") == len(frame.bytes) - 4
     return bytes(frame.bytes[4:])
-
-
-def packed(message) -> bytes:
-    """Serialise a message by genpy."""
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
 
 
 def joint_state(**fields) -> bytes:
@@ -230,6 +215,7 @@ def test_further_interfaces_are_what_genpy_reads_and_writes():
 
 @pytest.mark.parametrize("lacks", list(itertools.product((False, True), repeat=3)), ids=str)
 def test_an_imu_may_lack_each_quantity(lacks):
+    """A covariance of -1 marks what a driver does not measure: it is NaN here, and marked again when it is sent."""
     imu, message = codec("sensor_msgs/Imu"), sensor_messages.Imu()
     message.orientation.w, message.angular_velocity.z, message.linear_acceleration.x = 1.0, 0.3, 9.0
     names = ("orientation", "angular_velocity", "linear_acceleration")

@@ -1,6 +1,5 @@
 """Messages of declared topics against genpy's own serialisation, and the checksums of what is generated."""
 
-import io
 from dataclasses import dataclass
 
 import control_msgs.msg as control_messages
@@ -11,6 +10,7 @@ import sensor_msgs.msg as sensor_messages
 import trajectory_msgs.msg as trajectory_messages
 from actionlib_msgs.msg import GoalID
 from support.unit.declarations import Header, Twist, TwistStamped, Vector
+from support.unit.genpy_messages import clock, packed  # noqa: F401, a fixture
 
 from solfer.errors import ComponentError, MissingDependency, PipeError, UnknownName
 from solfer.middleware.ros.codecs.fields import require_fields
@@ -26,21 +26,6 @@ CHECKSUMS = {
     "JointTolerance": "f544fe9c16cf04547e135dd6063ff5be",
 }
 """Of the control_msgs of ROS Noetic."""
-
-
-@pytest.fixture(autouse=True)
-def clock():
-    """ROS time without a node."""
-    rospy.rostime.set_rostime_initialized(True)
-    yield
-    rospy.rostime.set_rostime_initialized(False)
-
-
-def packed(message) -> bytes:
-    """Serialise a message by genpy."""
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
 
 
 @pytest.mark.parametrize("name", CHECKSUMS)

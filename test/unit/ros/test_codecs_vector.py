@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rospy
 from numpy.testing import assert_array_equal
+from support.unit.genpy_messages import clock  # noqa: F401, a fixture
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.table import codec
@@ -20,14 +21,6 @@ BODIES = {
     "geometry_msgs/TwistStamped": "twist",
 }
 """Field that holds the numbers."""
-
-
-@pytest.fixture(autouse=True)
-def clock():
-    """ROS time without a node."""
-    rospy.rostime.set_rostime_initialized(True)
-    yield
-    rospy.rostime.set_rostime_initialized(False)
 
 
 def flat(element) -> list[float]:

@@ -18,7 +18,7 @@ PERIOD = 0.005  # [s]
 BOUND = 60.0  # [s]
 
 
-class Loop:
+class SleepingLoop:
     """The loop of a node that sleeps from cycle to cycle, in a thread of its own.
 
     Attributes:
@@ -53,7 +53,7 @@ def alive(monkeypatch):
 def loop(alive):
     """Run a loop on a StepClock."""
     clock = StepClock(alive.is_set)
-    made = Loop(clock, clock.sleep_until, alive.is_set)
+    made = SleepingLoop(clock, clock.sleep_until, alive.is_set)
     yield made, clock
     alive.clear()
     made.thread.join(BOUND)
@@ -140,7 +140,7 @@ class Proxy:
         """Nothing is open."""
 
 
-class Node:
+class FollowingNode:
     """A node `/arm` that follows: receives `joint_states`, publishes `desired` once in each cycle."""
 
     def __init__(self, alive):
@@ -153,7 +153,7 @@ class Node:
             lambda: [],
             alive.is_set,
         )
-        self.loop = Loop(clock, self._sleep_until, alive.is_set)
+        self.loop = SleepingLoop(clock, self._sleep_until, alive.is_set)
 
     def _sleep_until(self, deadline):
         if self.loop_has_begun:
@@ -174,7 +174,7 @@ def network(monkeypatch):
 @pytest.fixture
 def pair(alive, network):
     """Make a node that follows, and the server of a simulator that has published its joints and receives `desired`."""
-    node, received, published = Node(alive), {}, [1]
+    node, received, published = FollowingNode(alive), {}, [1]
     node.received["/simulator"] = 1
     made = LockstepServer(
         ["/arm"], "/simulator", [writer("/joint_states", published), reader("/desired", received)], alive.is_set

@@ -10,7 +10,7 @@ from solfer.middleware.ros.node.master_watch import MasterWatch
 WAIT = 30.0  # [s]
 
 
-class Master:
+class AnsweringMaster:
     """Answers with numbers, then for ever with the last of them; None: it does not answer.
 
     Args:
@@ -51,7 +51,7 @@ def watched(master):
     ids=["stays", "away", "later"],
 )
 def test_a_master_that_keeps_its_node_is_kept(numbers, known):
-    master = Master(*numbers, known=known)
+    master = AnsweringMaster(*numbers, known=known)
     watch = master.watch()
     assert master.all_asked.wait(WAIT)
     watch.close()
@@ -59,8 +59,8 @@ def test_a_master_that_keeps_its_node_is_kept(numbers, known):
 
 
 def test_a_master_without_answers_is_lost_in_time():
-    assert watched(Master(1, 1, None)) == "the ROS master does not answer (refused)"
-    patient = Master(1, None)
+    assert watched(AnsweringMaster(1, 1, None)) == "the ROS master does not answer (refused)"
+    patient = AnsweringMaster(1, None)
     watch = patient.watch(patience=2.0 * WAIT)
     assert patient.all_asked.wait(WAIT)
     watch.close()
@@ -68,13 +68,13 @@ def test_a_master_without_answers_is_lost_in_time():
 
 
 def test_another_master_is_a_loss():
-    assert watched(Master(1, 1, 2)).startswith("another ROS master answers at http")
+    assert watched(AnsweringMaster(1, 1, 2)).startswith("another ROS master answers at http")
 
 
 def test_a_master_that_forgets_its_node_is_lost():
-    assert "does not know this node any more" in watched(Master(1, known=(True, False)))
+    assert "does not know this node any more" in watched(AnsweringMaster(1, known=(True, False)))
 
 
 def test_without_a_master_there_is_nothing_to_watch():
     with pytest.raises(MiddlewareError, match="does not answer"):
-        Master(None).watch()
+        AnsweringMaster(None).watch()

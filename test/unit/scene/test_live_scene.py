@@ -161,6 +161,7 @@ def test_margins_shrink_the_polygon(robots):
 
 
 def test_references_are_seen_in_their_frames(robots):
+    """References relative to a link are shown in the world; those in frames that are not known are left out."""
     turn = Rotation.from_euler("z", 0.4).as_quat()
     own = Pose(Vector(0.5, 0.2, 0.1), Turn(*turn))
     message = TaskReferences(

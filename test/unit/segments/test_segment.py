@@ -55,14 +55,6 @@ def test_a_second_owner_is_refused_with_both_numbers(path):
     assert refusal.value.where == str(path)
 
 
-def test_a_second_owner_in_one_process_is_refused(path):
-    owner = Segment.create(path, KIND, LAYOUT, 8)
-    with pytest.raises(MiddlewareError, match="writes here already"):
-        Segment.create(path, KIND, LAYOUT, 8)
-    owner.close()
-    Segment.create(path, KIND, LAYOUT, 8)
-
-
 @pytest.mark.slow
 def test_what_a_killed_owner_left_is_made_anew(path):
     with process(hold, path) as child:
@@ -141,47 +133,12 @@ def test_a_truncated_segment_is_refused_and_replaced(path, left):
         assert Segment.create(path, KIND, LAYOUT, 8).generation == 2
 
 
-@pytest.mark.parametrize(
-    ("word", "value", "what"),
-    [
-        (Word.MAGIC, 1, "not shared memory"),
-        (Word.VERSION, 99, "version 99"),
-        (Word.SIZE, 5, "damaged"),
-        (Word.BOOT, 0, "before the machine was started"),
-        (Word.LAYOUT, 1, "damaged"),
-        (Word.TEXT, 3, "damaged"),
-    ],
-)
-def test_a_wrong_header_is_refused(path, word, value, what):
-    Segment.create(path, KIND, LAYOUT, 8)
-    corrupt(path, word, value)
-    with pytest.raises(MiddlewareError, match=what) as refusal:
-        Segment.attach(path, KIND, LAYOUT)
-    assert refusal.value.expected
-
-
-def test_another_kind_or_layout_is_refused(path):
-    Segment.create(path, KIND, LAYOUT, 8)
-    with pytest.raises(MiddlewareError, match="of the kind 'test'"):
-        Segment.attach(path, "other")
-    with pytest.raises(MiddlewareError, match="another layout") as refusal:
-        Segment.attach(path, KIND, b'{"names": ["b", "a"]}')
-    assert refusal.value.expected == '{"names": ["b", "a"]}'
-
-
 def test_a_segment_from_before_boot_is_replaced(path):
     first = Segment.create(path, KIND, LAYOUT, 8)
     first._lock.release()
     corrupt(path, Word.BOOT, 0)
     assert Segment.create(path, KIND, LAYOUT, 8).generation == 2
     Segment.attach(path, KIND, LAYOUT)
-
-
-def test_no_segment_is_an_error(path):
-    with pytest.raises(MiddlewareError, match="No such file"):
-        Segment.attach(path, KIND)
-    with pytest.raises(MiddlewareError, match="No such file"):
-        Segment.create(path / "below" / "nothing", KIND, LAYOUT, 8)
 
 
 def test_a_full_disk_is_an_error(path, monkeypatch):

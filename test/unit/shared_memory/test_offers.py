@@ -19,7 +19,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Scaled:
+class ScaleReply:
     success: bool = True
     message: str = ""
 
@@ -33,7 +33,7 @@ def test_living_nodes_offer_topics_and_services(space):
     with closing(XbotMiddleware(space, "arm")) as node:
         node.writer("pose", "geometry_msgs/PoseStamped")
         node.writer("wheel/command", "solfer/JointCommand")
-        node.serve("arm", (Service("scale", "test/Scale", Asked, Scaled, lambda _: Scaled()),), lambda *_: None)
+        node.serve("arm", (Service("scale", "test/Scale", Asked, ScaleReply, lambda _: ScaleReply()),), lambda *_: None)
         assert [(one.topic, one.message) for one in published_topics(space)] == [("pose", "geometry_msgs/PoseStamped")]
         assert published_topics(space, {"pose"}) == []
         (offer,) = [one for one in services(space) if one.interface == "test/Scale"]

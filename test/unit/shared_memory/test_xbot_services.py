@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from support.plugins.fleet import Fleet, still
 from support.recording.sine import tree
+from support.unit.refusals import check_refusal
 from support.unit.shared_world import Scale, Scaled, SharedWorld, ask, scale
 
 from solfer.components import Service
 from solfer.errors import ComponentError, MiddlewareError, ServiceUnavailable
 from solfer.interfaces.declaration import Accepted
 from solfer.middleware.shared_memory.rpc import channel as channel_module
+from solfer.middleware.shared_memory.rpc.channel import unpacked
 from solfer.plugins.generation.config_service import answer_at_once
 from solfer.transport import Inbox
 from solfer.transport.middleware import JOINT_NAMES, JointNames, NoFields
@@ -56,7 +58,10 @@ def test_a_service_that_comes_later_is_asked(world):
     assert answer.result(0).numbers == (1.0,)
 
 
-@pytest.mark.parametrize("fault", [ComponentError("no"), ValueError("bad")], ids=["solfer", "other"])
+LATE = ComponentError("it is late", where="here", expected="an earlier call")
+
+
+@pytest.mark.parametrize("fault", [LATE, ValueError("bad")], ids=["solfer", "other"])
 def test_the_caller_gets_an_error_of_the_handler(world, fault):
     def handler(_):
         raise fault
@@ -191,3 +196,32 @@ def test_parameters_of_a_plugin_travel(world, tmp_path):
     assert client.call("first/set_parameters", "solfer/SetParameters", setting, Accepted, 1e4).success
     reply = client.call("first/get_parameters", "solfer/GetParameters", GetParameters(("gain",)), ParametersReply, 1e4)
     assert (reply.values, reply.units) == (("1.5",), ("1/s",))
+
+
+def test_callers_learn_why_there_is_no_reply(world):
+    client = world.node("client")
+    words = "no node offers the service 'scaler/scale' (waited 0.25 s)"
+    check_refusal(lambda: ask(client, timeout=0.25), ServiceUnavailable, "", words)
+    world.node("server").serve("scaler", [Service("scale", "test/Scale", Scale, Scaled, scale)], Inbox().submit)
+    words = "does not answer (waited 0.25 s) (expected: an owner that runs"
+    check_refusal(lambda: ask(client, timeout=0.25), MiddlewareError, "", words)
+
+
+def test_callers_that_end_say_so(world, monkeypatch):
+    client = world.node("client")
+    answer = client.request("scaler/scale", "test/Scale", Scale((1.0,)), Scaled, 1.0)
+    client.close()
+    other = world.node("other")
+    monkeypatch.setattr(other, "running", lambda: False)
+    for call in (answer.result, lambda: ask(other)):
+        check_refusal(call, MiddlewareError, "", "the caller of service 'scaler/scale' ends")
+
+
+def test_what_cannot_travel_is_named(world):
+    world.serve(lambda _: Scaled(message=object()))
+    for call, words in (
+        (lambda: ask(world.node("client"), title=object()), "a object cannot be sent"),
+        (lambda: ask(world.node("other")), "its reply cannot be sent: a object cannot be sent"),
+        (lambda: unpacked(Scale, {"number": 1, "text": 2}), "Scale cannot be made of number, text"),
+    ):
+        check_refusal(call, MiddlewareError, "", words)

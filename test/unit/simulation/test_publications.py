@@ -20,7 +20,7 @@ class Written:
         self.kept.append((self.step, message.values[0]))
 
 
-class Counter(SingleSensor):
+class StepSensor(SingleSensor):
     """Measures the step of a writer, and how many samples it has taken."""
 
     name, message, topic = "counter", "solfer/Vector", "counter"
@@ -46,7 +46,7 @@ class Counter(SingleSensor):
 
 def publish(delay, steps=12):
     writer = Written()
-    publication = Publication(5, [writer], Counter(writer), delay)
+    publication = Publication(5, [writer], StepSensor(writer), delay)
     for writer.step in range(1, steps):
         publication.step(writer.step)
     return writer.kept
@@ -65,7 +65,7 @@ def test_delayed_messages_keep_what_was_measured(delay):
 def test_a_pause_takes_no_samples(delay):
     """Noise goes on as if there had been no pause, before the first sample, after others, and after a reset."""
     writer = Written()
-    sensor = Counter(writer)
+    sensor = StepSensor(writer)
     publication = Publication(5, [writer], sensor, delay)
     publication.repeat()
     assert writer.kept == [(0, 0.0)] and sensor.taken == 0

@@ -152,6 +152,7 @@ def test_a_folder_that_cannot_be_written_is_one_error(folder, tmp_path):
 
 
 def test_a_full_disk_is_one_error_and_leaves_the_plan_as_it_is(folder, monkeypatch):
+    """A study on a full disk can be continued once there is room."""
     before = (folder.path / STUDY).read_text()
 
     def full(*_, **__):

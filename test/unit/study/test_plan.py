@@ -146,6 +146,7 @@ def test_a_text_of_a_study_is_the_same_study_in_another_folder(tmp_path):
 
 
 def test_other_code_makes_other_ids(tmp_path, monkeypatch):
+    """Results of other code must not count as done: the hash has names and contents of all source files."""
     from solfer_tools.study import plan
 
     folder = tmp_path / "package"

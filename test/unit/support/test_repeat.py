@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support.suite.repeat import LEASE, MOST
-from support.suite.stalls import FILE, Watcher, stalls_since
+from support.suite.stalls import FILE, StallRecorder, stalls_since
 
 TESTS = Path(__file__).parents[2]
 
@@ -61,7 +61,7 @@ def test_only_a_stall_excuses_a_failure(tmp_path, stall, failed):
 def test_a_stall_is_recorded(tmp_path, monkeypatch):
     """A watcher that is stopped for longer than a lease takes that for a stall of the machine."""
     monkeypatch.setenv(FILE, "")
-    watcher = Watcher(tmp_path)
+    watcher = StallRecorder(tmp_path)
     time.sleep(0.3)
     begin = time.monotonic()
     watcher._process.send_signal(signal.SIGSTOP)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.refusals import place_of
 
 from solfer import Robot
 from solfer.config import read
@@ -211,9 +212,8 @@ def test_mistakes_are_reported_at_their_place(build, tmp_path, before, after, pl
     text = HANDS.replace(before, after)
     with pytest.raises(SolferError, match=f"(?s){message}") as error:
         build(text)
-    start = text.index(place)
-    line, column = text.count("\n", 0, start) + 1, start - text.rfind("\n", 0, start)
-    assert str(error.value).startswith(f"{tmp_path}/stack.yaml:{line}:{column}: stack")
+    begin = place_of(text, place, tmp_path / "stack.yaml")
+    assert str(error.value).startswith(f"{begin}: stack")
 
 
 def test_all_mistakes_are_reported_together(build):

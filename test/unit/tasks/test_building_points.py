@@ -137,29 +137,22 @@ def test_a_look_begins_straight_ahead(robot, build, axis):
 
 
 REFUSED = {
-    "point: position, link: floor": "'floor', which is not fixed to a link, has no position of its own"
-    "|a link, or `point: pose` with `rows`",
-    "point: orientation, link: rim": "'rim', which is not fixed to a link, has no orientation of its own"
-    "|a link, or `point: pose` with `rows`",
-    "point: pose, link: hand, offset: [1, 2, 3]": "'hand', which is not fixed to a link, has no offset of its own"
-    "|a link, or `point: pose` with `rows`",
-    "point: pose, link: elbow": "the component's point 'elbow' is LinearPoint of 'arm1_4', vector (3 numbers)|a pose",
-    "point: steering, link: arm1_7": "unknown wheel among the robot's contacts 'arm1_7'"
-    "|one of wheel_1, wheel_2, wheel_3, wheel_4",
-    "point: look_at, link: tool, target: arm2_7, axis: [1, 0, 0], reference: [1, 0, 0]": "a task on 'look_at' has no "
-    "reference|a target",
-    "point: rolling, link: wheel_1, gain: 2": "a gain of a task on 'rolling', whose error says nothing"
-    "|a velocity instead",
-    "point: center_of_mass, dofs: [x], without: [x]": "no DoF is left|at least one DoF that moves the task",
-    "point: position, link: arm1_7, reference: gaol": "unknown point of the component 'gaol'|",
+    "point: position, link: floor": "'floor', which is not fixed to a link, has no position of its own",
+    "point: orientation, link: rim": "'rim', which is not fixed to a link, has no orientation of its own",
+    "point: pose, link: hand, offset: [1, 2, 3]": "'hand', which is not fixed to a link, has no offset of its own",
+    "point: pose, link: elbow": "the component's point 'elbow' is LinearPoint of 'arm1_4'",
+    "point: steering, link: arm1_7": "unknown wheel among the robot's contacts 'arm1_7'",
+    "point: look_at, link: tool, target: arm2_7, axis: [1, 0, 0], reference: [1, 0, 0]": "'look_at' has no reference",
+    "point: rolling, link: wheel_1, gain: 2": "a gain of a task on 'rolling', whose error says nothing",
+    "point: center_of_mass, dofs: [x], without: [x]": "no DoF is left",
+    "point: position, link: arm1_7, reference: gaol": "unknown point of the component 'gaol'",
 }
 
 
-@pytest.mark.parametrize(("task", "text"), REFUSED.items(), ids=REFUSED)
-def test_what_is_no_point_is_refused(build, task, text):
-    with pytest.raises(SolferError) as error:
+@pytest.mark.parametrize(("task", "words"), REFUSED.items(), ids=REFUSED)
+def test_what_is_no_point_is_refused(build, task, words):
+    with pytest.raises(SolferError, match=words):
         build(task)
-    assert f"{error.value.what}|{error.value.expected}" == text
 
 
 @pytest.mark.parametrize(

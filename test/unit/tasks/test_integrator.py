@@ -9,9 +9,8 @@ from support.allocations import check_that_it_keeps_no_memory
 from support.needs import pybullet_robot
 
 from solfer import Robot
-from solfer.errors import SizeMismatch, TaskError
 from solfer.numerics.bounds.velocity import VelocityBounds
-from solfer.tasks import ReferenceIntegrator, joint_bounds
+from solfer.tasks import ReferenceIntegrator
 
 PERIOD = 0.01  # [s]
 
@@ -133,29 +132,6 @@ def test_a_lead_of_infinity_is_none(arm):
     integrator.start()
     integrator.update(np.full(7, 0.5))
     assert_allclose(arm.command.position, 0.5 * PERIOD)
-
-
-@pytest.mark.parametrize(
-    ("tags", "error", "text"),
-    [
-        ({"period": 0.0}, TaskError, "a period of 0 s"),
-        ({"period": np.nan}, TaskError, "a period of nan s"),
-        ({"lead": 0.0}, TaskError, "a lead of 0.0"),
-        ({"lead": np.nan}, TaskError, "a lead of nan"),
-        ({"lead": "near"}, TaskError, "a lead of 'near'"),
-        ({"lead": np.ones(6)}, SizeMismatch, r"a lead of shape \(6,\) for 7 DoFs"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(arm, tags, error, text):
-    with pytest.raises(error, match=text) as caught:
-        ReferenceIntegrator(arm, **({"period": PERIOD} | tags))
-    assert "reference integrator of 'lbr_iiwa'" in str(caught.value)
-
-
-def test_bounds_of_another_robot_are_refused(arm, repository):
-    other = Robot.load(repository / "config/robots/centauro/centauro.urdf")
-    with pytest.raises(SizeMismatch, match=r"bounds of shape \(48,\) for 7 DoFs"):
-        ReferenceIntegrator(arm, PERIOD, joint_bounds(other, PERIOD))
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.refusals import place_of
 
 from solfer import Robot
 from solfer.config import read
@@ -138,6 +139,5 @@ def test_mistakes_are_reported_at_their_place(build, tmp_path, before, after, pl
     text = TAGS.replace(before, after, 1)
     with pytest.raises(SolferError, match=f"(?s){message}") as error:
         build(text)
-    start = text.index(place)
-    line, column = text.count("\n", 0, start) + 1, start - text.rfind("\n", 0, start)
-    assert str(error.value).startswith(f"{tmp_path}/hands.yaml:{line}:{column}: hands")
+    begin = place_of(text, place, tmp_path / "hands.yaml")
+    assert str(error.value).startswith(f"{begin}: hands")

@@ -12,7 +12,6 @@ from support.unit.optimality import imbalance
 from support.unit.stacks import CENTAURO, Rows, at_random, largest_change, repeating, stack_of
 
 from solfer import Robot
-from solfer.errors import NotFinite, SizeMismatch, TaskError, UnknownName
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.solvers.qp import QpSolver, QpStatus
 from solfer.points import LinearPoint
@@ -290,52 +289,9 @@ def test_a_nan_task_is_a_failure(arm):
     assert_allclose(velocity, Hierarchy([first]).update(), atol=1e-6)
 
 
-def test_what_does_not_fit_is_refused(arm, robot):
+def test_a_policy_may_be_a_member(arm):
     task = Task("joints", Rows(arm, np.eye(7)))
-    with pytest.raises(UnknownName, match="unknown policy 'hald'\n  did you mean: hold"):
-        QpHierarchy([task], policy="hald")
-    with pytest.raises(SizeMismatch, match=r"bounds of shape \(48,\) for 7 DoFs"):
-        QpHierarchy([task], joint_bounds(robot, PERIOD))
-    with pytest.raises(SizeMismatch, match=r"positions of shape \(3,\) for 7 DoFs"):
-        QpHierarchy([task], position=np.zeros(3))
-    with pytest.raises(SizeMismatch, match="constraint 'wide': a matrix of 8 columns for 7 DoFs"):
-        QpHierarchy([task], constraints=[Constraint("wide", np.ones((1, 8)), 0.0, 1.0)])
-    with pytest.raises(TaskError, match="has constraints, got VelocityBounds"):
-        QpHierarchy([task], constraints=[VelocityBounds(("a",), [0.0], [1.0], [1.0], 1.0)])
     assert QpHierarchy([task], policy=Policy.STOP).policy is Policy("stop")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "text"),
-    [
-        (
-            (np.ones((2, 7)), 0.0, (1.0, -1.0)),
-            TaskError,
-            "constraint 'c': row 1 has the lower bound 0 above the upper one",
-        ),
-        ((np.ones((2, 7)), (0.0,), 1.0), SizeMismatch, r"constraint 'c': bounds of shape \(1,\)"),
-        ((np.ones(7), 0.0, 1.0), SizeMismatch, r"a matrix of shape \(7,\)"),
-        ((np.full((1, 7), np.nan), 0.0, 1.0), NotFinite, "constraint 'c'"),
-        ((np.ones((1, 7)), np.nan, 1.0), NotFinite, "constraint 'c'"),
-        ((np.ones((1, 7)), 0.0, 1.0, 0.0), TaskError, "constraint 'c': a weight of 0"),
-        (("wall", 0.0, 1.0), TaskError, "constraint 'c': a matrix of 'wall'"),
-        ((np.ones((1, 7)), 0.0, 1.0, -1.0), TaskError, "constraint 'c': a weight of -1"),
-    ],
-)
-def test_constraints_that_contradict_themselves_are_refused(arguments, error, text):
-    with pytest.raises(error, match=text):
-        Constraint("c", *arguments)
-
-
-def test_torque_limits_that_make_no_sense_are_refused(arm):
-    with pytest.raises(TaskError, match="joint 'lbr_iiwa_joint_1': a torque limit of 0"):
-        TorqueLimits(arm.dynamics, PERIOD, np.zeros(7))
-    with pytest.raises(TaskError, match="a period of 0 s"):
-        TorqueLimits(arm.dynamics, 0.0)
-    with pytest.raises(SizeMismatch, match=r"shape \(2,\) for 7 DoFs"):
-        TorqueLimits(arm.dynamics, PERIOD, (1.0, 2.0))
-    with pytest.raises(TaskError, match="no DoF of .* has a torque limit"):
-        TorqueLimits(arm.dynamics, PERIOD, np.full(7, np.inf))
 
 
 @pytest.mark.slow

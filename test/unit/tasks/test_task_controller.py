@@ -163,8 +163,6 @@ def test_what_cannot_be_is_refused_and_changes_nothing(robot, tasks):
         with pytest.raises(TaskError, match=text):
             change()
         assert controller.levels == ((tasks["com"],),)
-    with pytest.raises(TaskError, match="a period of -1 s"):
-        TaskController(robot, -1.0)
 
 
 def test_stacks_that_have_gone_are_given_back(robot, tasks):

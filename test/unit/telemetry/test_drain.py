@@ -22,7 +22,7 @@ from solfer.telemetry.rows import EVENT_COUNT, EVENT_WIDTH
 WAIT = 60.0  # [s]
 
 
-class Loop:
+class RecordedLoop:
     """What a loop records."""
 
     def __init__(self):
@@ -45,7 +45,7 @@ class Loop:
 
 @pytest.fixture
 def loop():
-    return Loop()
+    return RecordedLoop()
 
 
 def rows(drain):
@@ -144,7 +144,7 @@ def test_a_missing_recording_is_an_error(tmp_path):
 
 def work(folder, ready):
     """Record until the process is killed."""
-    loop = Loop()
+    loop = RecordedLoop()
     recorder = Recorder(folder, loop.sources, 1000.0)
     loop.record(recorder, 1, 101)
     recorder.event(Event(0.1, "arm", "run"))
@@ -169,7 +169,7 @@ def test_a_killed_process_leaves_its_last_seconds(tmp_path):
 
 def follow(folder, path, ready):
     """Record and write a file, a chunk after the other, until the process is killed."""
-    loop = Loop()
+    loop = RecordedLoop()
     recorder = Recorder(folder, loop.sources, 1000.0)
     drain = RecordDrain(folder)
     drain.into(RecordingWriter(path, {"robot.urdf": b"<robot/>"}))

@@ -17,6 +17,7 @@ from solfer.telemetry.rows import RECORDING
 
 
 def test_memory_of_ended_node_becomes_a_file(tmp_path, monkeypatch):
+    """A recording in shared memory outlives its node only where a folder is named, and is complete."""
     numbers, log = np.zeros(2), Logger("arm")
     log.add("error", numbers, ("x", "y"), "m")
     folder = tmp_path / "memory"

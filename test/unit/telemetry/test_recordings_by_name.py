@@ -105,6 +105,7 @@ def test_a_file_needs_a_folder(tmp_path):
 
 
 def test_a_file_recorder_waits_for_its_process(monkeypatch, tmp_path, caplog):
+    """The end of the loop waits for the recording, but not for ever, and logs that it gave up."""
     monkeypatch.setattr(
         recordings.FileRecorder, "PROGRAM", "import sys, time; time.sleep(60 * (sys.argv[-2] == 'slow')); sys.exit(3)"
     )

@@ -17,7 +17,7 @@ def test_states_of_goals_are_those_of_actionlib():
     }
 
 
-class Scene:
+class CountingScene:
     """A node with an action, and a client."""
 
     def __init__(self, wire):
@@ -45,7 +45,7 @@ class Scene:
 @pytest.fixture(params=[MemoryWire, XbotWire], ids=["memory", "shared_memory"])
 def scene(request):
     wire = request.param()
-    yield Scene(wire)
+    yield CountingScene(wire)
     wire.close()
 
 

@@ -8,7 +8,7 @@ RATE = 100.0
 PERIOD = 1.0 / RATE
 
 
-class Clock:
+class OversleepingClock:
     """Sleeps until a deadline, and so much longer as a test says."""
 
     def __init__(self, time=0.0):
@@ -34,20 +34,20 @@ def run(clock, cycles, costs=(), catch_up=0.0):
 
 
 def test_deadlines_are_absolute():
-    loop, begins = run(Clock(3.0), 1000, {index: 0.3 * PERIOD for index in range(0, 1000, 3)})
+    loop, begins = run(OversleepingClock(3.0), 1000, {index: 0.3 * PERIOD for index in range(0, 1000, 3)})
     assert [begin for begin, _, _ in begins] == pytest.approx([3.0 + PERIOD * index for index in range(1000)], abs=1e-9)
     assert loop.skipped == 0
 
 
 def test_a_long_cycle_leaves_out_whole_periods():
-    loop, begins = run(Clock(), 5, {1: 2.5 * PERIOD})
+    loop, begins = run(OversleepingClock(), 5, {1: 2.5 * PERIOD})
     assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, 3.5, 4, 5]
     assert [skipped for _, _, skipped in begins] == [0, 0, 1, 0, 0] and loop.skipped == 1
     assert begins[2][1] == pytest.approx(1.5 * PERIOD)
 
 
 def test_a_late_wake_up_leaves_out_whole_periods():
-    clock = Clock()
+    clock = OversleepingClock()
     clock.oversleeps[round(2 * PERIOD, 6)] = 3.2 * PERIOD
     _, begins = run(clock, 4)
     assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, 5.2, 6]
@@ -55,19 +55,19 @@ def test_a_late_wake_up_leaves_out_whole_periods():
 
 
 def test_a_lag_is_made_up_where_that_is_requested():
-    loop, begins = run(Clock(), 8, {1: 4.5 * PERIOD}, catch_up=5 * PERIOD)
+    loop, begins = run(OversleepingClock(), 8, {1: 4.5 * PERIOD}, catch_up=5 * PERIOD)
     assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, 5.5, 5.5, 5.5, 5.5, 6, 7]
     assert loop.skipped == 0
 
 
 def test_only_what_exceeds_the_lag_is_left_out():
-    loop, begins = run(Clock(), 8, {1: 9.5 * PERIOD}, catch_up=5 * PERIOD)
+    loop, begins = run(OversleepingClock(), 8, {1: 9.5 * PERIOD}, catch_up=5 * PERIOD)
     assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, *[10.5] * 5, 11]
     assert loop.skipped == 4
 
 
 def test_a_restart_is_due_at_once():
-    clock = Clock()
+    clock = OversleepingClock()
     loop, _ = run(clock, 2)
     clock.time = 7.77
     loop.restart()

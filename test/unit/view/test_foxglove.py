@@ -108,6 +108,7 @@ def test_parameters_are_read_and_not_changed_without_control(repository):
 
 
 def test_parameters_change_with_control_while_no_page_commands(repository):
+    """Foxglove may set parameters until a page takes control, and not against it."""
     with served(repository, True) as (bench, client):
         client.send(op="subscribeParameterUpdates", parameterNames=["hands.gain"])
         client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.5}], id="set")

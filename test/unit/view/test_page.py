@@ -148,6 +148,7 @@ def test_the_pad_drives_while_it_is_pressed(bench):
 
 @pytest.mark.parametrize("way", ["silent", "closed", "half closed", "presses on", "without its life"])
 def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
+    """Whatever way a page ends, base and hand get a last command at rest within 0.7 s, and control is free again."""
     bench.run(30)
     command(bench)
     client = bench.clients[0]
@@ -195,6 +196,7 @@ def test_a_page_that_reloads_commands_no_more(bench):
 
 
 def test_a_reference_is_dragged_in_the_frame_of_its_task(bench):
+    """Only the page in control drags; the reference is sent relative to the torso until the drag ends."""
     client, other = bench.clients
     dragged = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4))
     client.send(dragged)
@@ -257,6 +259,7 @@ def test_a_page_without_control_changes_nothing_of_others(bench):
 
 
 def test_numbers_of_a_page_stay_in_the_range_of_their_slider(bench):
+    """A page is not trusted: numbers beyond the slider are clipped, others and impossible poses are ignored."""
     bench.run(30)
     command(bench)
     client = bench.clients[0]

@@ -28,7 +28,7 @@ class Force:
     vector: Vector = field(default_factory=Vector)
 
 
-class Publishing(Component):
+class ForcePublisher(Component):
     """Declares topics of its own."""
 
     def topics(self):
@@ -262,7 +262,7 @@ def test_topics_with_a_slash_keep_their_names(folder):
 
 
 def test_declared_topics_follow_the_name(folder):
-    changed = shared_tree(folder, "first", "first", first={"class": f"{__name__}:Publishing"})
+    changed = shared_tree(folder, "first", "first", first={"class": f"{__name__}:ForcePublisher"})
     file = written(folder, changed)
     assert check_file(file).errors == ()
     loaded, bus = load_shared(file), Bus()

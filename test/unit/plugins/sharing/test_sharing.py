@@ -32,6 +32,7 @@ def seen(folder, changed, together, names=NAMES, cycles=60):
 
 @pytest.mark.parametrize("estimator", [False, True])
 def test_each_sees_what_it_sees_alone(tmp_path, estimator):
+    """Plugins that share computations receive and command the same numbers to the bit, and compute less."""
     changed = tree()
     changed["modules"]["third"] |= {"class": "support.plugins.fleet:Balance", "dynamics": True}
     if estimator:
