@@ -20,7 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
 from form import Figures, parser_of
-from support.shared.figure_5 import ORDER, SharedWorld, module, write  # noqa: E402
+from support.shared.figure_5 import ORDER, Figure5World, module, write  # noqa: E402
 
 from solfer.plugins.timing.cycle_timing import STAGES  # noqa: E402
 
@@ -57,7 +57,7 @@ class Stopwatch:
         return measured
 
 
-def computed(world: SharedWorld) -> dict[str, int]:
+def computed(world: Figure5World) -> dict[str, int]:
     """Count what all Robots have computed."""
     robots = {id(plugin.robot.kinematics): plugin.robot for plugin in world.plugins.values()}
     counts = [robot.computations() for robot in robots.values()]
@@ -76,7 +76,7 @@ class Way:
         own: Times of the cycle of the component that only reads, where it is there.
     """
 
-    def __init__(self, name: str, world: SharedWorld, shared: bool):
+    def __init__(self, name: str, world: Figure5World, shared: bool):
         self._name, self._world = name, world
         world.run(1.0)
         self._watches = [Stopwatch()] if shared else [Stopwatch() for _ in ORDER]
@@ -127,7 +127,7 @@ def main() -> None:
         for name, shared, more in kinds:
             listed = [f"{member}::{member}" for member in (*ORDER, *more)]
             file = write(Path(folder), shared={"plugins": listed}, **{READER: reads})
-            ways.append(Way(name, SharedWorld(file, shared, time.monotonic_ns), shared))
+            ways.append(Way(name, Figure5World(file, shared, time.monotonic_ns), shared))
     gc.collect()
     gc.disable()
     turns = np.array([[way.run() for way in ways] for _ in range(round(seconds / TURN))])

@@ -97,12 +97,14 @@ class Saying(logging.Handler):
 @contextmanager
 def logged(handler: logging.Handler) -> Iterator[None]:
     """Let a handler receive what is logged meanwhile."""
-    logger = logging.getLogger("solfer")
-    logger.addHandler(handler)
+    loggers = [logging.getLogger(package) for package in ("solfer", "solfer_tools")]
+    for logger in loggers:
+        logger.addHandler(handler)
     try:
         yield
     finally:
-        logger.removeHandler(handler)
+        for logger in loggers:
+            logger.removeHandler(handler)
 
 
 class DrivenRobot:

@@ -74,17 +74,18 @@ class MemoryBlock:
             loop does not touch, and what is left out is 0.
 
     Attributes:
+        arrays: The arrays by their names.
         record: The numbers, which may be changed, and the addresses of the arrays, shape ().
         address: What a compiled loop gets.
     """
 
     def __init__(self, layout: BlockLayout, **fields: Any):
-        self._arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
+        self.arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
         self.record = np.zeros((), layout.record)
         for name, value in fields.items():
-            if name not in self._arrays:
+            if name not in self.arrays:
                 self.record[name] = 0 if value is None else value
-        for name, array in self._arrays.items():
+        for name, array in self.arrays.items():
             base = np.dtype(layout.fields[name][0])
             shape = layout.shape(name, fields)
             assert array.dtype == base and array.shape == shape and array.flags.c_contiguous, (name, base, shape)

@@ -132,13 +132,13 @@ def numbers_of(component):
             law, record = component._steering.law, component.tasks.numbers.record
             yield from (
                 component.tasks.gain,
-                [float(law[key]) for key in ("across", *TUNED)],
+                [float(law[key][0]) for key in ("across", *TUNED)],
                 component.targets._limits,
             )
             yield [float(record[key]) for key in record.dtype.names if record.dtype[key].kind == "f"]
             yield [*component.drive._speeds, *component.drive._limits, component._lifting.margin]
-            yield [float(component._guard._memory.record["required_margin"]), component._guard.polygon.required_margin]
-            yield [float(component._pace._memory.record[key]) for key in ("base_speed", "vertex_speed", "acceleration")]
+            yield [float(component._guard._block.record["required_margin"]), component._guard.polygon.required_margin]
+            yield [float(component._pace._block.record[key]) for key in ("base_speed", "vertex_speed", "acceleration")]
             if isinstance(component, SupportShaping):
                 governor = component.shaping.governor
                 yield from (

@@ -18,6 +18,7 @@ from solfer.config import Record
 from solfer.config.loading.configuration import Configuration
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.middleware.memory.bus import Bus, Topic
+from solfer.numerics.blocks import MemoryBlock
 from solfer.plugins.timing.cycle_timing import CycleTiming
 from solfer.points.point import Layout
 from solfer.points.program import Instruction, Program
@@ -49,7 +50,7 @@ ADDRESSES = ("numba", "llvmlite", "pinocchio", "concurrent", "threading", "pybul
 PLACE = re.compile(r"[^ ]*\.yaml(:\d+)+(: [\w.]+)?")
 """Places in files, which move with every change; they are for errors."""
 
-UNSTEADY = ("_version", "client", "_client", "_program", "_live", "_collect")
+UNSTEADY = ("_version", "client", "_client", "_program", "_live", "_collect", "_address", "address")
 """Attributes that count what happened in this process before, or have addresses of what is elsewhere."""
 
 
@@ -110,6 +111,9 @@ class Digest:
             return [value.func, value.args, value.keywords]
         if isinstance(value, types.MethodType):
             return [value.__func__.__qualname__, value.__self__]
+        if isinstance(value, MemoryBlock):  # its record has addresses, too
+            numbers = [name for name in value.record.dtype.names if name not in value.arrays]
+            return [[float(value.record[name]) for name in numbers], value.arrays]
         if isinstance(value, types.FunctionType):
             cells = [cell.cell_contents for cell in value.__closure__ or () if _full(cell)]
             return [value.__qualname__, cells, value.__defaults__]

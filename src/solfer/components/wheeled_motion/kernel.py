@@ -86,7 +86,8 @@ WHEELS = BlockLayout(
     camber=(float, "count"),
     caster=(float, "count"),
     # joints: those that steer, where they are, where they are commanded, and the ends of their ranges
-    turning_dofs=(int, "count"),
+    turning_count=int,
+    turning_dofs=(int, "turning_count"),
     measured=(float, "dofs"),
     position=(float, "dofs"),
     velocity=(float, "dofs"),

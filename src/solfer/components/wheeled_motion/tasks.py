@@ -116,6 +116,7 @@ class DrivingTasks:
             place=wheels.place,
             camber=points[TASK_POINTS[CAMBER]].value,
             caster=points[TASK_POINTS[CASTER]].value,
+            turning_count=len(wheels.steering),
             turning_dofs=wheels.steering,
             measured=self._robot.state.position,
             position=joints.position,

@@ -166,11 +166,15 @@ class OneLine(logging.Handler):
 
 
 def connect_logs() -> None:
-    """Send solfer's records to the terminal and to /rosout; rospy's root logger writes them into the log file."""
+    """Send the records of solfer and its tools to the terminal and to /rosout.
+
+    Rospy's root logger writes them into the log file.
+    """
     # Under roslaunch the output is a pipe; without this, messages come out when its buffer is full.
     if isinstance(sys.stdout, io.TextIOWrapper):  # a notebook or a test may have replaced it
         sys.stdout.reconfigure(line_buffering=True)
-    ours = logging.getLogger("solfer")
-    if ours.level == logging.NOTSET:
-        ours.setLevel(logging.INFO)
-    ours.handlers[:] = [OneLine()]
+    for package in ("solfer", "solfer_tools"):
+        ours = logging.getLogger(package)
+        if ours.level == logging.NOTSET:
+            ours.setLevel(logging.INFO)
+        ours.handlers[:] = [OneLine()]
