@@ -1,8 +1,14 @@
 """The page in the browser, by its name before 0.2.0: it is `solfer_tools.view` now."""
 
-import sys
 import warnings
 from importlib import import_module
+from typing import Any
+
+_TOOLS = import_module("solfer_tools.view")
+__all__ = list(_TOOLS.__all__)
 
 warnings.warn("solfer.view is solfer_tools.view now; this name goes with 0.3", FutureWarning, stacklevel=2)
-sys.modules[__name__] = import_module("solfer_tools.view")
+
+
+def __getattr__(name: str) -> Any:
+    return getattr(_TOOLS, name)
