@@ -194,8 +194,8 @@ class _PageConnection(ServerConnection):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See `ServerConnection.connection_made`."""
-        # what is decoded at once [bytes]: 256 KiB of empty messages would keep others waiting for 0.4 s
-        transport.max_size = 16384  # type: ignore[attr-defined]  # of asyncio
+        # what is decoded at once [bytes]: 256 KiB of empty messages would keep others waiting for 0.4 to 1 s
+        transport.max_size = 4096  # type: ignore[attr-defined]  # of asyncio
         super().connection_made(transport)
 
     def process_event(self, event: Event) -> None:
