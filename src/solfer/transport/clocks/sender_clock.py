@@ -43,7 +43,7 @@ class SenderClock:
         passed = arrival - self._arrival
         step = stamp - self._stamp
         delay = arrival - stamp
-        if not self.is_distrusted and 0.0 <= step and delay >= self._lowest:
+        if not self.is_distrusted and 0.0 < step and delay >= self._lowest:
             count = self._count
             if count < AVERAGED:
                 self._count = count = count + 1
@@ -59,9 +59,11 @@ class SenderClock:
         return self._check(stamp, arrival)
 
     def _check(self, stamp: float, arrival: float) -> float:
-        """Return the time of a message that is the first, earlier than all before, or comes after a wrong stamp."""
+        """Return the time of a message that is the first, repeated, earlier than all before, or after a wrong stamp."""
         if arrival - self._arrival > PAUSE:
             self.restart()
+        if stamp == self._stamp and stamp and not self.is_distrusted:
+            return stamp + self._offset  # a simulation that stands still has no period
         passed = arrival - self._arrival
         step = stamp - self._stamp
         delay = arrival - stamp
