@@ -1,12 +1,13 @@
 """The improved law of wheeled motion in plain NumPy, one wheel and one equation after the other.
 
-It is written from the equations of docs/reference/wheeled_motion.md, and shares with the component no more than tags
-and constants: state, references and Jacobians are given in each cycle. Vectors in the plane are complex numbers. The
-guard and the pace are not part of it; the pace is an input.
+It is written from the equations of docs/reference/wheeled_motion.md, with its own constants, and takes nothing from
+the component but its tags: state, references and Jacobians are given in each cycle. Vectors in the plane are complex
+numbers. The guard and the pace are not part of it; the pace is an input.
 """
 
 import cmath
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +15,9 @@ from driving_cases.levels import dense_within
 from driving_cases.original import OriginalSteering
 from scipy.spatial.transform import Rotation
 
-from solfer.components.wheeled_motion import WheeledMotion, kernel, steering, wheels
-from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.tags import ANGLE_ERRORS, PACED_STEERING_ERROR
-from solfer.tasks.constraints import joint_bounds
+REST_ERROR, REST_DISTANCE, WAKE_DISTANCE, WAKE_TIME = 2e-3, 2.5e-3, 4e-3, 0.3  # where wheels rest [m], and [s]
+RELAXATION_LENGTH = 1e-3  # within which the direction of a wheel follows [m]
+LONGER_WAY, END_MARGIN = 0.35, 0.1  # where a wheel turns the other way [rad]
 
 
 class Measured(NamedTuple):
@@ -43,7 +43,24 @@ class Measured(NamedTuple):
     jacobian: np.ndarray
 
 
-def measured(component: WheeledMotion) -> Measured:
+class Bounds(NamedTuple):
+    """Bounds of the joint velocities, and the ranges of the joints, each of shape (n,)."""
+
+    lower_position: np.ndarray
+    upper_position: np.ndarray
+    speed: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+def bounds_at(position: np.ndarray, kinematics: Any, period: float) -> Bounds:
+    """Return the bounds with which no joint leaves its range within a period."""
+    lower, upper, speed = kinematics.lower_position, kinematics.upper_position, kinematics.velocity_limit
+    down, up = np.minimum(lower - position, 0.0) / period, np.maximum(upper - position, 0.0) / period
+    return Bounds(lower, upper, speed, np.maximum(down, -speed), np.minimum(up, speed))
+
+
+def measured(component: Any) -> Measured:
     """Return what the Points of a component have measured at their last update."""
     points: dict[str, Any] = {task.name: task.point for task in component.stack.tasks}
     base, vertices = points["BASE"], points["CONTACT_POINTS"]
@@ -85,7 +102,7 @@ class Merged:
             error: Its error [m].
             base_speed: Speed of the wheel by the motion of the base in the last cycle [m/s].
         """
-        if self._rests and not desired and abs(error) < kernel.REST_ERROR:
+        if self._rests and not desired and abs(error) < REST_ERROR:
             return self._wheel.angle
         return self._wheel.update(desired, error, base_speed)
 
@@ -117,15 +134,15 @@ class Kept:
         self._before, distance = desired, abs(error)
         if desired:
             self._rest = 0.0
-        elif distance < (kernel.WAKE_DISTANCE if self._rest else kernel.REST_DISTANCE):
-            self._rest = kernel.WAKE_TIME
+        elif distance < (WAKE_DISTANCE if self._rest else REST_DISTANCE):
+            self._rest = WAKE_TIME
         else:
             self._rest = max(self._rest - self._period, 0.0)
         if not self._rest:
-            velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.REST_ERROR / max(distance, 1e-300))
+            velocity = desired + self._gain * error * max(0.0, 1.0 - REST_ERROR / max(distance, 1e-300))
             aim = nearest(cmath.phase(velocity), self.angle)
             way = abs(velocity) * self._period
-            self.angle += (1.0 - math.exp(-way / steering.RELAXATION_LENGTH)) * (aim - self.angle)
+            self.angle += (1.0 - math.exp(-way / RELAXATION_LENGTH)) * (aim - self.angle)
         return self.angle
 
 
@@ -133,19 +150,18 @@ class WheeledLaw:
     """Joint velocities of the tasks BASE, STEERING, CONTACT_POINTS, CAMBER and CASTER above which no wheel slips.
 
     Args:
-        component: The component whose tags, gains, damping and bounds of joints count, after its `init`.
+        component: The component whose tags, gains, damping and robot count, after its `init`.
     """
 
-    def __init__(self, component: WheeledMotion):
+    def __init__(self, component: Any):
         robot, stack = component.model, component.stack
         self._tags, self._period, self._moved = component.tags, component.period, component.moved
-        self._rows = wheels.rows_of(self._tags.stack_record().levels, stack.ends.tolist())
         self._gain = np.concatenate([task.gain for task in stack.tasks])
         self._damping, self._ends = stack.numbers[:, 3].copy(), stack.ends
-        records = wheels.find_wheels(robot, self._tags)
-        self._turning = [wheels.steered_by(robot, self._tags, wheel) for wheel in records]
-        self._bounds = joint_bounds(robot, self._period)
-        self._most = ANGLE_ERRORS | ({"STEERING": PACED_STEERING_ERROR} if self._tags.is_paced else {})
+        self._rows = {name: slice(*ends) for name, ends in zip(self._tags.ik, pairwise(self._ends), strict=True)}
+        self._turning = [robot.dof(link.replace("wheel", "ankle_yaw")) for link in robot.links(self._tags.track)]
+        self._kinematics = robot.kinematics
+        self._most = {"STEERING": 0.2 if self._tags.is_paced else 0.1, "CAMBER": 2.0, "CASTER": 2.0}  # [rad]
         self._start(measured(component))
 
     def _start(self, state: Measured) -> None:
@@ -159,7 +175,7 @@ class WheeledLaw:
         self._ways = np.zeros(len(rolling))
         self.position, self.velocity = state.position.copy(), np.zeros(len(state.position))
 
-    def update(self, state: Measured, references: References) -> np.ndarray:
+    def update(self, state: Measured, references: Any) -> np.ndarray:
         """Return the joint velocities of one cycle, shape (n,) [rad/s, m/s]; references have gone on already."""
         jacobian, rows = state.jacobian.copy(), self._rows["STEERING"]
         jacobian[rows][references.lifted] = 0.0
@@ -168,8 +184,8 @@ class WheeledLaw:
         errors = turn * desired - (state.vertices[:, :2] @ (1.0, 1j) - place)
         aims = self._steer(state, references, errors / turn)
         error = self._errors(state, references, errors, self._within(state, jacobian, aims))
-        rates, bounds = self._rates(state, references, error, jacobian), self._bounds
-        bounds.update(self.position)
+        rates = self._rates(state, references, error, jacobian)
+        bounds = bounds_at(self.position, self._kinematics, self._period)
         given = jacobian, rates, self._damping, self._ends, self._moved
         velocity = dense_within(*given, bounds=bounds, rigid=self._ends[1])[0]
         self.velocity[self._moved] = velocity[self._moved]
@@ -177,7 +193,7 @@ class WheeledLaw:
         self._before = place, turn
         return self.velocity
 
-    def _steer(self, state: Measured, references: References, errors: np.ndarray) -> np.ndarray:
+    def _steer(self, state: Measured, references: Any, errors: np.ndarray) -> np.ndarray:
         """Return the directions in which wheels are to roll in the world [rad], from errors seen from the heading."""
         place, turn, heading = complex(*state.pose[:2]), cmath.exp(1j * heading_of(state)), heading_of(state)
         moved = (place - self._before[0]) / turn / self._period
@@ -198,24 +214,24 @@ class WheeledLaw:
 
     def _within(self, state: Measured, jacobian: np.ndarray, aims: np.ndarray) -> np.ndarray:
         """Return aims within the ranges of the joints that steer; a wheel keeps the way that it has begun [rad]."""
-        found, most, bounds = np.zeros(len(aims)), self._most["STEERING"], self._bounds
+        found, most, ranges = np.zeros(len(aims)), self._most["STEERING"], self._kinematics
         for index, dof in enumerate(self._turning):
             row = jacobian[self._rows["STEERING"].start + index, dof]
-            lower, upper, begun = bounds.lower_position[dof], bounds.upper_position[dof], self._ways[index]
+            lower, upper, begun = ranges.lower_position[dof], ranges.upper_position[dof], self._ways[index]
             angle = math.atan2(state.rolling[index, 1], state.rolling[index, 0])
             way = begun + soft(aims[index], angle + begun, math.pi, math.pi)
-            end, step = state.position[dof] + row * way, kernel.LEAD_CYCLES * self._period * self.velocity[dof]
+            end, step = state.position[dof] + row * way, 4.0 * self._period * self.velocity[dof]
             is_inside = lower < end < upper
             is_next_inside = lower < self.position[dof] + step < upper
             other = way - math.copysign(math.pi, step * row if is_inside and not is_next_inside else way)
-            is_short = abs(way) <= math.pi / 2.0 + kernel.EXTRA_ANGLE
-            is_free = lower + kernel.END_MARGIN < state.position[dof] + row * other < upper - kernel.END_MARGIN
+            is_short = abs(way) <= math.pi / 2.0 + LONGER_WAY
+            is_free = lower + END_MARGIN < state.position[dof] + row * other < upper - END_MARGIN
             if not (is_short and is_inside and is_next_inside) and is_free:
                 way = other
             self._ways[index], found[index] = way, angle + np.clip(way, -most, most)
         return found
 
-    def _errors(self, state: Measured, references: References, errors: np.ndarray, aims: np.ndarray) -> np.ndarray:
+    def _errors(self, state: Measured, references: Any, errors: np.ndarray, aims: np.ndarray) -> np.ndarray:
         """Return the errors of all tasks; those of vertices are given, in the world."""
         turn = Rotation.from_quat(references.orientation) * Rotation.from_quat(state.pose[3:]).inv()
         along = errors / (state.rolling @ (1.0, 1j))
@@ -235,7 +251,7 @@ class WheeledLaw:
             error[self._rows[name]] = values
         return error
 
-    def _rates(self, state: Measured, references: References, error: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+    def _rates(self, state: Measured, references: Any, error: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         """Return the rates of all tasks: K e, bounded with a pace, and at the pace the desired ones."""
         tags, rows, rates = self._tags, self._rows, self._gain * error
         is_paced, steer = tags.is_paced, rows["STEERING"]
@@ -257,7 +273,7 @@ class WheeledLaw:
             if abs(error[row]) < (1.0 - 1e-9) * most:
                 limit = most * self._gain[row]
                 rates[row] = np.clip(rates[row] + self._wheels[index].turn, -limit, limit)
-            limits = np.array((self._bounds.lower_position[dof], self._bounds.upper_position[dof]))
+            limits = np.array((self._kinematics.lower_position[dof], self._kinematics.upper_position[dof]))
             ends = jacobian[row, dof] * (limits - self.position[dof]) / self._period
             rates[row] = np.clip(rates[row], ends.min() + with_base, ends.max() + with_base)
         return rates
