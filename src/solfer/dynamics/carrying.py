@@ -3,9 +3,10 @@
 import numpy as np
 from scipy.linalg import lapack
 
-from solfer.dynamics.carrying_kernel import bear, carry
+from solfer.dynamics.carrying_kernel import CARRYING, bear, carry
 from solfer.dynamics.dynamic_model import DynamicModel
 from solfer.errors import SizeMismatch
+from solfer.numerics.blocks import MemoryBlock
 from solfer.numerics.solvers.null_space import RANK_TOLERANCE
 
 WEAK = 1e-3
@@ -47,13 +48,22 @@ class CarryingTorques:
         self.model = model
         self.torque = np.zeros(size)
         self.rank = self.carried = 0
-        self._free = np.array(free, dtype=np.int64)
-        self._span = np.zeros((size, size))
-        self._squares = np.zeros((2, size))
-        self._along = np.zeros(size)
-        self._held, self._factor = np.zeros((2, count, count))
+        self._held = np.zeros((count, count))
         self._load, self._parts, self._ratios = np.zeros((3, count))
         self._well = np.zeros(count, dtype=bool)
+        self._block = MemoryBlock(
+            CARRYING,
+            dofs=size,
+            free_count=count,
+            free=np.array(free, dtype=np.int64),
+            span=np.zeros((size, size)),
+            along=np.zeros(size),
+            held=self._held,
+            load=self._load,
+            torque=self.torque,
+            squares=np.zeros((2, size)),
+            factor=np.zeros((count, count)),
+        )
 
     def update(self, jacobian: np.ndarray) -> np.ndarray:
         """Compute `torque` for the present state, and return it.
@@ -68,24 +78,11 @@ class CarryingTorques:
         size = len(self.torque)
         if jacobian.ndim != 2 or jacobian.shape[1] != size or len(jacobian) > size:
             raise SizeMismatch(f"a matrix of shape {jacobian.shape}, expected (k, {size}), k <= {size}")
-        self.rank, is_held = carry(
-            jacobian,
-            bias,
-            self._free,
-            RANK_TOLERANCE,
-            WEAK,
-            self._span,
-            self._squares,
-            self._held,
-            self._factor,
-            self._load,
-            self._along,
-            self.torque,
-        )
-        self.carried = len(self._free) if self.rank else 0
+        self.rank, is_held = carry(self._block.address, jacobian, bias, RANK_TOLERANCE, WEAK)
+        self.carried = len(self._load) if self.rank else 0
         if not is_held:
             self._bear_weakly()
-            bear(bias, self._free, self._span, self.rank, self._load, self._along, self.torque)
+            bear(self._block.address, bias, self.rank)
         return self.torque
 
     def _bear_weakly(self) -> None:

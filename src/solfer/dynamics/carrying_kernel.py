@@ -5,8 +5,29 @@ The vectors of a basis are rows, so that sums over the DoFs run through memory i
 
 import math
 
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
+
+CARRYING = BlockLayout(
+    "Carrying",
+    dofs=int,
+    free_count=int,
+    free=(int, "free_count"),  # DoFs without torque
+    # orthonormal rows Q^T, as many as the rank, and Q^T h; B B^T
+    span=(float, "dofs", "dofs"),
+    along=(float, "dofs"),
+    held=(float, "free_count", "free_count"),
+    # what contacts have to bear besides: h_free - B Q^T h, then a solution of B B^T x
+    load=(float, "free_count"),
+    torque=(float, "dofs"),
+    # work space
+    squares=(float, 2, "dofs"),
+    factor=(float, "free_count", "free_count"),
+)
+"""What `carry` and `bear` write."""
+
+_carrying_at = CARRYING.at
 
 
 @part
@@ -70,40 +91,42 @@ def _span(jacobian, tolerance, span, squares):
 
 
 @part
-def _torque(bias, free, span, rank, load, along, torque):
+def _write_torque(block, bias, rank):
     """Write tau = h - Q x, with x = `along` + B^T `load`; zero for the DoFs `free`."""
+    free = block.free
+    torque = block.torque
     torque[:] = bias
     for r in range(rank):
-        entry = along[r]
-        for i in range(len(free)):
-            entry += span[r, free[i]] * load[i]
-        _add(-entry, span[r], torque)
-    for i in range(len(free)):
+        entry = block.along[r]
+        for i in range(block.free_count):
+            entry += block.span[r, free[i]] * block.load[i]
+        _add(-entry, block.span[r], torque)
+    for i in range(block.free_count):
         torque[free[i]] = 0.0
 
 
-def _carry(jacobian, bias, free, tolerance, weak, span, squares, held, factor, load, along, torque):
+def _carry(start, jacobian, bias, tolerance, weak):
     """Write the torques where contacts hold the DoFs `free` well; see `solfer.dynamics.carrying.CarryingTorques`.
 
     Args:
+        start: Address of a `CARRYING`.
         jacobian: That of the contacts, shape (k, n).
         bias: Bias force h, shape (n,).
-        free: DoFs without torque, shape (m,).
         tolerance: Ratio to the longest row below which what is left of another one counts as zero.
         weak: Least eigenvalue of B B^T where all is held well.
-        span: Orthonormal rows Q^T, as many as the rank; shape (n, n).
-        squares: Work space, shape (2, n).
-        held: B B^T, shape (m, m).
-        factor: Work space, shape (m, m).
-        load: What contacts have to bear besides: h_free - B Q^T h before, a solution of B B^T x after; shape (m,).
-        along: Q^T h, as many as the rank; shape (n,).
-        torque: The torques, shape (n,).
 
     Returns:
         The rank, and whether all is held well; if not, `torque` is not written, and `load` is what has to be borne.
     """
-    size = len(free)
-    rank = _span(jacobian, tolerance, span, squares)
+    block = _carrying_at(start)
+    free = block.free
+    span = block.span
+    along = block.along
+    held = block.held
+    load = block.load
+    factor = block.factor
+    size = block.free_count
+    rank = _span(jacobian, tolerance, span, block.squares)
     for r in range(rank):
         along[r] = _dot(span[r], bias)
     for i in range(size):
@@ -125,24 +148,19 @@ def _carry(jacobian, bias, free, tolerance, weak, span, squares, held, factor, l
         cholesky(factor)
         forward(factor, load)
         backward(factor, load)
-    _torque(bias, free, span, rank, load, along, torque)
+    _write_torque(block, bias, rank)
     return rank, True
 
 
-def _bear(bias, free, span, rank, load, along, torque):
-    """Write the torques where contacts hold the DoFs `free` weakly; arguments as in `_carry`, with `load` solved."""
-    _torque(bias, free, span, rank, load, along, torque)
+def _bear(start, bias, rank):
+    """Write the torques where contacts hold the DoFs `free` weakly, with `load` solved."""
+    _write_torque(_carrying_at(start), bias, rank)
 
-
-_MATRIX = "float64[:, ::1]"
-_VECTOR = "float64[::1]"
-_INDICES = "int64[::1]"
 
 carry = cached(
-    f"Tuple((int64, boolean))({_MATRIX}, {_VECTOR}, {_INDICES}, float64, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, "
-    f"{_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR})",
+    "Tuple((int64, boolean))(int64, float64[:, ::1], float64[::1], float64, float64)",
     _carry,
     REORDERED,
     sources=[DENSE],
 )
-bear = cached(f"void({_VECTOR}, {_INDICES}, {_MATRIX}, int64, {_VECTOR}, {_VECTOR}, {_VECTOR})", _bear, REORDERED)
+bear = cached("void(int64, float64[::1], int64)", _bear, REORDERED)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry import consensus_kernel as kernel
+from solfer.numerics.blocks import MemoryBlock
 
 COMPARISON_TIME = 0.3
 """Time over which wheels are compared [s]: encoders are too coarse for less."""
@@ -40,10 +41,18 @@ class WheelConsensus:
         self.distances = np.zeros(count)
         self.contradiction = self.contradicted = 0.0
         self._slip_time = slip_time
-        self._weights = np.zeros(count)
         self._recent = np.zeros((count + 1, 3))
         self._speeds = np.zeros((count + 1, 2))
-        self._mean = np.zeros(3)
+        self._block = MemoryBlock(
+            kernel.CONSENSUS,
+            count=count,
+            inliers=self.inliers,
+            distances=self.distances,
+            recent=self._recent,
+            speeds=self._speeds,
+            weights=np.zeros(count),
+            mean=np.zeros(3),
+        )
 
     def start(self) -> None:
         """Begin at rest."""
@@ -66,7 +75,7 @@ class WheelConsensus:
             time: Time of these speeds [s].
         """
         keep = self._slip_time / (self._slip_time + time)
-        kernel.reject(speeds, arms, rate, weights, tolerance, keep, self._recent, self.inliers, self._mean)
+        kernel.reject(self._block.address, speeds, arms, rate, weights, tolerance, keep)
 
     def compare(
         self,
@@ -94,12 +103,8 @@ class WheelConsensus:
             By how much the yaw rate of the wheels contradicts the gyroscope beyond what is likely [rad^2/s^2].
         """
         keep = COMPARISON_TIME / (COMPARISON_TIME + time)
-        contradiction = float(
-            kernel.estimate(
-                speeds, arms, self.inliers, rate, variance, keep, tolerance,
-                self._speeds, self.distances, self._weights, variances,
-            )
-        )  # fmt: skip
+        address = self._block.address
+        contradiction = kernel.estimate(address, speeds, arms, rate, variance, keep, tolerance, variances)
         self.contradiction = math.sqrt(max(contradiction, 0.0))
         self.contradicted = self.contradicted + time if self.contradiction > 0.1 else 0.0
         return contradiction

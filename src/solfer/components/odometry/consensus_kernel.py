@@ -2,7 +2,23 @@
 
 import math
 
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
+
+CONSENSUS = BlockLayout(
+    "Consensus",
+    count=int,  # number of wheels
+    inliers=(bool, "count"),
+    distances=(float, "count"),
+    # smoothed velocities of the wheels, and the yaw rate below them: to reject wheels, and to compare them
+    recent=(float, "count + 1", 3),
+    speeds=(float, "count + 1", 2),
+    weights=(float, "count"),
+    mean=(float, 3),
+)
+"""What `reject` and `estimate` keep."""
+
+_consensus_at = CONSENSUS.at
 
 
 @part
@@ -64,9 +80,14 @@ def best_pair(speeds, arms, inliers, rate, variance, tolerance, distances, weigh
     return lowest_cost, best
 
 
-def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, distances, weights, variances):
+def _estimate(start, speeds, arms, rate, variance, keep, tolerance, variances):
     """Smooth speeds and rate, and write distances and weights of the Cauchy estimate; see `WheelConsensus.compare`."""
-    count = len(distances)
+    block = _consensus_at(start)
+    inliers = block.inliers
+    distances = block.distances
+    weights = block.weights
+    smoothed = block.speeds
+    count = block.count
     for i in range(count):
         for axis in range(2):
             smoothed[i, axis] = keep * smoothed[i, axis] + (1.0 - keep) * speeds[i, axis]
@@ -108,10 +129,14 @@ def mean_speed(speeds, arms, rate, weights, inliers, mean):
     return total
 
 
-def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mean):
+def _reject(start, speeds, arms, rate, weights, tolerance, keep):
     """Smooth speeds and rate, and leave out the worst wheel while it is too far from the others; two stay."""
+    block = _consensus_at(start)
+    inliers = block.inliers
+    mean = block.mean
+    smoothed = block.recent
     left = 0
-    count = len(speeds)
+    count = block.count
     smoothed[count, 0] = keep * smoothed[count, 0] + (1.0 - keep) * rate
     rate = smoothed[count, 0]
     for i in range(count):
@@ -150,8 +175,7 @@ def _yaw(displacements, arms, weights):
 _F = "float64"
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
-_B = "boolean[::1]"
 
-estimate = cached(f"float64({_M}, {_M}, {_B}, {_F}, {_F}, {_F}, {_F}, {_M}, {_V}, {_V}, {_V})", _estimate)
-reject = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_F}, {_M}, {_B}, {_V})", _reject)
+estimate = cached(f"float64(int64, {_M}, {_M}, {_F}, {_F}, {_F}, {_F}, {_V})", _estimate)
+reject = cached(f"void(int64, {_M}, {_M}, {_F}, {_V}, {_F}, {_F})", _reject)
 yaw = cached(f"UniTuple(float64, 2)({_M}, {_M}, {_V})", _yaw)

@@ -328,10 +328,9 @@ class FilteredOdometry:
             inliers=consensus.inliers,
         )
         spread_time = 0.1  # [s] over which each wheel's innovations are averaged
-        filter_kernel.learn_spreads(
-            motion.speeds, motion.arms, kalman.velocity, rate - covered * (kalman.bias + kalman.noise),
-            consensus.inliers, spread_time / (spread_time + period), motion.weights, motion.spreads, motion.trusted,
-        )  # fmt: skip
+        yaw_rate = rate - covered * (kalman.bias + kalman.noise)
+        keep = spread_time / (spread_time + period)
+        filter_kernel.learn_spreads(motion.address, kalman.velocity, yaw_rate, consensus.inliers, keep)
 
     def _tolerance(self, speed: float) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
@@ -380,10 +379,9 @@ class FilteredOdometry:
         self.position[2] += raised
         ground.map.note(raised, motion.trusted)
         forgetting_time = 2.0  # [s] in which a wheel's rise is forgotten while it touches
-        filter_kernel.find_lifted(
-            motion.displacements, motion.arms, yaw, base.turned, motion.weights, motion.trusted, wheels.normal,
-            self._tags.clearance, 1.0 - period / forgetting_time, ground.slope, ground.rise, ground.lifted,
-        )  # fmt: skip
+        forget = 1.0 - period / forgetting_time
+        clearance = self._tags.clearance
+        filter_kernel.find_lifted(motion.address, ground.address, yaw, base.turned, wheels.normal, clearance, forget)
 
     def _find_velocity(self) -> None:
         """Compute the velocities of this moment."""

@@ -2,6 +2,7 @@
 
 import math
 
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 
 
@@ -77,30 +78,68 @@ def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate,
     return 0.25 * square / 3.0
 
 
-def _measure_displacements(
-    jacobian, before, arms, arms_before, step, turned, weights, displacements, mean, arm, tilting
-):
+MOTION = BlockLayout(
+    "Motion",
+    count=int,  # number of wheels
+    joint_count=int,
+    # Jacobians and arms, now and at the measurement before; steps of the joints
+    jacobian=(float, "3 * count", "joint_count"),
+    jacobian_before=(float, "3 * count", "joint_count"),
+    arms=(float, "count", 3),
+    arms_before=(float, "count", 3),
+    step=(float, "joint_count"),
+    # weights of wheels that touch, of those that also roll, and the spread of what is left of each one's velocity
+    weights=(float, "count"),
+    trusted=(float, "count"),
+    spreads=(float, "count"),
+    # displacements, means of arms, and the displacement of their mean by tilting
+    displacements=(float, "count", 3),
+    mean_arms=(float, "count", 3),
+    arm=(float, 3),
+    tilting=(float, 3),
+    speeds=(float, "count", 3),
+)
+"""What wheels measure between two measurements of the joints."""
+
+GROUND = BlockLayout(
+    "Ground",
+    count=int,
+    slope=(float, 2),
+    rise=(float, "count"),  # of each wheel above the others
+    lifted=(bool, "count"),
+)
+"""What `find_lifted` writes."""
+
+_motion_at = MOTION.at
+_ground_at = GROUND.at
+
+
+def _measure_displacements(start, turned):
     """Write displacements measured by wheels, with mean Jacobians and arms, and that of the ground point by tilting."""
+    motion = _motion_at(start)
+    displacements = motion.displacements
+    mean = motion.mean_arms
+    arm = motion.arm
     px = turned[0]
     py = turned[1]
     total = 0.0
     arm[:] = 0.0
-    for i in range(len(arms)):
+    for i in range(motion.count):
         for axis in range(3):
-            mean[i, axis] = 0.5 * (arms[i, axis] + arms_before[i, axis])
+            mean[i, axis] = 0.5 * (motion.arms[i, axis] + motion.arms_before[i, axis])
             row = 3 * i + axis
             displacement = 0.0
-            for k in range(len(step)):
-                displacement += (jacobian[row, k] + before[row, k]) * step[k]
+            for k in range(motion.joint_count):
+                displacement += (motion.jacobian[row, k] + motion.jacobian_before[row, k]) * motion.step[k]
             displacements[i, axis] = -0.5 * displacement
-            arm[axis] += weights[i] * mean[i, axis]
-        total += weights[i]
+            arm[axis] += motion.weights[i] * mean[i, axis]
+        total += motion.weights[i]
         displacements[i, 0] -= py * mean[i, 2]
         displacements[i, 1] += px * mean[i, 2]
         displacements[i, 2] -= px * mean[i, 1] - py * mean[i, 0]
     for axis in range(3):
         arm[axis] /= total
-    tilting[0], tilting[1], tilting[2] = py * arm[2], -px * arm[2], px * arm[1] - py * arm[0]
+    motion.tilting[0], motion.tilting[1], motion.tilting[2] = py * arm[2], -px * arm[2], px * arm[1] - py * arm[0]
 
 
 def _measure_speeds(displacements, tilting, time, slip_ratio, encoder_deviation, spreads, variances, speeds):
@@ -114,16 +153,22 @@ def _measure_speeds(displacements, tilting, time, slip_ratio, encoder_deviation,
         variances[i] = max(deviation * deviation, spreads[i])
 
 
-def _learn_spreads(speeds, arms, velocity, yaw_rate, inliers, keep, weights, spreads, trusted):
+def _learn_spreads(start, velocity, yaw_rate, inliers, keep):
     """Smooth the squares of what is left of each wheel's velocity, and write the weights of the wheels that roll."""
+    motion = _motion_at(start)
+    speeds = motion.speeds
+    arms = motion.mean_arms
+    weights = motion.weights
+    spreads = motion.spreads
+    trusted = motion.trusted
     count = rolling = 0
-    for i in range(len(spreads)):
+    for i in range(motion.count):
         count += inliers[i]
         trusted[i] = weights[i] if inliers[i] else 0.0
         rolling += trusted[i] > 0.0
     # the wheel itself is in the mean
     factor = (1.0 - keep) * max(2, count) / (3.0 * (max(2, count) - 1.0))
-    for i in range(len(spreads)):
+    for i in range(motion.count):
         x = speeds[i, 0] - velocity[0] + yaw_rate * arms[i, 1]
         y = speeds[i, 1] - velocity[1] - yaw_rate * arms[i, 0]
         z = speeds[i, 2] - velocity[2]
@@ -195,32 +240,39 @@ def along_normal_by_tilting(arms, i, px, py, x, y, z):
     return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
 
 
-def _find_lifted(displacements, arms, yaw, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
+def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
     """Note how far legs have lifted wheels above the others [m], and which are lifted.
 
     A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
     smaller one counts. How high a wheel is that was lifted is known by its place: no sum of ways would stay right.
     """
+    motion = _motion_at(start)
+    ground = _ground_at(ground_start)
+    displacements = motion.displacements
+    arms = motion.mean_arms
+    trusted = motion.trusted
+    rise = ground.rise
+    lifted = ground.lifted
     px = turned[0]
     py = turned[1]
     x = normal[0]
     y = normal[1]
     z = normal[2]
     total = mean_tilting = mean_displacement = 0.0
-    for i in range(len(rise)):
+    for i in range(motion.count):
         total += trusted[i]
         mean_tilting += trusted[i] * along_normal_by_tilting(arms, i, px, py, x, y, z)
         mean_displacement += trusted[i] * along_normal(displacements, arms, i, yaw, x, y, z)
     mean_tilting /= total
     mean_displacement /= total
-    for i in range(len(rise)):
+    for i in range(motion.count):
         # a wheel that goes up measures that the base goes down
         up = mean_displacement - along_normal(displacements, arms, i, yaw, x, y, z)
         by_leg = up - (along_normal_by_tilting(arms, i, px, py, x, y, z) - mean_tilting)
         if up * by_leg > 0.0:
             rise[i] += up if abs(up) < abs(by_leg) else by_leg
         if lifted[i] or rise[i] > clearance:
-            above = height_above_others(weights, arms, normal, i, slope)
+            above = height_above_others(motion.weights, arms, normal, i, ground.slope)
             lifted[i] = above > (0.5 * clearance if lifted[i] else clearance)
             rise[i] = above if lifted[i] else min(rise[i], clearance)
         if not lifted[i]:
@@ -276,13 +328,11 @@ turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
 joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
 mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_V}, {_V}, {_M})", _mean_rate)
-measure_displacements = cached(
-    f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_displacements
-)
+measure_displacements = cached(f"void(int64, {_V})", _measure_displacements)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
-learn_spreads = cached(f"void({_M}, {_M}, {_V}, {_F}, {_B}, {_F}, {_V}, {_V}, {_V})", _learn_spreads)
+learn_spreads = cached(f"void(int64, {_V}, {_F}, {_B}, {_F})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
-find_lifted = cached(f"void({_M}, {_M}, {_F}, {_V}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_V}, {_B})", _find_lifted)
+find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_lifted)
 velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)

@@ -4,6 +4,7 @@ import numpy as np
 
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.wheels import Wheels
+from solfer.numerics.blocks import MemoryBlock
 
 
 class WheelMotion:
@@ -24,6 +25,7 @@ class WheelMotion:
         trusted: The same if it also rolls, shape (k,).
         spreads: Spread of each wheel's innovations, shape (k,).
         variances: Variance of each wheel's speed, shape (k,) [m^2/s^2].
+        address: What compiled functions get of these.
     """
 
     def __init__(self, wheels: Wheels):
@@ -34,6 +36,25 @@ class WheelMotion:
         self._jacobian_before = np.zeros_like(wheels.jacobian)
         self.step, self._joints_before = np.zeros((2, wheels.joints))
         self.arm, self.tilting = np.zeros((2, 3))
+        self._block = MemoryBlock(
+            filter_kernel.MOTION,
+            count=count,
+            joint_count=wheels.joints,
+            jacobian=wheels.jacobian,
+            jacobian_before=self._jacobian_before,
+            arms=wheels.arms,
+            arms_before=self._arms_before,
+            step=self.step,
+            weights=self.weights,
+            trusted=self.trusted,
+            spreads=self.spreads,
+            displacements=self.displacements,
+            mean_arms=self.arms,
+            arm=self.arm,
+            tilting=self.tilting,
+            speeds=self.speeds,
+        )
+        self.address = self._block.address
 
     def find_step(self) -> None:
         """Compute the steps of the joints since the last `remember`."""
@@ -56,11 +77,7 @@ class WheelMotion:
 
     def measure(self, turned: np.ndarray) -> None:
         """Compute the displacements by a rotation of the base, shape (3,) [rad]."""
-        wheels = self.wheels
-        filter_kernel.measure_displacements(
-            wheels.jacobian, self._jacobian_before, wheels.arms, self._arms_before, self.step, turned,
-            self.weights, self.displacements, self.arms, self.arm, self.tilting,
-        )  # fmt: skip
+        filter_kernel.measure_displacements(self.address, turned)
 
     def mean_height(self) -> float:
         """Return the height of the contacts above the base's origin, mean of the wheels that touch [m]."""

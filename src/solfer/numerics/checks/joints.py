@@ -2,6 +2,7 @@
 
 import math
 
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.kernels import wrapped
 
@@ -61,6 +62,18 @@ AGREED = 12
 ROWS = 13
 """Number of rows."""
 
+LEAPS = BlockLayout(
+    "Leaps",
+    count=int,
+    before=(float, ROWS, "count"),
+    fastest=(float, "count"),  # largest speed of each joint; infinity: none is known
+    revolutions=(float, "count"),  # what positions may jump by; 0: nothing
+    endless=(bool, "count"),  # joints without ends
+)
+"""What `find_leap` reads, and what is remembered of each joint."""
+
+_leaps_at = LEAPS.at
+
 
 @part
 def _is_struck(velocity, part, before, stamp):
@@ -91,7 +104,7 @@ def _reset_stray(before, k):
     before[STRAYED, k] = before[ALLOWED, k] = before[LIMIT, k] = 0.0
 
 
-def _find_leap(position, velocity, part, before, fastest, revolutions, endless, arrival, stamp):
+def _find_leap(start, position, velocity, part, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
@@ -102,13 +115,10 @@ def _find_leap(position, velocity, part, before, fastest, revolutions, endless, 
     T (0.2 max(|v|, |v'|) + |v - v'|): velocities may be filtered.
 
     Args:
+        start: Address of a `LEAPS`.
         position: Measured positions.
         velocity: Measured velocities; empty: there are none.
         part: Indices of the joints that were measured.
-        before: What is remembered of each joint, shape (ROWS, n).
-        fastest: Largest speed of each joint; infinity: none is known.
-        revolutions: What positions may jump by; 0: nothing.
-        endless: Whether each joint has no ends.
         arrival: Arrival of the measurement.
         stamp: Its stamp.
 
@@ -116,6 +126,11 @@ def _find_leap(position, velocity, part, before, fastest, revolutions, endless, 
         Index of the joint; plus the number of joints where it is too fast, plus twice that where it does not move by
         its velocities. -1: there is none.
     """
+    block = _leaps_at(start)
+    before = block.before
+    fastest = block.fastest
+    revolutions = block.revolutions
+    endless = block.endless
     stray_distance = 0.08  # [rad, m]
     stamp_error = 0.005  # [s]
     shaking_time = 0.5  # [s] after the robot has struck something, for which velocities do not show the ways
@@ -179,8 +194,4 @@ def _find_leap(position, velocity, part, before, fastest, revolutions, endless, 
     return wrong
 
 
-find_leap = cached(
-    "int64(float64[::1], float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], boolean[::1],"
-    " float64, float64)",
-    _find_leap,
-)
+find_leap = cached("int64(int64, float64[::1], float64[::1], int64[::1], float64, float64)", _find_leap)

@@ -27,13 +27,21 @@ class JointLeaps:
 
     def __init__(self, robot: Robot, dofs: np.ndarray):
         # imported here: its compiler takes a while to load
+        from solfer.numerics.blocks import MemoryBlock
         from solfer.numerics.checks import joints
 
         self._find = joints.find_leap
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
-        self._limits = self._fastest, robot.revolutions[dofs], np.isinf(robot.upper_limits.position[dofs])
         self._before = np.zeros((joints.ROWS, len(dofs)))
+        self._block = MemoryBlock(
+            joints.LEAPS,
+            count=len(dofs),
+            before=self._before,
+            fastest=self._fastest,
+            revolutions=np.array(robot.revolutions[dofs]),
+            endless=np.isinf(robot.upper_limits.position[dofs]),
+        )
         self._place = self._before[joints.PLACE]
         self._arrival = self._before[joints.ARRIVAL]
         self._strayed = self._before[joints.STRAYED]
@@ -58,7 +66,7 @@ class JointLeaps:
         Raises:
             Contradiction: A joint cannot be there, or so fast, or its velocities contradict it.
         """
-        wrong = self._find(position, velocity, part, self._before, *self._limits, arrival, stamp)
+        wrong = self._find(self._block.address, position, velocity, part, arrival, stamp)
         if wrong < 0:
             return
         count = len(self._names)
