@@ -7,26 +7,24 @@ the contact.
 from solfer.numerics.compilation import cached
 
 
-def _shift(wrenches, taken, contacts, members, origins, sign, out, put, places):
+def _shift(wrenches, contacts, origins, rows, sign, out, places):
     """Move wrenches between origins of links and contacts, all in world axes.
 
     Args:
         wrenches: Force and torque of each, shape (s, 6).
-        taken: Rows of `wrenches`, shape (k,).
         contacts: Positions of contacts, shape (c, 3) [m].
-        members: Row of `contacts` of each, shape (k,); below zero: it is left out.
         origins: Origin of the link of each, shape (k, 3) [m].
+        rows: Row of each in `wrenches`, `contacts` and `out`, shape (k, 3); below zero: it is left out.
         sign: 1 from contacts to origins, -1 from origins to contacts.
         out: Where they are written, shape (o, 6); may not be `wrenches`.
-        put: Rows of `out`, shape (k,).
         places: Which of the k are moved, shape (j,).
     """
     for place in places:
-        if members[place] < 0:
+        if rows[place, 1] < 0:
             continue
-        wrench = wrenches[taken[place]]
-        moved = out[put[place]]
-        contact = contacts[members[place]]
+        wrench = wrenches[rows[place, 0]]
+        contact = contacts[rows[place, 1]]
+        moved = out[rows[place, 2]]
         origin = origins[place]
         rx = contact[0] - origin[0]
         ry = contact[1] - origin[1]
@@ -43,7 +41,6 @@ def _shift(wrenches, taken, contacts, members, origins, sign, out, put, places):
 
 
 shift = cached(
-    "void(float64[:,::1], int64[::1], float64[:,::1], int64[::1], float64[:,::1], float64, float64[:,::1], "
-    "int64[::1], int64[::1])",
+    "void(float64[:,::1], float64[:,::1], float64[:,::1], int64[:,::1], float64, float64[:,::1], int64[::1])",
     _shift,
 )

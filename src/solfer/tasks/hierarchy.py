@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from solfer.tasks.kernel import descend
+from solfer.numerics.blocks import MemoryBlock
+from solfer.tasks.kernel import DESCENT, descend
 from solfer.tasks.stack import Levels, Stack
 
 
@@ -22,32 +23,35 @@ class Descent:
     """
 
     def __init__(self, stack: Stack, checks: bool):
-        (rows, cols), count = stack.jacobian.shape, len(stack.levels)
-        self._stack = stack
-        self.reached = np.zeros((count + 1, cols))
-        self.slopes = np.zeros(count if checks else 0)
-        self._projected = np.zeros((max(rows, cols), cols))
-        self.basis = np.zeros((rows, cols))
+        (rows, cols), levels = stack.jacobian.shape, len(stack.levels)
+        slopes = levels if checks else 0
         largest = int(np.diff(stack.ends).max())
-        # the factor L of a level, then its residual
-        self._square = np.zeros((largest + 1, largest))
-        self._work = np.zeros((3, cols))
+        self.reached = np.zeros((levels + 1, cols))
+        self.slopes = np.zeros(slopes)
+        self.basis = np.zeros((rows, cols))
+        self._block = MemoryBlock(
+            DESCENT,
+            rows=rows,
+            cols=cols,
+            levels=levels,
+            largest=largest,
+            height=max(rows, cols),
+            slope_count=slopes,
+            jacobian=stack.jacobian,
+            velocity=stack.velocity,
+            numbers=stack.numbers,
+            ends=stack.ends,
+            projected=np.zeros((max(rows, cols), cols)),
+            basis=self.basis,
+            square=np.zeros((largest + 1, largest)),
+            work=np.zeros((3, cols)),
+            reached=self.reached,
+            slopes=self.slopes,
+        )
 
     def update(self) -> None:
         """Compute all levels at the last update of the stack."""
-        stack = self._stack
-        descend(
-            stack.jacobian,
-            stack.velocity,
-            stack.numbers,
-            stack.ends,
-            self._projected,
-            self.basis,
-            self._square,
-            self._work,
-            self.reached,
-            self.slopes,
-        )
+        descend(self._block.address)
 
 
 class Hierarchy:

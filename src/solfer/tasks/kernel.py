@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
 
@@ -16,6 +17,32 @@ ROW_TOLERANCE = 1e-12
 CANCELLED = 0.5
 """Ratio of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
 made its rounding errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9."""
+
+DESCENT = BlockLayout(
+    "Descent",
+    rows=int,
+    cols=int,
+    levels=int,
+    largest=int,  # rows of a level
+    height=int,  # the larger one of rows and columns
+    slope_count=int,
+    jacobian=(float, "rows", "cols"),
+    velocity=(float, "rows"),
+    numbers=(float, "rows", 5),
+    ends=(int, "levels + 1"),
+    projected=(float, "height", "cols"),
+    basis=(float, "rows", "cols"),
+    # the factor L of a level, then its residual
+    square=(float, "largest + 1", "largest"),
+    work=(float, 3, "cols"),
+    # zeros, then the velocities after each level
+    reached=(float, "levels + 1", "cols"),
+    # what is left of the slope of each level's cost, as a ratio of its largest term
+    slopes=(float, "slope_count"),
+)
+"""What `descend` reads and writes."""
+
+_descent_at = DESCENT.at
 
 
 @part
@@ -217,21 +244,24 @@ def _leave(column, free, factors, count):
 
 
 @part
-def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, out):
+def _finish(block, start, end, count, out):
     """Add the step of the last level in the coordinates z of what is left: (A' D^-2 A + 1) z = A' D^-2 (r - J dq).
 
     With A = J F, where F are the free columns, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F z.
     """
-    cols = jacobian.shape[1]
-    row = step[:count]
+    jacobian = block.jacobian
+    free = block.projected
+    square = block.square
+    cols = block.cols
+    row = block.work[0, :count]
     right = square[-1, :count]
     square[:count, :count] = 0.0
     right[:] = 0.0
     for j in range(count):
         square[j, j] = 1.0
     for i in range(start, end):
-        left = velocity[i]
-        weight = 1.0 / numbers[i, 3] ** 2
+        left = block.velocity[i]
+        weight = 1.0 / block.numbers[i, 3] ** 2
         row[:] = 0.0
         for k in range(cols):
             entry = jacobian[i, k]
@@ -256,16 +286,18 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
 
 
 @part
-def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out):
+def _imbalance(block, start, end, before, out):
     """Compute the slope of a level's cost beside the levels before, as a ratio of its largest term, if that is > 1."""
-    cols = jacobian.shape[1]
+    jacobian = block.jacobian
+    step = block.work[0]
+    cols = block.cols
     largest = 1.0
     step[:] = 0.0
     for i in range(start, end):
-        left = velocity[i]
+        left = block.velocity[i]
         for k in range(cols):
             left -= jacobian[i, k] * out[k]
-        left /= numbers[i, 3] ** 2
+        left /= block.numbers[i, 3] ** 2
         for k in range(cols):
             if jacobian[i, k] != 0.0:
                 term = left * jacobian[i, k]
@@ -274,39 +306,41 @@ def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out
     for k in range(cols):
         step[k] -= out[k] - before[k]
         largest = max(largest, abs(out[k] - before[k]))
-    _clear(step, basis, 0, start)
+    _clear(step, block.basis, 0, start)
     worst = 0.0
     for k in range(cols):
         worst = max(worst, abs(step[k]))
     return worst / largest
 
 
-def _descend(jacobian, velocity, numbers, ends, projected, basis, square, work, reached, slopes):
-    """Write the velocities of all levels into the rows of `reached` behind the first; see `solfer.tasks.hierarchy`.
-
-    `slopes` is what each row leaves of the slope of its level's cost, as a ratio of its largest term.
-    """
+def _descend(address):
+    """Write the velocities of all levels into the rows of `reached` behind the first; see `solfer.tasks.hierarchy`."""
+    block = _descent_at(address)
+    jacobian = block.jacobian
+    projected = block.projected
+    basis = block.basis
+    square = block.square
     residual = square[-1]
-    step = work[0]
-    for level in range(len(ends) - 1):
-        start = ends[level]
-        end = ends[level + 1]
-        before = reached[level]
-        out = reached[level + 1]
+    step = block.work[0]
+    for level in range(block.levels):
+        start = block.ends[level]
+        end = block.ends[level + 1]
+        before = block.reached[level]
+        out = block.reached[level + 1]
         out[:] = before
-        is_last = level == len(ends) - 2
+        is_last = level == block.levels - 1
         if is_last and start and end - start > _dimensions(basis, start):
             # `projected` is not needed any more
-            count = _complete(basis, start, projected, work)
-            _finish(jacobian, velocity, numbers, start, end, projected, count, square, step, out)
+            count = _complete(basis, start, projected, block.work)
+            _finish(block, start, end, count, out)
         else:
-            _project(jacobian, velocity, start, end, projected, basis, residual, out)
-            _factorise(numbers, start, end, projected, square)
+            _project(jacobian, block.velocity, start, end, projected, basis, residual, out)
+            _factorise(block.numbers, start, end, projected, square)
             _advance(start, end, projected, basis, square, residual, step, out)
         if not is_last:
             _extend(jacobian, start, end, projected, basis, start)
-        if len(slopes):
-            slopes[level] = _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out)
+        if block.slope_count:
+            block.slopes[level] = _imbalance(block, start, end, before, out)
 
 
 def _span(jacobian, start, end, basis):
@@ -379,13 +413,7 @@ gather = cached(
 gather_jacobian = cached(
     f"void({_MATRIX}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX})", _gather_jacobian, REORDERED
 )
-descend = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, "
-    f"{_VECTOR})",
-    _descend,
-    REORDERED,
-    sources=[DENSE],
-)
+descend = cached("void(int64)", _descend, REORDERED, sources=[DENSE])
 count_kept = cached(
     f"int64({_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
     _count_kept,

@@ -31,6 +31,7 @@ class ImuProgress:
 
     Attributes:
         rate, rate_before: Mean angular velocity of its newest interval, and that at its begin, shape (3,) [rad/s].
+        rates: Both, shape (2, 3).
         assumed: Tilting that was assumed since its last sample, shape (2,) [rad].
         since: Time since its last sample [s].
         pending: Yaw that was integrated since its last sample [rad].
@@ -40,7 +41,8 @@ class ImuProgress:
     """
 
     def __init__(self, joints: int):
-        self.rate, self.rate_before = np.zeros((2, 3))
+        self.rates = np.zeros((2, 3))
+        self.rate, self.rate_before = self.rates
         self.assumed = np.zeros(2)
         self.sway = np.zeros(joints)
         self.start()
@@ -231,7 +233,7 @@ class FilteredOdometry:
         time = imu.since + self._period
         shaken = filter_kernel.mean_rate(
             base.rotation, base.heading, base.angular, base.turned, time, base.averages,
-            imu.rate_before, imu.rate, kalman.axes,
+            imu.rates, kalman.axes,
         )  # fmt: skip
         shaking_time = 0.3  # [s] for which it lasts
         shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._period

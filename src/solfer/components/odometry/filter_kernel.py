@@ -59,11 +59,13 @@ def _joint_motion(step, legs, sway, keep):
     return largest, largest_leg, largest_sway
 
 
-def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate, axes):
+def _mean_rate(rotation, heading, angular, turned, time, averages, rates, axes):
     """Write the mean rate of the gyroscope over a time [s], and the axes from the base to the heading frame.
 
     Returns the variance of what it may have missed between its samples [rad^2/s^2].
     """
+    rate = rates[0]
+    before = rates[1]
     turn_about_vertical(rotation, -heading, axes)
     largest = 0.0
     for axis in range(3):
@@ -327,7 +329,7 @@ _B = "boolean[::1]"
 turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
 joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
-mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_V}, {_V}, {_M})", _mean_rate)
+mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_M}, {_M})", _mean_rate)
 measure_displacements = cached(f"void(int64, {_V})", _measure_displacements)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
 learn_spreads = cached(f"void(int64, {_V}, {_F}, {_B}, {_F})", _learn_spreads)

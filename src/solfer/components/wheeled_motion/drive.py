@@ -142,7 +142,7 @@ class Drive:
         if not self.is_active:
             return
         change, yaw_change = self._limits
-        given = self._state, references.velocity, references.angular, heading, ratio
+        given = self._state, references.motion, heading, ratio
         if follow(*given, passed, STREAM_TIMEOUT, change * passed, yaw_change * passed):
             self.start()
         elif self.progress < 1.0:

@@ -42,31 +42,24 @@ class AccelerationBounds:
         braking: float,
         horizon: float,
     ):
-        self._lower_position = np.array(lower_position, dtype=float)
-        self._upper_position = np.array(upper_position, dtype=float)
-        self.speed = np.array(speed, dtype=float)
+        self._limits = np.array((lower_position, upper_position, speed), dtype=float)
+        self.speed = self._limits[2]
         self.braking = braking
         self._horizon = horizon
-        self.lower = np.full(len(self.speed), -np.inf)
-        self.upper = np.full(len(self.speed), np.inf)
+        self._bounds = np.full_like(self._limits[:2], np.inf)
+        self.lower, self.upper = self._bounds
+        self.lower[:] = -np.inf
 
     def update(self, position: np.ndarray, velocity: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each. Allocates nothing."""
-        _bound(
-            position,
-            velocity,
-            self._lower_position,
-            self._upper_position,
-            self.speed,
-            self.braking,
-            self._horizon,
-            self.lower,
-            self.upper,
-        )
+        _bound(position, velocity, self._limits, self.braking, self._horizon, self._bounds)
 
 
-def _bound_all(position, velocity, lower_position, upper_position, speed, braking, horizon, lower, upper):
+def _bound_all(position, velocity, limits, braking, horizon, bounds):
     """See `AccelerationBounds.update`; a NaN stays one."""
+    lower_position = limits[0]
+    upper_position = limits[1]
+    speed = limits[2]
     for k in range(len(position)):
         up = upper_position[k] - position[k]
         down = position[k] - lower_position[k]
@@ -78,11 +71,8 @@ def _bound_all(position, velocity, lower_position, upper_position, speed, brakin
         slowest = speed[k] if slowest > speed[k] else slowest
         most = (fastest - velocity[k]) / horizon
         least = (-slowest - velocity[k]) / horizon
-        upper[k] = -braking if most < -braking else most
-        lower[k] = braking if least > braking else least
+        bounds[0, k] = braking if least > braking else least
+        bounds[1, k] = -braking if most < -braking else most
 
 
-_VECTOR = "float64[::1]"
-_bound = cached(
-    f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR}, {_VECTOR})", _bound_all
-)
+_bound = cached("void(float64[::1], float64[::1], float64[:, ::1], float64, float64, float64[:, ::1])", _bound_all)

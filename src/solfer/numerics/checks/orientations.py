@@ -123,13 +123,14 @@ def _find_skew(x, y, z, w, before):
 
 
 @part
-def _compare_rotations(values, u, v, s, c, own_axes, passed, rate, before):
+def _compare_rotations(values, last, own_axes, passed, rate, before):
     """Compare the rotation since the quaternion before, in the axes of the link or of the world, with the rates."""
     fastest = 10.0  # rate beyond which the orientation has to rotate as fast: else it is a spike [rad/s]
     x = values[0]
     y = values[1]
     z = values[2]
     w = values[3]
+    u, v, s, c = last
     side = 1.0 if own_axes else -1.0
     sign = 2.0 if c * w + u * x + v * y + s * z >= 0.0 else -2.0
     tx = sign * (c * x - w * u - side * (v * z - s * y))
@@ -187,7 +188,7 @@ def _find_fault(values, own_axes, force, arrival, stamp, before):
     fault, size = _find_skew(x, y, z, w, before)
     if fault or not is_next or rate == 0.0:  # many senders leave rates zero
         return fault, size
-    fault, size = _compare_rotations(values, u, v, s, c, own_axes, passed, rate, before)
+    fault, size = _compare_rotations(values, (u, v, s, c), own_axes, passed, rate, before)
     # Beyond these bounds [m/s^2] it is in other units, or without gravity: a push that topples a robot within a second
     # makes it 13.
     if fault == 0 and not 6.8 < before[FORCE_SIZE] < 15.8:

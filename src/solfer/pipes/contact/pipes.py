@@ -65,36 +65,27 @@ class _Wrenches:
         self._turned = np.zeros_like(published) if carried.fixed else published
         self._origins = Handler(LinearPoint(contact.link, robot) for contact in carried.contacts)
         self.all = np.arange(len(published))
-        self._members = self.all
         self._memory = np.zeros(0)
+        self._read = self._written = np.zeros((0, 3), dtype=int)
 
     def write(self, places: np.ndarray) -> None:
         """Write rows of the message to their contacts."""
         self._bring_up_to_date()
         if self._turned is not self._published:
             np.matmul(self._published.reshape(2, 3), self._rotation().T, out=self._turned.reshape(2, 3))
-        self._move(self._turned, self.all, -1.0, out=self._memory, put=self._members, places=places)
+        self._move(self._turned, self._written, -1.0, out=self._memory, places=places)
 
     def read(self) -> None:
         """Write the wrenches of all contacts to the message."""
         self._bring_up_to_date()
-        self._move(self._memory, self._members, 1.0, out=self._turned, put=self.all, places=self.all)
+        self._move(self._memory, self._read, 1.0, out=self._turned, places=self.all)
         if self._turned is not self._published:
             np.matmul(self._turned.reshape(2, 3), self._rotation(), out=self._published.reshape(2, 3))
 
-    def _move(
-        self,
-        source: np.ndarray,
-        taken: np.ndarray,
-        sign: float,
-        out: np.ndarray,
-        put: np.ndarray,
-        *,
-        places: np.ndarray,
-    ) -> None:
+    def _move(self, source: np.ndarray, rows: np.ndarray, sign: float, out: np.ndarray, places: np.ndarray) -> None:
         positions = self._robot.contacts.positions
         origins = self._origins.value.reshape(-1, 3)
-        self._shift(source, taken, positions, self._members, origins, sign, out, put, places)
+        self._shift(source, positions, origins, rows, sign, out, places)
 
     def _rotation(self) -> np.ndarray:
         return self._robot.kinematics.rotation(self._contacts[0].link)
@@ -105,7 +96,9 @@ class _Wrenches:
         contacts = self._robot.contacts  # computed on access
         if contacts.wrenches is not self._memory:
             self._memory, known = contacts.wrenches, [id(contact) for contact in contacts]
-            self._members = np.array([known.index(id(each)) if id(each) in known else -1 for each in self._contacts])
+            members = np.array([known.index(id(each)) if id(each) in known else -1 for each in self._contacts])
+            self._written = np.stack((self.all, members, members), axis=1)
+            self._read = np.stack((members, members, self.all), axis=1)
         self._origins.update(jacobian=False)
 
 

@@ -166,8 +166,10 @@ def _step_alone(motion, places, orientations, numbers, period):
     _step(numbers, motion, places[0], places[1], orientations, period)
 
 
-def _follow(state, velocity, angular, heading, counted, passed, timeout, change, yaw_change):
+def _follow(state, motion, heading, counted, passed, timeout, change, yaw_change):
     """Write the velocity of this cycle that follows a ratio of the one sent; return whether it rests for good."""
+    velocity = motion[0]
+    angular = motion[1]
     state[AGE] += passed
     x = velocity[0]
     y = velocity[1]
@@ -207,7 +209,7 @@ def _gain(distance, lead, passed):
     return 0.0 if distance < 1e-9 else min(max(1.0 / lead, lowest_speed / distance), 1.0 / passed)
 
 
-def _approach(errors, limits, velocity, angular, vertex_velocity, first, last, lead, passed):
+def _approach(errors, limits, motion, vertex_velocity, first, last, lead, passed):
     """Let velocities go to errors / lead, times one ratio so that none is larger than it may be; return that ratio.
 
     Rows of the base, of its heading, and of the vertices count from `first` to `last`. No speed is larger than that
@@ -223,7 +225,7 @@ def _approach(errors, limits, velocity, angular, vertex_velocity, first, last, l
         if speed > most:
             ratio = min(ratio, most / speed)
     for index in range(first, last):
-        rate = velocity if index == 0 else angular if index == 1 else vertex_velocity[index - 2]
+        rate = motion[index] if index < 2 else vertex_velocity[index - 2]
         error = errors[index]
         begin = 2 if index == 1 else 0
         most = limits[index, 1] * passed
@@ -242,7 +244,5 @@ _MATRIX = "float64[:, ::1]"
 
 advance = cached("void(int64, boolean, boolean, boolean, float64, float64)", _advance)
 step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)
-follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}{6 * ', float64'})", _follow)
-approach = cached(
-    f"float64({_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_MATRIX}, int64, int64, float64, float64)", _approach
-)
+follow = cached(f"boolean({_VECTOR}, {_MATRIX}{6 * ', float64'})", _follow)
+approach = cached(f"float64({_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64, int64, float64, float64)", _approach)
