@@ -113,16 +113,17 @@ def _ratio_left(row, whole):
 
 
 @part
-def _project(jacobian, velocity, start, end, projected, basis, residual, out):
+def _project(block, start, end, residual, out):
     """Write J' = J P of a level, whose P is 1 - W^T W with all rows W before it, and its residual r - J dq."""
-    cols = jacobian.shape[1]
+    jacobian = block.jacobian
+    projected = block.projected
     for i in range(start, end):
-        entry = velocity[i]
-        for k in range(cols):
+        entry = block.velocity[i]
+        for k in range(block.cols):
             entry -= jacobian[i, k] * out[k]
             projected[i, k] = jacobian[i, k]
         residual[i - start] = entry
-        _clear(projected[i], basis, 0, start)
+        _clear(projected[i], block.basis, 0, start)
         projected[i] *= _ratio_left(projected[i], jacobian[i]) > ROW_TOLERANCE
 
 
@@ -145,21 +146,21 @@ def _factorise(numbers, start, end, projected, factor):
 
 
 @part
-def _advance(start, end, projected, basis, factor, residual, step, out):
+def _advance(block, start, end, residual, out):
     """Add the step J'^T (L L^T)^-1 (r - J dq)."""
     rows = end - start
-    matrix = factor[:rows, :rows]
+    matrix = block.square[:rows, :rows]
     solved = residual[:rows]
     forward(matrix, solved)
     backward(matrix, solved)
-    cols = projected.shape[1]
+    step = block.work[0]
     step[:] = 0.0
     for i in range(rows - 1, -1, -1):
-        for k in range(cols):
-            step[k] += solved[i] * projected[start + i, k]
+        for k in range(block.cols):
+            step[k] += solved[i] * block.projected[start + i, k]
     # rows that contradict each other have large parts in the step, which cancel out; their rounding errors do not
-    _remove(step, basis, 0, start)
-    for k in range(cols):
+    _remove(step, block.basis, 0, start)
+    for k in range(block.cols):
         out[k] += step[k]
 
 
@@ -319,9 +320,7 @@ def _descend(address):
     jacobian = block.jacobian
     projected = block.projected
     basis = block.basis
-    square = block.square
-    residual = square[-1]
-    step = block.work[0]
+    residual = block.square[-1]
     for level in range(block.levels):
         start = block.ends[level]
         end = block.ends[level + 1]
@@ -334,9 +333,9 @@ def _descend(address):
             count = _complete(basis, start, projected, block.work)
             _finish(block, start, end, count, out)
         else:
-            _project(jacobian, block.velocity, start, end, projected, basis, residual, out)
-            _factorise(block.numbers, start, end, projected, square)
-            _advance(start, end, projected, basis, square, residual, step, out)
+            _project(block, start, end, residual, out)
+            _factorise(block.numbers, start, end, projected, block.square)
+            _advance(block, start, end, residual, out)
         if not is_last:
             _extend(jacobian, start, end, projected, basis, start)
         if block.slope_count:

@@ -61,22 +61,23 @@ class VelocityBounds:
 
     def update(self, position: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m], shape (n,). Allocates nothing."""
-        _bound(position, self.lower_position, self.upper_position, self.speed, self._rate, self.lower, self.upper)
+        _bound(position, self.lower_position, self.upper_position, self._rate, self.limits)
 
 
-def _bound_all(position, lower_position, upper_position, speed, rate, lower, upper):
+def _bound_all(position, lower_position, upper_position, rate, limits):
     """See `VelocityBounds.update`; a NaN stays one."""
+    speed = limits[2]
     for k in range(len(position)):
         up = upper_position[k] - position[k]
         down = lower_position[k] - position[k]
         up = rate * (0.0 if up < 0.0 else up)
         down = rate * (0.0 if down > 0.0 else down)
-        upper[k] = speed[k] if up > speed[k] else up
-        lower[k] = -speed[k] if down < -speed[k] else down
+        limits[0, k] = -speed[k] if down < -speed[k] else down
+        limits[1, k] = speed[k] if up > speed[k] else up
 
 
 _VECTOR = "float64[::1]"
-_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, float64, {_VECTOR}, {_VECTOR})", _bound_all)
+_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, float64[:, ::1])", _bound_all)
 
 
 def _check(joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray) -> None:

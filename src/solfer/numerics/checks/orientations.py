@@ -56,8 +56,9 @@ NUMBERS = 24
 
 
 @part
-def _tilt_between(x, y, z, w, before, first):
+def _tilt_between(quaternion, before, first):
     """Return by what angle the vertical of a quaternion differs from that of the one at `first` [rad]."""
+    x, y, z, w = quaternion
     u = before[first]
     v = before[first + 1]
     s = before[first + 2]
@@ -71,22 +72,22 @@ def _tilt_between(x, y, z, w, before, first):
 
 
 @part
-def _find_tilt_leap(x, y, z, w, arrival, stamp, before):
+def _find_tilt_leap(quaternion, arrival, stamp, before):
     """Note whether the tilt has leapt since the message before; the first one is accepted."""
     if before[ARRIVAL] == -math.inf:
         before[FORCE + 2] = FORCE_WINDOW * GRAVITY  # a robot that starts by accelerating is not askew
         before[FORCE_SIZE] = GRAVITY
         return
     elapsed = max(arrival - before[ARRIVAL], min(stamp - before[STAMP], LONGEST_INTERVAL))
-    tilt = _tilt_between(x, y, z, w, before, NEWEST)
+    tilt = _tilt_between(quaternion, before, NEWEST)
     if tilt > TILT_MARGIN + 6.0 * min(elapsed, 0.1):  # [rad/s], [s]: how fast a link can tilt, and for how long
         before[ROTATION:FROZEN_TIME] = 0.0
-        before[LEAPT] = max(before[LEAPT], _tilt_between(x, y, z, w, before, ACCEPTED))
+        before[LEAPT] = max(before[LEAPT], _tilt_between(quaternion, before, ACCEPTED))
         before[WITNESSED] = 0.0
 
 
 @part
-def _add_force(x, y, z, w, force, passed, before):
+def _add_force(quaternion, force, passed, before):
     """Add the specific force, in the world's axes, while it is that of a robot that neither falls nor turns fast."""
     fx = force[0]
     fy = force[1]
@@ -94,6 +95,7 @@ def _add_force(x, y, z, w, force, passed, before):
     size = math.sqrt(fx * fx + fy * fy + fz * fz)
     if abs(size - GRAVITY) < 1.0:  # beyond it is not gravity that is measured, as in a fall
         # R f = f + 2 w (a x f) + 2 a x (a x f), where a is the axis of the quaternion
+        x, y, z, w = quaternion
         px = y * fz - z * fy
         py = z * fx - x * fz
         pz = x * fy - y * fx
@@ -108,13 +110,13 @@ def _add_force(x, y, z, w, force, passed, before):
 
 
 @part
-def _find_skew(x, y, z, w, before):
+def _find_skew(quaternion, before):
     """Return a leap of the tilt, or an angle between the vertical and the specific force, that is too large."""
     largest = 0.1  # angle between the vertical and the mean specific force [rad]
     askew = math.atan2(math.sqrt(before[FORCE] ** 2 + before[FORCE + 1] ** 2), before[FORCE + 2])
     if before[LEAPT] > 0.0:
         is_witnessed = before[WITNESSED] > 0.5 and askew < largest
-        if not is_witnessed and _tilt_between(x, y, z, w, before, ACCEPTED) > TILT_MARGIN:
+        if not is_witnessed and _tilt_between(quaternion, before, ACCEPTED) > TILT_MARGIN:
             return 1, before[LEAPT]
         before[LEAPT] = 0.0
         before[FORCE + 2] += FORCE_WINDOW * GRAVITY
@@ -159,24 +161,15 @@ def _compare_rotations(values, last, own_axes, passed, rate, before):
 @part
 def _find_fault(values, own_axes, force, arrival, stamp, before):
     """Check an orientation as `_check_rotation` does; remember it, whether it counts or not."""
-    x = values[0]
-    y = values[1]
-    z = values[2]
-    w = values[3]
-    u = before[NEWEST]
-    v = before[NEWEST + 1]
-    s = before[NEWEST + 2]
-    c = before[NEWEST + 3]
+    quaternion = values[0], values[1], values[2], values[3]
+    last = before[NEWEST], before[NEWEST + 1], before[NEWEST + 2], before[NEWEST + 3]
     is_first = before[ARRIVAL] == -math.inf
     passed = stamp - before[STAMP]
-    _find_tilt_leap(x, y, z, w, arrival, stamp, before)
-    before[NEWEST] = x
-    before[NEWEST + 1] = y
-    before[NEWEST + 2] = z
-    before[NEWEST + 3] = w
+    _find_tilt_leap(quaternion, arrival, stamp, before)
+    before[NEWEST : NEWEST + 4] = values[:4]
     before[ARRIVAL] = arrival
     before[STAMP] = stamp
-    is_frozen = x == u and y == v and z == s and w == c
+    is_frozen = quaternion == last
     if passed >= GAP or passed < -LONGEST_INTERVAL or (before[FROZEN_TIME] > GAP and not is_frozen):
         before[ROTATION:FORCE] = 0.0
         before[IS_APART] = 0.0
@@ -184,11 +177,11 @@ def _find_fault(values, own_axes, force, arrival, stamp, before):
     is_next = not is_first and 0.0 < passed < GAP
     rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
     if is_next and rate < 0.5:  # [rad/s]: a sensor that rotates faster does not measure gravity alone
-        _add_force(x, y, z, w, force, passed, before)
-    fault, size = _find_skew(x, y, z, w, before)
+        _add_force(quaternion, force, passed, before)
+    fault, size = _find_skew(quaternion, before)
     if fault or not is_next or rate == 0.0:  # many senders leave rates zero
         return fault, size
-    fault, size = _compare_rotations(values, (u, v, s, c), own_axes, passed, rate, before)
+    fault, size = _compare_rotations(values, last, own_axes, passed, rate, before)
     # Beyond these bounds [m/s^2] it is in other units, or without gravity: a push that topples a robot within a second
     # makes it 13.
     if fault == 0 and not 6.8 < before[FORCE_SIZE] < 15.8:
