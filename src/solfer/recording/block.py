@@ -2,17 +2,23 @@
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from mcap.opcode import Opcode
 
 from solfer.errors import RecordingError
-from solfer.recording.kinds import JOINT_PARTS, JOINTS_KIND, STAMP_PLACE, Template, check, part_of, template, topic_of
+from solfer.recording.kinds import JOINT_PARTS, JOINTS_KIND, STAMP_PLACE, check, part_of, template, topic_of
 from solfer.recording.model import Channel
 
-_RECORD = "<BQHIQQ"  # of a message: opcode, length, channel, sequence, time of the log, time of publication
-_HEADER = struct.calcsize(_RECORD)
+_HEAD = struct.Struct("<BQH")
+"""Begin of the record of a message: opcode, length, channel. Its number and both times follow."""
+
+_NUMBERED = 20
+"""Bytes of a number and of both times."""
+
+CONTENT = _HEAD.size + _NUMBERED
+"""Where the content begins in the record of a message."""
 
 
 class RecordedTopic:
@@ -73,6 +79,14 @@ def topics_of(channels: Sequence[Channel]) -> list[RecordedTopic]:
     return topics
 
 
+def together(channels: Iterable[Channel]) -> list[list[Channel]]:
+    """Group channels of the same times."""
+    groups: dict[bytes, list[Channel]] = {}
+    for channel in channels:
+        groups.setdefault(np.asarray(channel.times, dtype=float).tobytes(), []).append(channel)
+    return list(groups.values())
+
+
 def _rank(channel: Channel) -> int:
     return JOINT_PARTS.index(part_of(channel.name)) if channel.kind == JOINTS_KIND else 0
 
@@ -96,27 +110,25 @@ class Block:
         self.first = first
         starts = np.cumsum([0, *(len(channel.columns) for channel in channels)])
         self.width = int(starts[-1])
+        # what differs from row to row, of which each message has its parts
+        fields = [("number", "<u4"), ("times", "<u8", (2,)), ("stamp", "<u4", (2,)), ("values", "<f8", (self.width,))]
+        self._varying = np.dtype(fields)
         data = bytearray()
         self._offsets = []
-        self._moves: list[tuple[int, int, int]] = []  # where numbers go, where they come from, and how many bytes
+        self._moves: list[tuple[int, int, int]] = []  # where bytes go, where they come from, and how many
         for index, topic in enumerate(self.topics):
-            self._offsets.append(len(data))
-            content: Template = topic.template
-            data += struct.pack(_RECORD, Opcode.MESSAGE, _HEADER - 9 + len(content.data), first + index, 0, 0, 0)
+            begin = len(data)
+            self._offsets.append(begin)
+            data += _HEAD.pack(Opcode.MESSAGE, CONTENT - 9 + len(topic.template.data), first + index)
+            data += bytes(_NUMBERED) + topic.template.data
+            self._moves += [(begin + _HEAD.size, 0, _NUMBERED), (begin + CONTENT + STAMP_PLACE, _NUMBERED, 8)]
             columns = np.concatenate([np.arange(starts[place], starts[place + 1]) for place in topic.places])
-            self._moves += _moves(content.runs, columns, len(data))
-            data += content.data
+            for place, count in topic.template.runs:
+                if count:
+                    self._moves.append((begin + CONTENT + place, _NUMBERED + 8 * (1 + int(columns[0])), 8 * count))
+                columns = columns[count:]
         self._row = np.frombuffer(bytes(data), dtype=np.uint8)
         self.size = len(data)
-        # places of the fields of `_RECORD`
-        self._times = self._bytes(8, 15, 23)
-        self._numbers = self._bytes(4, 11)
-        self._stamps = self._bytes(8, _HEADER + STAMP_PLACE)
-
-    def _bytes(self, size: int, *places: int) -> np.ndarray:
-        """Return the indices of numbers of so many bytes that are at these places of all messages."""
-        begins = np.array([offset + place for offset in self._offsets for place in places], dtype=int)
-        return (begins[:, None] + np.arange(size)).ravel()
 
     def messages(self, numbers: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Make the messages of rows, one row after the other.
@@ -129,13 +141,13 @@ class Block:
         Returns:
             Records of messages, uint8, shape (T, size).
         """
-        rows = np.empty((len(times), self.size), dtype=np.uint8)
-        rows[:] = self._row
-        stamps = np.stack((times // 1_000_000_000, times % 1_000_000_000), axis=1)
-        rows[:, self._times] = _repeated(times.astype("<u8"), len(self._times))
-        rows[:, self._numbers] = _repeated(numbers.astype("<u4"), len(self._numbers))
-        rows[:, self._stamps] = _repeated(stamps.astype("<u4"), len(self._stamps))
-        content = np.ascontiguousarray(values, dtype="<f8").view(np.uint8)
+        varying = np.empty(len(times), dtype=self._varying)
+        varying["number"] = numbers
+        varying["times"] = times[:, None]
+        varying["stamp"] = np.stack(np.divmod(times, 1_000_000_000), axis=1)
+        varying["values"] = values
+        content = varying.view(np.uint8).reshape(len(times), self._varying.itemsize)
+        rows = np.tile(self._row, (len(times), 1))
         for target, source, size in self._moves:
             rows[:, target : target + size] = content[:, source : source + size]
         return rows
@@ -143,20 +155,3 @@ class Block:
     def offsets(self, rows: int) -> np.ndarray:
         """Return where the messages of so many rows begin, int64, shape (topics, rows)."""
         return np.array(self._offsets)[:, None] + self.size * np.arange(rows)
-
-
-def _moves(runs: Sequence[tuple[int, int]], columns: np.ndarray, begin: int) -> list[tuple[int, int, int]]:
-    """List what is copied into a message at `begin`: the numbers of some columns, a run after the other."""
-    moves = []
-    used = 0
-    for place, count in runs:
-        if count:
-            moves.append((begin + place, 8 * int(columns[used]), 8 * count))
-        used += count
-    return moves
-
-
-def _repeated(numbers: np.ndarray, size: int) -> np.ndarray:
-    """Repeat the bytes of each row's number up to a size, uint8, shape (T, size)."""
-    content = numbers.view(np.uint8).reshape(len(numbers), -1)
-    return np.tile(content, (1, size // max(1, content.shape[1])))

@@ -13,22 +13,19 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Metadata, Schema
+from mcap.records import Attachment, Chunk, Message, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 from mcap.writer import MCAP0_MAGIC
 
 from solfer.errors import RecordingError, SolferError, described
 from solfer.files import open_regular
-from solfer.recording.block import RecordedTopic
+from solfer.recording.block import CONTENT, RecordedTopic
 from solfer.recording.events import event_of
 from solfer.recording.kinds import EVENT_MESSAGE
 from solfer.recording.model import Channel, Event, Recording
 from solfer.recording.writer import END, METADATA
 
 _HEAD = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<HIQQ")
-_CHUNK = struct.Struct("<QQQI")
-_CONTENT = _HEAD.size + _MESSAGE.size
 _MAX_OTHERS_SIZE = 1 << 27  # [B], of all that is no chunk
 _MAX_UNPACKED_SIZE = 1 << 28  # [B], of all messages, and besides
 _MAX_EXPANSION = 64  # times the size of the file
@@ -157,20 +154,21 @@ class _Reader:
 
     def _chunk(self, content: bytes) -> None:
         """Take the messages of a chunk; one that is damaged is left out."""
-        first, last, size, checksum = _CHUNK.unpack_from(content)
-        stream = ReadDataStream(io.BytesIO(content[_CHUNK.size :]))
-        packing = stream.read_prefixed_string()
-        length = stream.read8()
-        packed = stream.read(length)
+        chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
+        packing = chunk.compression
+        size = chunk.uncompressed_size
+        checksum = chunk.uncompressed_crc
         try:
             most = 1 << 24  # [B] of the messages in a chunk; solfer's own have some hundred kB
-            if size > most or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
+            if size > most or (packing == "zstd" and zstandard.frame_content_size(chunk.data) not in (-1, size)):
                 raise zstandard.ZstdError("as much memory would be taken as a damaged number says")
-            messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
+            messages = zstandard.decompress(chunk.data, size) if packing == "zstd" else chunk.data
         except zstandard.ZstdError:
             messages = b""
         if packing not in ("", "zstd") or len(messages) != size or (checksum and zlib.crc32(messages) != checksum):
-            self._missing.append(f"damaged rows between {1e-9 * first:.3f} s and {1e-9 * last:.3f} s")
+            begin = 1e-9 * chunk.message_start_time
+            end = 1e-9 * chunk.message_end_time
+            self._missing.append(f"damaged rows between {begin:.3f} s and {end:.3f} s")
             return
         self._unpacked += size
         if self._unpacked > _MAX_UNPACKED_SIZE + _MAX_EXPANSION * self._size:
@@ -186,12 +184,13 @@ class _Reader:
             return
         if self._schemas[topic.schema_id] == EVENT_MESSAGE:
             for place, length in zip(places, lengths, strict=True):
-                content = data[place : place + length].tobytes()
-                time = _MESSAGE.unpack_from(content, _HEAD.size)[2]
-                self._events.append(event_of(content[_CONTENT:], time))
+                content = data[place + _HEAD.size : place + length].tobytes()
+                message = Message.read(ReadDataStream(io.BytesIO(content)), len(content))
+                self._events.append(event_of(message.data, message.log_time))
             return
         rows = data[places[:, None] + np.arange(int(lengths[0]))] if np.all(lengths == lengths[0]) else data[:0]
-        self._rows.setdefault(number, []).append((_stamps(rows), rows[:, _CONTENT:]))
+        stamps = np.ascontiguousarray(rows[:, CONTENT - 20 : CONTENT - 8]).view(_ROW)[:, 0]
+        self._rows.setdefault(number, []).append((stamps, rows[:, CONTENT:]))
 
     def _channels(self) -> tuple[dict[str, Channel], int]:
         """Put the rows of each channel together; also returns how many rows the numbers of the messages lack."""
@@ -228,7 +227,7 @@ def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     found: dict[int, list[tuple[int, int]]] = {}
     place = 0
     unpack = struct.Struct("<BQH").unpack_from
-    while place + _CONTENT <= len(messages):
+    while place + CONTENT <= len(messages):
         opcode, length, number = unpack(messages, place)
         if opcode == Opcode.MESSAGE:
             found.setdefault(number, []).append((place, _HEAD.size + length))
@@ -237,14 +236,6 @@ def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         raise ValueError(f"a chunk of {len(messages)} bytes with messages of {place}")
     arrays = {number: np.array(places) for number, places in found.items()}
     return {number: (places[:, 0], places[:, 1]) for number, places in arrays.items()}
-
-
-def _stamps(rows: np.ndarray) -> np.ndarray:
-    """Return the numbers and times of messages, shape (T,)."""
-    stamps = np.zeros(len(rows), _ROW)
-    stamps["sequence"] = np.ascontiguousarray(rows[:, 11:15]).view("<u4")[:, 0]
-    stamps["time"] = np.ascontiguousarray(rows[:, 15:23]).view("<u8")[:, 0]
-    return stamps
 
 
 def _gaps(sequence: np.ndarray) -> int:

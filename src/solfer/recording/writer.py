@@ -15,11 +15,13 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
+    Chunk,
     ChunkIndex,
     DataEnd,
     Footer,
     Header,
     McapRecord,
+    Message,
     Metadata,
     MetadataIndex,
     Schema,
@@ -29,7 +31,7 @@ from mcap.records import Channel as ChannelRecord
 from mcap.writer import MCAP0_MAGIC
 
 from solfer.errors import RecordingError
-from solfer.recording.block import Block
+from solfer.recording.block import Block, together
 from solfer.recording.events import event_message
 from solfer.recording.kinds import EVENT_MESSAGE, check, definition, ros_name
 from solfer.recording.model import Channel, Event, Recording
@@ -151,9 +153,8 @@ class RecordingWriter:
             RecordingError: The disk is full.
         """
         time = round(1e9 * event.time)
-        content = event_message(event, time)
-        record = struct.pack("<BQHIQQ", Opcode.MESSAGE, 22 + len(content), self._events, 0, time, time) + content
-        self._chunk(record, self._events, np.array([[[time, 0]]], dtype="<u8"))
+        message = Message(self._events, time, event_message(event, time), publish_time=time, sequence=0)
+        self._chunk(_bytes(message), self._events, np.array([[[time, 0]]], dtype="<u8"))
 
     def finish(self, lost: int = 0) -> None:
         """Complete the file, which had to do without `lost` rows, with the index of all, and close it.
@@ -187,20 +188,15 @@ class RecordingWriter:
 
     def _text(self, name: str, texts: dict[str, str]) -> None:
         data = _bytes(Metadata(name, texts))
-        begin = self.size
-        self._append(data)
-        self._texts.append(MetadataIndex(begin, len(data), name))
+        self._texts.append(MetadataIndex(self._append(data), len(data), name))
 
     def _attach(self, name: str, content: bytes) -> None:
         kinds = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
         media = kinds.get(Path(name).suffix, "application/octet-stream")
         data = _bytes(Attachment(0, 0, name, media, content))
-        begin = self.size
-        self._append(data)
+        begin = self._append(data)
         self._attached.append(
-            AttachmentIndex(
-                begin, length=len(data), create_time=0, log_time=0, data_size=len(content), name=name, media_type=media
-            )
+            AttachmentIndex(begin, len(data), 0, create_time=0, data_size=len(content), name=name, media_type=media)
         )
 
     def _chunk(self, messages: bytes, first: int, index: np.ndarray) -> None:
@@ -208,15 +204,17 @@ class RecordingWriter:
         packed = self._compress(messages)
         begin = int(index[..., 0].min())
         end = int(index[..., 0].max())
-        # first and last time, size, checksum, name of the compression with its length, size of the records
-        head = struct.pack("<QQQIi4sQ", begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
-        chunk = struct.pack("<BQ", Opcode.CHUNK, len(head) + len(packed)) + head + packed
+        size = len(messages)
+        checksum = zlib.crc32(messages)
+        chunk = _bytes(
+            Chunk("zstd", packed, end, message_start_time=begin, uncompressed_crc=checksum, uncompressed_size=size)
+        )
         tail = bytearray()
         places = {}
         start = self.size
         for number, rows in enumerate(index, start=first):
-            places[number], size = start + len(chunk) + len(tail), 16 * len(rows)
-            tail += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + size, number, size) + rows.tobytes()
+            places[number] = start + len(chunk) + len(tail)
+            tail += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + rows.nbytes, number, rows.nbytes) + rows.tobytes()
         self._append(chunk + tail)
         entry = ChunkIndex(
             len(chunk),
@@ -227,15 +225,15 @@ class RecordingWriter:
             message_index_length=len(tail),
             message_index_offsets=places,
             message_start_time=begin,
-            uncompressed_size=len(messages),
+            uncompressed_size=size,
         )
         self._span = (min(begin, self._span[0]), max(end, self._span[1])) if self._chunks else (begin, end)
         self._chunks.append(_bytes(entry))
         for number in places:
             self._counts[number] += index.shape[1]
 
-    def _append(self, data: bytes) -> None:
-        """Write data whole, or leave the file as it was."""
+    def _append(self, data: bytes) -> int:
+        """Write data whole, or leave the file as it was; returns where it begins."""
         rest = memoryview(data)
         try:
             while rest:
@@ -245,6 +243,7 @@ class RecordingWriter:
             self._file.seek(self.size)
             raise _cannot_write(error, self.path) from error
         self.size += len(data)
+        return self.size - len(data)
 
     def _summary(self) -> bytes:
         """Make the end of the file: what it holds, and where."""
@@ -264,9 +263,9 @@ class RecordingWriter:
         known = (*self._schemas.values(), *self._channels, statistics)
         places = (*self._attached, *self._texts)
         summary = b"".join((*map(_bytes, known), *self._chunks, *map(_bytes, places)))
-        head = struct.pack("<BQQQ", Opcode.FOOTER, 20, begin, 0)
-        footer = Footer(begin, 0, zlib.crc32(head, zlib.crc32(summary)))
-        return end + summary + _bytes(footer) + MCAP0_MAGIC
+        footer = _bytes(Footer(begin, 0, 0))[:-4]  # without its checksum, which includes the rest of it
+        checksum = zlib.crc32(footer, zlib.crc32(summary))
+        return end + summary + footer + struct.pack("<I", checksum) + MCAP0_MAGIC
 
 
 def save(recording: Recording, path: Path) -> None:
@@ -278,10 +277,7 @@ def save(recording: Recording, path: Path) -> None:
     """
     writer = RecordingWriter(path, recording.attachments, recording.metadata)
     try:
-        groups: dict[bytes, list[Channel]] = {}
-        for channel in recording.channels.values():
-            groups.setdefault(np.asarray(channel.times, dtype=float).tobytes(), []).append(channel)
-        for channels in groups.values():
+        for channels in together(recording.channels.values()):
             _save_together(writer, channels)
         for event in recording.events:
             writer.event(event)
