@@ -6,7 +6,8 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -169,26 +170,13 @@ class SlurmEngine(WorkerEngine):
                 job.cancel(check=False)
 
 
-class needs:  # noqa: N801 reads as a statement
-    """Raise a clear error where a package is missing that an engine needs.
-
-    Args:
-        package: The package.
-        project: Its name for pip.
-    """
-
-    def __init__(self, package: str, project: str):
-        self._package = package
-        self._project = project
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: Any, error: BaseException | None, _: Any) -> None:
-        if isinstance(error, ModuleNotFoundError):
-            raise StudyError(
-                f"the package '{self._package}' is missing", expected=f"pip install {self._project}"
-            ) from None
+@contextmanager
+def needs(package: str, project: str) -> Iterator[None]:
+    """Raise a clear error where a package is missing that an engine needs; `project` is its name for pip."""
+    try:
+        yield
+    except ModuleNotFoundError:
+        raise StudyError(f"the package '{package}' is missing", expected=f"pip install {project}") from None
 
 
 def worker_command(folder: Path, follow: bool) -> list[str]:

@@ -243,7 +243,7 @@ class StudyFolder:
         temporary = folder / f"{RESULT}.{uuid.uuid4().hex}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            temporary.write_text(json.dumps(result.as_json(), indent=1, sort_keys=True))
+            temporary.write_bytes(json.dumps(result.as_json(), indent=1, sort_keys=True).encode())
             with suppress(FileExistsError):
                 os.link(temporary, folder / RESULT)
         except OSError as error:
@@ -343,7 +343,7 @@ class StudyFolder:
         writer.writerows(rows)
         files = [self.path / "table.csv"]
         try:
-            write_whole(files[0], text.getvalue())
+            write_whole(files[0], text.getvalue().encode())
             with suppress(ImportError):
                 files.append(_write_parquet(self.path / "table.parquet", head, rows))
         except OSError as error:
@@ -366,7 +366,7 @@ class StudyFolder:
             return os.fstat(now.fileno()).st_mtime - claim.stat().st_mtime > CLAIM_TIMEOUT
 
 
-def write_whole(file: Path, text: str) -> None:
+def write_whole(file: Path, content: bytes) -> None:
     """Replace a file by another one at once, so that readers never see a part of it.
 
     Raises:
@@ -374,7 +374,7 @@ def write_whole(file: Path, text: str) -> None:
     """
     temporary = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
     try:
-        temporary.write_text(text)
+        temporary.write_bytes(content)
         temporary.replace(file)
     finally:
         temporary.unlink(missing_ok=True)
@@ -386,7 +386,7 @@ def _write(folder: Path, data: StudyFile) -> None:
     Raises:
         OSError: It cannot be written.
     """
-    write_whole(folder / STUDY, json.dumps(data.model_dump(), indent=1))
+    write_whole(folder / STUDY, json.dumps(data.model_dump(), indent=1).encode())
 
 
 def _reason(error: Exception) -> str:
@@ -436,13 +436,9 @@ def _write_parquet(file: Path, head: list[str], rows: list[dict[str, Any]]) -> P
             columns[name] = pyarrow.array(values)
         except (pyarrow.ArrowException, OverflowError):  # values of different types
             columns[name] = pyarrow.array([None if value is None else str(value) for value in values])
-    table = pyarrow.table(columns)
-    temporary = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
-    try:
-        parquet.write_table(table, temporary)
-        temporary.replace(file)
-    finally:
-        temporary.unlink(missing_ok=True)
+    content = io.BytesIO()
+    parquet.write_table(pyarrow.table(columns), content)
+    write_whole(file, content.getvalue())
     return file
 
 

@@ -71,7 +71,7 @@ def write_report(folder: StudyFolder) -> Path:
     page += f"<style>{STYLE}</style></head><body>{''.join(parts)}<script>{SORT}</script></body></html>\n"
     file = folder.path / "report.html"
     try:
-        write_whole(file, page)
+        write_whole(file, page.encode())
     except OSError as error:
         raise StudyError(
             f"it cannot be written: {error.strerror}", where=str(file), expected="a folder with room, of this user"
@@ -163,16 +163,14 @@ def _of_good(rows: Sequence[Row], measure: str) -> np.ndarray:
 def _map(rows: Sequence[Row], first: str, second: str, measure: str, values: np.ndarray) -> "Figure":
     """Draw the mean of a measure over two variables."""
     (across, across_names), (up, up_names) = _levels(rows, first), _levels(rows, second)
-    sums = np.zeros((len(up_names), len(across_names)))
-    counts = np.zeros_like(sums)
+    shape = (len(up_names), len(across_names))
     finite = np.isfinite(values)
-    np.add.at(sums, (up[finite], across[finite]), values[finite])
-    np.add.at(counts, (up[finite], across[finite]), 1)
-    with np.errstate(invalid="ignore"):
-        mean = sums / np.where(counts > 0, counts, np.nan)
+    place = np.ravel_multi_index((up[finite], across[finite]), shape)
+    with np.errstate(invalid="ignore"):  # NaN where there is no run
+        mean = np.bincount(place, values[finite], math.prod(shape)) / np.bincount(place, minlength=math.prod(shape))
     figure = new_figure(3.4, 2.6)
     axes = figure.add_subplot()
-    image = axes.imshow(mean, origin="lower", aspect="auto", cmap="viridis")
+    image = axes.imshow(mean.reshape(shape), origin="lower", aspect="auto", cmap="viridis")
     axes.set_xticks(range(len(across_names)), across_names, rotation=45)
     axes.set_yticks(range(len(up_names)), up_names)
     axes.set_xlabel(first)

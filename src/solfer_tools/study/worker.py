@@ -179,7 +179,7 @@ def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
             os.dup2(stderr, stream)
         gc.freeze()
         record, changes = study.study.settings(run.variations)
-        write_whole(study.of(run) / CONFIGURATION_FILE, _texts(run, record, changes))
+        write_whole(study.of(run) / CONFIGURATION_FILE, _texts(run, record, changes).encode())
         study.finish(run, _result(study, run, record, changes=changes))
         code = 0
     except (SolferError, SolferErrors) as error:

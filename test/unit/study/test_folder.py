@@ -158,7 +158,7 @@ def test_a_full_disk_is_one_error_and_leaves_the_plan_as_it_is(folder, monkeypat
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pathlib.Path.write_text", full)
+    monkeypatch.setattr("pathlib.Path.write_bytes", full)
     for act in (
         lambda: folder.finish(folder.runs[0], Result("")),
         lambda: folder.add(folder.runs[0]),
