@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import UnknownName
-from solfer.recording.model import Channel, Recording
+from solfer.recording.kinds import NAMED
+from solfer.recording.model import COLUMNS_KIND, Channel, Recording
 
 HALF_OF_RESOLUTION = 5e-10
 """Half of the resolution of times in a file [s]."""
@@ -59,7 +60,8 @@ def _narrowed(channel: Channel, places: list[int]) -> Channel:
         return channel
     columns = tuple(channel.columns[place] for place in places)
     units = tuple(channel.units[place] for place in places)
-    return dataclasses.replace(channel, columns=columns, units=units, values=channel.values[:, places])
+    kind = COLUMNS_KIND if channel.kind in NAMED else channel.kind  # whose messages hold all columns
+    return dataclasses.replace(channel, kind=kind, columns=columns, units=units, values=channel.values[:, places])
 
 
 def span(recording: Recording) -> tuple[float, float]:

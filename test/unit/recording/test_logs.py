@@ -181,6 +181,16 @@ def test_each_kind_fits_into_a_bag(kind, tmp_path, monkeypatch, capsys):
     assert all(f"={float(number)!r}" in text for number in saved.values[0])
 
 
+def test_one_column_of_a_point_is_a_column(file, recording, capsys):
+    assert main(["log", "cut", file, "-o", "part.mcap", "-c", "arm/log/com/x"]) == 0
+    part = read(Path("part.mcap"))["arm/log/com"]
+    assert (part.kind, part.columns) == (COLUMNS_KIND, ("x",))
+    np.testing.assert_array_equal(part.values, recording["arm/log/com"].values[:, :1])
+    assert main(["log", "export", file, "--bag", "out.bag", "-c", "arm/log/com/x"]) == 0
+    with Reader(Path("out.bag")) as bag:
+        assert {connection.msgtype for connection in bag.connections} == {"std_msgs/msg/Float64MultiArray"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
