@@ -24,10 +24,7 @@ POSITIONAL = 6
 KERNELS = {
     "advance",
     "approach",
-    "bear",
-    "carry",
     "count_kept",
-    "descend",
     "gather",
     "objective",
     "self._check",

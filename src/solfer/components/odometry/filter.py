@@ -332,7 +332,7 @@ class FilteredOdometry:
         spread_time = 0.1  # [s] over which each wheel's innovations are averaged
         yaw_rate = rate - covered * (kalman.bias + kalman.noise)
         keep = spread_time / (spread_time + period)
-        filter_kernel.learn_spreads(motion.address, kalman.velocity, yaw_rate, consensus.inliers, keep)
+        filter_kernel.learn_spreads(motion.block.address, kalman.velocity, yaw_rate, consensus.inliers, keep)
 
     def _tolerance(self, speed: float) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
@@ -383,7 +383,7 @@ class FilteredOdometry:
         forgetting_time = 2.0  # [s] in which a wheel's rise is forgotten while it touches
         forget = 1.0 - period / forgetting_time
         clearance = self._tags.clearance
-        filter_kernel.find_lifted(motion.address, ground.address, yaw, base.turned, wheels.normal, clearance, forget)
+        filter_kernel.find_lifted(motion.block.address, ground.address, yaw, base.turned, wheels.normal, clearance, forget)
 
     def _find_velocity(self) -> None:
         """Compute the velocities of this moment."""

@@ -25,7 +25,7 @@ class WheelMotion:
         trusted: The same if it also rolls, shape (k,).
         spreads: Spread of each wheel's innovations, shape (k,).
         variances: Variance of each wheel's speed, shape (k,) [m^2/s^2].
-        address: What compiled functions get of these.
+        block: What compiled functions get of these.
     """
 
     def __init__(self, wheels: Wheels):
@@ -36,7 +36,7 @@ class WheelMotion:
         self._jacobian_before = np.zeros_like(wheels.jacobian)
         self.step, self._joints_before = np.zeros((2, wheels.joints))
         self.arm, self.tilting = np.zeros((2, 3))
-        self._block = MemoryBlock(
+        self.block = MemoryBlock(
             filter_kernel.MOTION,
             count=count,
             joint_count=wheels.joints,
@@ -54,7 +54,6 @@ class WheelMotion:
             tilting=self.tilting,
             speeds=self.speeds,
         )
-        self.address = self._block.address
 
     def find_step(self) -> None:
         """Compute the steps of the joints since the last `remember`."""
@@ -77,7 +76,7 @@ class WheelMotion:
 
     def measure(self, turned: np.ndarray) -> None:
         """Compute the displacements by a rotation of the base, shape (3,) [rad]."""
-        filter_kernel.measure_displacements(self.address, turned)
+        filter_kernel.measure_displacements(self.block.address, turned)
 
     def mean_height(self) -> float:
         """Return the height of the contacts above the base's origin, mean of the wheels that touch [m]."""
