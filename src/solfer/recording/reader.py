@@ -188,7 +188,9 @@ class _Reader:
                 message = Message.read(ReadDataStream(io.BytesIO(content)), len(content))
                 self._events.append(event_of(message.data, message.log_time))
             return
-        rows = data[places[:, None] + np.arange(int(lengths[0]))] if np.all(lengths == lengths[0]) else data[:0]
+        rows = np.zeros((0, CONTENT), np.uint8)  # of unequal lengths none has the layout of the topic, see `_stacked`
+        if np.all(lengths == lengths[0]):
+            rows = data[places[:, None] + np.arange(int(lengths[0]))]
         stamps = np.ascontiguousarray(rows[:, CONTENT - 20 : CONTENT - 8]).view(_ROW)[:, 0]
         self._rows.setdefault(number, []).append((stamps, rows[:, CONTENT:]))
 

@@ -89,17 +89,34 @@ def test_a_huge_length_takes_no_memory(file, size):
     assert any("damaged rows" in sentence for sentence in read(file).missing)
 
 
-def test_a_chunk_with_a_message_beyond_its_end_is_an_error(file):
-    def beyond(old):
-        messages = bytearray(zstandard.decompress(old[44:]))
-        messages[1:9] = struct.pack("<Q", 1 << 62)
-        packed = zstandard.compress(bytes(messages))
-        head = old[:16] + struct.pack("<QI", len(messages), zlib.crc32(messages)) + old[28:36]
-        return head + struct.pack("<Q", len(packed)) + packed
+def with_messages(old, change):
+    """Return a chunk whose messages are changed, with their checksum."""
+    messages = change(zstandard.decompress(old[44:]))
+    packed = zstandard.compress(messages)
+    head = old[:16] + struct.pack("<QI", len(messages), zlib.crc32(messages)) + old[28:36]
+    return head + struct.pack("<Q", len(packed)) + packed
 
-    changed(file, 6, beyond)
+
+def test_a_chunk_with_a_message_beyond_its_end_is_an_error(file):
+    def beyond(messages):
+        return messages[:1] + struct.pack("<Q", 1 << 62) + messages[9:]
+
+    changed(file, 6, lambda old: with_messages(old, beyond))
     with pytest.raises(RecordingError, match="a chunk of"):
         read(file)
+
+
+def test_messages_of_unequal_length_are_named(file):
+    """Their topic has no row of that chunk, and the rest of the file is read."""
+
+    def longer(messages):
+        end = 9 + struct.unpack_from("<Q", messages, 1)[0]
+        return messages[:1] + struct.pack("<Q", end - 9 + 8) + messages[9:end] + bytes(8) + messages[end:]
+
+    changed(file, 6, lambda old: with_messages(old, longer))
+    found = read(file)
+    assert any("do not have the layout of their topic" in sentence for sentence in found.missing)
+    assert len(found["arm/a"].times) == 0
 
 
 def test_zeros_behind_the_beginning_are_an_error_at_once(tmp_path, file):
