@@ -91,7 +91,7 @@ def test_a_repeated_message_is_no_fault(repeated, late):
     clock = SenderClock()
     for step in range(1, 500):
         stamp = CLOCK + PERIOD * step
-        clock.time(stamp, PERIOD * step - (late if step > 1 else 0.0))
+        assert clock.time(stamp, PERIOD * step - (late if step > 1 else 0.0)) == stamp
         for _ in range(repeated if step == 1 else 1):
             assert clock.time(stamp, PERIOD * step) == stamp
     assert not clock.is_distrusted and not clock.fault

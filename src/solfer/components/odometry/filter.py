@@ -383,7 +383,9 @@ class FilteredOdometry:
         forgetting_time = 2.0  # [s] in which a wheel's rise is forgotten while it touches
         forget = 1.0 - period / forgetting_time
         clearance = self._tags.clearance
-        filter_kernel.find_lifted(motion.block.address, ground.address, yaw, base.turned, wheels.normal, clearance, forget)
+        filter_kernel.find_lifted(
+            motion.block.address, ground.block.address, yaw, base.turned, wheels.normal, clearance, forget
+        )
 
     def _find_velocity(self) -> None:
         """Compute the velocities of this moment."""

@@ -214,8 +214,8 @@ class Targets:
             errors[2:] = 0.0
         first = 0 if self._base.is_followed else 2
         last = 2 + self._vertices.is_followed * self._count
-        going = references.motion, references.vertex_velocity
-        self.ratio = approach(errors, self._limits, *going, first, last, LEAD, passed)
+        vertex_velocity = references.vertex_velocity
+        self.ratio = approach(errors, self._limits, references.motion, vertex_velocity, first, last, LEAD, passed)
         for stream, ends, rates in ((self._base, base_ends, moving[:2]), (self._vertices, vertices_end, moving[2:])):
             stream.age += passed
             if ends and not any(rate.any() for rate in rates):

@@ -6,7 +6,7 @@ AHEAD = 1.5
 """Periods by which a stamp may be ahead of all others at its arrival: transports are no faster than they have been."""
 
 PAUSE = 0.5
-"""Time without a message after which stamps are compared with nothing: another process may send now [s]."""
+"""Time without a new stamp after which stamps are compared with nothing: another process may send now [s]."""
 
 AVERAGED = 100
 """Messages over which periods and delays are averaged."""
@@ -17,7 +17,8 @@ class SenderClock:
 
     That is its stamp, unless stamps go back by more than half a period, or ahead by more than 1.5, or are no numbers,
     or zero where others are not. After such a stamp arrivals count for 1 s, smoothed, with the mean delay of before.
-    Where a clock was set, times go on from there. After a pause of 0.5 s stamps count as those of the first message.
+    Where a clock was set, times go on from there. A stamp after 0.5 s without a new one counts as that of the first
+    message.
 
     A stamp and the arrival of its message need not be of one clock, nor of clocks that go equally fast.
 

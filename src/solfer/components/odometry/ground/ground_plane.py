@@ -25,7 +25,7 @@ class GroundPlane:
         slope: Slope of the plane through the contacts, shape (2,); live.
         rise: Rise of each wheel above the others, shape (k,) [m]; live.
         lifted: Which wheels are lifted, shape (k,); live.
-        address: What compiled functions get of these three.
+        block: What compiled functions get of these three.
     """
 
     def __init__(self, motion: WheelMotion, kalman: WheelInertialFilter, level: float):
@@ -37,10 +37,9 @@ class GroundPlane:
         self.slope = np.zeros(2)
         self.rise = np.zeros(count)
         self.lifted = np.zeros(count, dtype=bool)
-        self._block = MemoryBlock(
+        self.block = MemoryBlock(
             filter_kernel.GROUND, count=count, slope=self.slope, rise=self.rise, lifted=self.lifted
         )
-        self.address = self._block.address
         self._floor = math.nan
         self._floor_variance = 0.0
         self._samples = 0
