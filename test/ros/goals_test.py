@@ -13,7 +13,7 @@ import rospy
 import rostest
 from actionlib.msg import TestActionGoal
 from actionlib_msgs.msg import GoalID, GoalStatusArray
-from system import START, wait_for
+from system import SOAKS, START, wait_for
 
 sys.path.insert(0, str(Path(os.path.realpath(__file__)).parents[1]))
 
@@ -29,7 +29,7 @@ from support.unit.goal_sequences import (  # noqa: E402
 from solfer.middleware.ros import RosMiddleware, RosNode  # noqa: E402
 from solfer.transport.declared.action_server import ActionServer  # noqa: E402
 
-SEQUENCES, LENGTH, SEED = 20, 4, 2026
+SEQUENCES, LENGTH, SEED = 20 if SOAKS else 8, 4, 2026
 TICK = 0.1
 """Time between two events [s]."""
 

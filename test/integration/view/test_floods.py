@@ -34,7 +34,7 @@ motion: {{function: "builtins:print"}}
 settle: 2.0
 duration: 600.0
 """
-SPAN = 1.5
+SPAN = 1.0
 """Of a flood [s]."""
 
 LONGEST_GAP = 0.5
@@ -201,6 +201,7 @@ CHANNEL = {"topic": "/a", "encoding": "json", "schemaName": "a"}
 OPCODES = {"pings": Opcode.PING, "pongs": Opcode.PONG}
 
 
+@pytest.mark.daily(10)
 @pytest.mark.parametrize("kind", FLOODS)
 def test_a_flood_neither_delays_others_nor_stays(served, kind):
     """As fast as the socket takes them, from a sender that reads nothing."""
