@@ -276,10 +276,10 @@ def one_byte_each(connections):
 
 
 SILENT = {
-    "nothing": (500, lambda _: None),
-    "a part of a request": (500, lambda those: [each.sendall(b"GET / HTTP/1.1\r\nHost:") for each in those]),
-    "half-closed": (200, lambda those: [each.shutdown(socket.SHUT_WR) for each in those]),
-    "slow": (100, one_byte_each),
+    "nothing": (200, lambda _: None),
+    "a part of a request": (200, lambda those: [each.sendall(b"GET / HTTP/1.1\r\nHost:") for each in those]),
+    "half-closed": (100, lambda those: [each.shutdown(socket.SHUT_WR) for each in those]),
+    "slow": (50, one_byte_each),
 }
 
 
