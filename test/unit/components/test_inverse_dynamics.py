@@ -197,6 +197,7 @@ def test_torques_balance_accelerations_and_forces():
 
 @pytest.mark.parametrize(("spread", "speed", "scale"), [(0.02, 0.02, 1.0), (0.1, 0.3, 0.5)])
 def test_torques_are_those_of_a_second_computation(spread, speed, scale):
+    """As are the demands: accelerations of tasks, with their drift, and of contacts, which settle."""
     component, random = started(limits={"torque_scale": scale}), np.random.default_rng(2)
     second, active = Second(component, scale), 0
     for _ in range(50):
@@ -204,38 +205,14 @@ def test_torques_are_those_of_a_second_computation(spread, speed, scale):
         cycle(component)
         problem = component.problem
         acceleration, force, torque = second.solve(component.problem.bounds)
+        jacobian, desired = second.tasks(component.model.state.position, component.model.state.velocity)
+        assert np.abs(component._demand.stack.jacobian - jacobian).max() < 1e-12
+        assert np.abs(component._demand.tasks - desired).max() < 1e-8
         assert not component.is_holding
         assert np.abs(problem.torque - torque)[6:].max() < 1e-6
         assert np.abs(problem.acceleration - acceleration).max() < 1e-6 and np.abs(problem.force - force).max() < 1e-6
         active += np.count_nonzero(problem.active)
     assert scale == 1.0 or active > 100
-
-
-def test_contacts_accelerate_as_their_velocities_change():
-    """Along the accelerations, velocities of the wheels at the ground vanish with the gain `settle`."""
-    component, random = started(), np.random.default_rng(3)
-    second, step = Second(component), 1e-6
-    for _ in range(10):
-        draw(component, random)
-        cycle(component)
-        q, v, a = component.model.state.position, component.model.state.velocity, component.problem.acceleration
-        ahead, back = (
-            second.contact_jacobian(q + sign * step * v + 0.5 * step**2 * a) @ (v + sign * step * a)
-            for sign in (1.0, -1.0)
-        )
-        change = (ahead - back) / (2.0 * step)
-        assert np.abs(change + SETTLE * second.contact_jacobian(q) @ v).max() < 1e-6
-
-
-def test_tasks_drift_as_their_rates_change():
-    component, random = started(), np.random.default_rng(4)
-    second = Second(component)
-    draw(component, random)
-    cycle(component)
-    state = component.model.state
-    jacobian, desired = second.tasks(state.position, state.velocity)
-    assert np.abs(component._demand.stack.jacobian - jacobian).max() < 1e-12
-    assert np.abs(component._demand.tasks - desired).max() < 1e-8
 
 
 def test_it_stands_on_its_weight():

@@ -227,22 +227,15 @@ def test_joints_stay_within_their_limits(make):
     assert 0.999 < highest <= 1.0 + 1e-6
 
 
-def test_the_base_stops_without_messages(make):
+@pytest.mark.parametrize(("left_out", "silent", "braking"), [(0, 98, 140), (1, 44, 70)])
+def test_the_base_stops_without_messages(make, left_out, silent, braking):
+    """Silence and braking, 0.2 m/s at 0.3 m/s2, count by the clock, also where cycles are left out."""
     component = make()
+    component.passed = (1 + left_out) * PERIOD
     cycle(component, 200, (0.2, 0.0, 0.0))
-    cycle(component, 98)
+    cycle(component, silent)
     assert_allclose(component.references.velocity[0], 0.2)
-    cycle(component, 202)  # 1.5 s after the last message
-    assert_allclose(component.references.velocity, 0.0)
-
-
-def test_silence_and_braking_count_by_the_clock(make):
-    component = make()
-    component.passed = 2.0 * PERIOD  # every second cycle is left out
-    cycle(component, 200, (0.2, 0.0, 0.0))
-    cycle(component, 44)  # 0.54 s after the last message
-    assert_allclose(component.references.velocity[0], 0.2)
-    cycle(component, 70)  # 0.2 m/s at 0.3 m/s2
+    cycle(component, braking)
     assert not component.references.velocity.any()
 
 
@@ -256,22 +249,6 @@ def test_wheels_stay_where_silence_leaves_them(make):
     turned = {silent: abs(each._steering.measured).max() for silent, each in components.items()}
     assert turned[True] < 0.2 < 0.5 < turned[False], turned
     assert not components[True].references.velocity.any()
-
-
-def test_vertices_without_messages_are_reported(make, caplog):
-    component = make()
-    component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2))
-    cycle(component, 150)
-    assert "no velocity for 0.55 s" in caplog.text
-    assert not component.references.vertex_velocity.any()
-
-
-def test_a_velocity_that_is_not_finite_is_refused(make):
-    component = make()
-    with pytest.raises(NotFinite, match="a velocity of"):
-        move(component, np.nan, 0.0, 0.0)
-    cycle(component, 10)
-    assert_allclose(component.references.velocity, 0.0)
 
 
 def speeds_and_changes(component, count, of):
@@ -416,7 +393,7 @@ def test_it_says_where_its_references_are(make):
         get.handler(GetReference("vertexes"))
 
 
-def test_vertices_by_the_originals_topic(make):
+def test_vertices_by_the_originals_topic(make, caplog):
     component = make()
     support = named(component.topics(), "wheels_support")
     references = component.references
@@ -426,7 +403,7 @@ def test_vertices_by_the_originals_topic(make):
         cycle(component, 20)
     assert_allclose(references.vertex_velocity[:, 1], (-0.02, 0.02, -0.02, 0.02))
     cycle(component, 150)  # without messages
-    assert not references.vertex_velocity.any()
+    assert not references.vertex_velocity.any() and "no velocity for 0.55 s" in caplog.text
     support.handler(WheelsSupport(position=tuple(start.ravel())))
     cycle(component, 800)
     assert_allclose(references.vertices[:, :2], start[:, :2], atol=1e-9)
@@ -469,6 +446,7 @@ def test_velocities_are_bounded(make):
         ("wheels_support", WheelsSupport(velocity=(1e20,) * 12), NotFinite),
         ("wheels_support", WheelsSupport(position=(1e308,) * 12), NotFinite),
         ("cmd_vel", Twist(Vector(1.7e308, 1.7e308), Vector()), ComponentError),
+        ("cmd_vel", Twist(Vector(np.nan), Vector()), NotFinite),
     ],
 )
 def test_messages_that_do_not_fit_change_nothing(make, topic, message, kind):

@@ -125,12 +125,14 @@ def test_a_reference_is_in_the_count_of_the_driver():
         assert made.robot.command.position[6] == pytest.approx(desired, abs=1e-9)
 
 
-def test_the_motor_side_has_a_count_of_its_own():
+@pytest.mark.parametrize(("begin", "is_alone"), [(0.0, False), (40.0, True)])
+def test_the_motor_side_has_a_count_of_its_own(begin, is_alone):
     made = scene()
     motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
     writer = made.context.middleware.writer("motors", "solfer/JointCommand")
-    for angle in motion():
-        made.measure(wrapped(angle))
+    for angle in motion() + begin:
+        if not is_alone:
+            made.measure(wrapped(angle))
         writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
         motor.run()
         assert made.robot.motor.position[6] == angle
@@ -158,16 +160,6 @@ def test_the_motor_side_begins_on_the_turn_of_the_link_side(count, turns, is_lin
             made.measure(count(angle))
         deflections.append(made.robot.motor.position[6] - made.robot.state.position[6])
     assert deflections[1:] == pytest.approx(np.full(799, 0.02), abs=1e-9)
-
-
-def test_a_motor_side_that_is_alone_has_a_count_of_its_own():
-    made = scene()
-    motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
-    writer = made.context.middleware.writer("motors", "solfer/JointCommand")
-    for angle in motion() + 40.0:
-        writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
-        motor.run()
-        assert made.robot.motor.position[6] == angle
 
 
 @pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
