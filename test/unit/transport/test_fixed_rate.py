@@ -12,7 +12,8 @@ class OversleepingClock:
     """Sleeps until a deadline, and so much longer as a test says."""
 
     def __init__(self, time=0.0):
-        self.time, self.oversleeps = time, {}
+        self.time = time
+        self.oversleeps = {}
 
     def now(self):
         return self.time
@@ -23,7 +24,9 @@ class OversleepingClock:
 
 def run(clock, cycles, costs=(), catch_up=0.0):
     """Run a loop; returns it, and when each cycle began, how late that was and how many periods it left out."""
-    loop, begins, costs = FixedRateLoop(clock, RATE, catch_up), [], dict(costs)
+    loop = FixedRateLoop(clock, RATE, catch_up)
+    begins = []
+    costs = dict(costs)
 
     def cycle(late, skipped):
         begins.append((clock.time, late, skipped))
