@@ -215,7 +215,7 @@ class SensorTrial:
         stopped = {name: plugin for name, plugin in world.plugins.items() if plugin.life is not running}
         outcome.stopped = list(stopped)
         outcome.named = [(time - self.begin_of_fault, text) for time, text in saying.said]
-        reasons = [managed.reason for managed in world.together.plugins if managed.reason]
+        reasons = [managed.reason for managed in world.set.plugins if managed.reason]
         outcome.named += [(duration, reason) for reason in reasons]
         outcome.obeys = "locomotion" not in stopped and outcome.rest >= OBEYS * MOTIONS[self.motion][0]
         reasons += [f"{name}: {plugin.health()[1]}" for name, plugin in stopped.items()]

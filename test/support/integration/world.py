@@ -1,6 +1,6 @@
 """CENTAURO and plugins in one process on a virtual clock."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, wraps
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from solfer.config import load
 from solfer.middleware.memory import Bus, FaultsRecord, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
-from solfer.plugins import Plugin, Registry, generate
+from solfer.plugins import Plugin, PluginSet, Registry, generate, generate_shared
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.bullet import robot as bullet_robot
 from solfer.simulation.bundle_records import BundleRecord
@@ -99,6 +99,15 @@ class World:
         plugin = generate(configuration, MemoryMiddleware(self.bus, name), generator)
         self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle(), cycles=True)
         return plugin
+
+    def together(self, listed: Sequence) -> PluginSet:
+        """Make plugins that share what they can in one loop, with a node each, not yet started."""
+        members = generate_shared(listed, lambda each: MemoryMiddleware(self.bus, each.module.name), Registry())
+        return PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires)
+
+    def pause(self, paused: bool) -> None:
+        """Let the simulation stand still, or go on."""
+        self.bus.call("simulator/pause", data=paused)
 
     def ask(self, service: str = "joint_states/trajectory", **fields):
         """Call a service and let its owner answer."""

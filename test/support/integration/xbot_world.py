@@ -1,5 +1,6 @@
 """CENTAURO and plugins in one process on a virtual clock, with their pipes in shared memory."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,13 @@ from support.integration.world import CONFIG, ROBOT, World, perfect
 from solfer.config import load
 from solfer.middleware.memory import FaultsRecord
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.plugins import Plugin, Registry, generate
+from solfer.plugins import Plugin, Registry, generate, generate_shared
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.simulation import Simulation, SimulationServer
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
+from solfer.transport.lower_level import Answer
+from solfer.transport.middleware import SWITCH_ONE, Flag
 
 ON_BOTH = pytest.mark.parametrize("world", ("ROS", pytest.param("XBOT", marks=pytest.mark.soak)), indirect=True)
 """For tests that hold with each `middleware:`; nothing else changes. ROS stands for a `World` in memory.
@@ -59,6 +64,26 @@ class XbotWorld(World):
         self.bus.every(1.0 / plugin.rate, plugin.cycle)
         self.offers(plugin)
         return plugin
+
+    def executor(self, listed: Sequence, rules: ExecutorRules | None = None) -> Executor:
+        """Make plugins that share what they can under an executor, with a node each, which are not yet started."""
+        nodes = {each.configuration.module.name: self.node(each.configuration.module.name) for each in listed}
+        members = generate_shared(listed, lambda each: nodes[each.module.name], Registry())
+        for plugin in members.plugins:
+            self.offers(plugin)
+        return Executor(
+            members.plugins,
+            self.node("xbot"),
+            EmergencyStopLatch(self._folder),
+            rules=rules or ExecutorRules(),
+            polls=[members.sharing.turns.next, *(node.poll for node in nodes.values())],
+            requires=members.requires,
+            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * self.bus.time)),
+        )
+
+    def pause(self, paused: bool) -> None:
+        """See `World.pause`."""
+        self._asker.request("simulator/pause", SWITCH_ONE, Flag(paused), Answer, 1.0)
 
     def offers(self, plugin: Plugin) -> None:
         """Note the services of a plugin, for `ask`."""

@@ -9,9 +9,7 @@ from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
-from solfer.plugins import PluginSet, Registry, generate, generate_shared
-from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorTelemetry
+from solfer.plugins import Registry, generate
 from solfer_tools.demo.waving import FRAME, HANDS, Waving
 from solfer_tools.navigation import Navigation, ScenarioCourse
 from solfer_tools.scenarios import Player, Scenario
@@ -94,7 +92,7 @@ class Nodes(Driven, World):
     """As nodes under ROS do it: `hands` by itself, and the shared plugin.
 
     Attributes:
-        together: The plugins of the shared one.
+        set: The plugins of the shared one.
     """
 
     system = "SM"
@@ -108,9 +106,7 @@ class Nodes(Driven, World):
         hands = generate(alone, MemoryMiddleware(self.bus, "hands"), generator)
         self.bus.every(1.0 / hands.rate, lambda: hands.cycle(), cycles=True)  # which tests replace
         shared = load_shared(file, "full_control", default=registry.configuration, system=self.system)
-        members = generate_shared(shared.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry)
-        together = PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires)
-        self.together = together
+        self.set = together = self.together(shared.plugins)
         together.start()
         self.rate = together.rate
         self.bus.every(1.0 / self.rate, lambda: together.cycle(), cycles=True)
@@ -136,22 +132,8 @@ class Figure5Layer(Driven, BridgedWorld):
         listed = layer.load()
         super().__init__(folder, [each.configuration for each in listed], faults)
         self.run(0.5)
-        nodes = {}
-
-        def node_of(configuration):
-            nodes[configuration.module.name] = node = self.node(configuration.module.name)
-            return node
-
-        members = generate_shared(listed, node_of, registry)
-        self.executor = Executor(
-            members.plugins,
-            self.node("xbot"),
-            EmergencyStopLatch(folder),
-            polls=[members.sharing.turns.next, *(node.poll for node in nodes.values())],
-            requires=members.requires,
-            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * self.bus.time)),
-        )
-        self.executor.switchboard.commit(self.executor.switchboard.plan(layer.start))
-        self.rate = self.executor.rate
-        self.bus.every(1.0 / self.rate, self.executor.cycle, cycles=True)
-        self.plugins = {managed.name: managed.plugin for managed in self.executor.plugins}
+        self.layer = self.executor(listed)
+        self.layer.switchboard.commit(self.layer.switchboard.plan(layer.start))
+        self.rate = self.layer.rate
+        self.bus.every(1.0 / self.rate, self.layer.cycle, cycles=True)
+        self.plugins = {managed.name: managed.plugin for managed in self.layer.plugins}

@@ -16,12 +16,9 @@ from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.middleware.bridge import Bridge
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import PluginSet, Registry, generate, generate_shared
+from solfer.plugins import PluginSet, Registry, generate
 from solfer.plugins.outputs.start_blend import SHORTEST
-from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
-from solfer.transport.lower_level import Answer
-from solfer.transport.middleware import SWITCH_ONE, Flag
+from solfer.realtime.executor import ExecutorRules
 from solfer_tools.demo.driving import COURSE_RATE
 from solfer_tools.demo.waving import Waving
 from solfer_tools.navigation import Navigation, ScenarioCourse
@@ -101,7 +98,7 @@ class _Scheduled:
 
     def __init__(self, *args):
         super().__init__(*args)
-        self._pause(True)
+        self.pause(True)
         self.bus.run_until(0.1)
         self._sets = self._made()
         pipes = [
@@ -115,7 +112,7 @@ class _Scheduled:
         self.names = tuple((pipe.name, name, joint) for pipe, name in fields for joint in pipe.sent.names)
         self._numbers, self.sent = [getattr(pipe.sent, name) for pipe, name in fields], []
         self.bus.run_until(BEGIN)
-        self._pause(False)
+        self.pause(False)
         self.outside = Outside(MemoryMiddleware(self.bus, "driver"))
         self.bus.every(1.0 / COURSE_RATE, self.outside.cycle, FIRST - 2.0 * BEFORE)
         self._schedule()
@@ -140,20 +137,12 @@ class _Scheduled:
 class ScheduledNodes(_Scheduled, World):
     """As nodes, of which `full_control` has several plugins."""
 
-    def _pause(self, paused):
-        self.bus.call("simulator/pause", data=paused)
-
     def _made(self):
         registry, file = Registry(), CONFIG / "centauro.yaml"
         alone = load(file, "hands").at(PLUGINS_RATE)
         generator = registry.find("inverse_kinematics", alone.module.class_)
-        shared = load_shared(file, "full_control", default=registry.configuration)
-        members = generate_shared(shared.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry)
-        hands = generate(alone, MemoryMiddleware(self.bus, "hands"), generator)
-        return [
-            PluginSet([hands]),
-            PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires),
-        ]
+        together = self.together(load_shared(file, "full_control", default=registry.configuration).plugins)
+        return [PluginSet([generate(alone, MemoryMiddleware(self.bus, "hands"), generator)]), together]
 
 
 class ScheduledLayer(_Scheduled, BridgedWorld):
@@ -161,30 +150,11 @@ class ScheduledLayer(_Scheduled, BridgedWorld):
 
     def __init__(self, folder):
         file = with_filters_of_nodes(folder) / "figures" / "figure_5.yaml"
-        self._layer = read_layer(file, Registry().configuration).at(PLUGINS_RATE)
-        self._listed = self._layer.load()
+        self._listed = read_layer(file, Registry().configuration).at(PLUGINS_RATE).load()
         super().__init__(folder, [each.configuration for each in self._listed])
 
-    def _pause(self, paused):
-        self._asker.request("simulator/pause", SWITCH_ONE, Flag(paused), Answer, 1.0)
-
     def _made(self):
-        nodes = []
-
-        def node_of(configuration):
-            nodes.append(self.node(configuration.module.name))
-            return nodes[-1]
-
-        members = generate_shared(self._listed, node_of, Registry())
-        executor = Executor(
-            members.plugins,
-            self.node("xbot"),
-            EmergencyStopLatch(self._folder),
-            rules=ExecutorRules(blend=SHORTEST),
-            polls=[members.sharing.turns.next, *(node.poll for node in nodes)],
-            requires=members.requires,
-            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * self.bus.time)),
-        )
+        executor = self.executor(self._listed, ExecutorRules(blend=SHORTEST))
         self.bridge.cycle()
         return [executor]
 

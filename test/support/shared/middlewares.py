@@ -10,12 +10,9 @@ from solfer.components import Service
 from solfer.components.joint_states import JointStates
 from solfer.config import load_shared
 from solfer.config.loading.rt_layer import read_layer
-from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import PluginSet, Registry, generate_shared
-from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
+from solfer.realtime.executor import ExecutorRules
 from solfer.transport.lower_level import Answer, answered
-from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, NoFields
+from solfer.transport.middleware import TRIGGER, NoFields
 
 LISTED = ("upper_body", *ORDER, "wave")
 """The members of the shared plugin, in the order of their cycles."""
@@ -94,7 +91,7 @@ class _Listed:
 
     def __init__(self, file, *args):
         super().__init__(*args)
-        self._pause(True)
+        self.pause(True)
         self.set = self._made(file)
         pipes = [(plugin.name, pipe) for plugin in self._plugins() for pipe, _ in plugin.outputs.controllers]
         fields = [
@@ -108,7 +105,7 @@ class _Listed:
         self._numbers = tuple(numbers for *_, numbers in fields)
         self.sent = []
         self.bus.run_until(BEGIN)
-        self._pause(False)
+        self.pause(False)
         self.set.switchboard.commit(self.set.switchboard.plan(self.listed))
         for work in (self.set.cycle, self._note):
             self.bus.every(1.0 / self.set.rate, work, BEGIN + STEP)
@@ -141,40 +138,14 @@ class _Listed:
 class InMemory(_Listed, World):
     """CENTAURO on a bus, and the shared plugin of a file."""
 
-    def _pause(self, paused):
-        self.bus.call("simulator/pause", data=paused)
-
     def _made(self, file):
-        members = generate_shared(
-            load_shared(file).plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), Registry()
-        )
-        polls = [members.sharing.turns.next]
-        return PluginSet(members.plugins, polls=polls, requires=members.requires)
+        return self.together(load_shared(file).plugins)
 
 
 class InLayer(_Listed, XbotWorld):
     """CENTAURO in shared memory, and the shared plugin of a layer's file under its executor."""
 
-    def _pause(self, paused):
-        self._asker.request("simulator/pause", SWITCH_ONE, Flag(paused), Answer, 1.0)
-
     def _made(self, file):
-        layer, nodes, bus = read_layer(file), [], self.bus
-
-        def node_of(configuration):
-            nodes.append(self.node(configuration.module.name))
-            return nodes[-1]
-
-        members = generate_shared(layer.load(), node_of, Registry())
-        for plugin in members.plugins:
-            self.offers(plugin)
+        layer = read_layer(file)
         rules = layer.executor
-        return Executor(
-            members.plugins,
-            self.node("xbot"),
-            EmergencyStopLatch(self._folder),
-            rules=ExecutorRules(rules.blend, rules.budget, rules.overruns, rules.grace),
-            polls=[members.sharing.turns.next, *(node.poll for node in nodes)],
-            requires=members.requires,
-            telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * bus.time)),
-        )
+        return self.executor(layer.load(), ExecutorRules(rules.blend, rules.budget, rules.overruns, rules.grace))

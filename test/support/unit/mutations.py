@@ -12,93 +12,19 @@ import zstandard
 
 FOLDERS = ("support", "transport", "worlds", "robots/centauro", "robots/centauro/hardware")
 NUMBERS = (
-    0,
-    -1,
-    1,
-    99,
-    1e9,
-    1e29,
-    1e-3,
-    1e-300,
-    1e300,
-    -1e300,
-    float("nan"),
-    float("inf"),
-    float("-inf"),
-    10**17,
-    10**40,
-    -0.0,
-    0.1,
-    4000,
-    1e-12,
-)
+    0, -1, 1, 99, 1e9, 1e29, 1e-3, 1e-300, 1e300, -1e300, float("nan"), float("inf"), float("-inf"), 10**17, 10**40,
+    -0.0, 0.1, 4000, 1e-12,
+)  # fmt: skip
 WORDS = (
-    "",
-    " ",
-    "~",
-    "all",
-    "SKIP",
-    "none",
-    "../..",
-    "/",
-    ".",
-    "package://",
-    "package://solfer",
-    "$(find )",
-    "::",
-    "a::",
-    "::a",
-    "joint_states",
-    "solfer:errors",
-    "os:path",
-    "\t",
-    "\u00e4\u4f60\U0001f600",
-    "\u202e\u200b",
-    "\ufeff",
-    "\x85",
-    "\x00",
-    "x" * 5000,
-    "yes",
-    "1e3",
-    "{}",
-    "%s",
-    "a.b",
-    "null",
-    "base_link",
-    "FEEDBACK",
-    "RBDL",
-    "class",
-)
+    "", " ", "~", "all", "SKIP", "none", "../..", "/", ".", "package://", "package://solfer", "$(find )", "::", "a::",
+    "::a", "joint_states", "solfer:errors", "os:path", "\t", "\u00e4\u4f60\U0001f600", "\u202e\u200b", "\ufeff", "\x85",
+    "\x00", "x" * 5000, "yes", "1e3", "{}", "%s", "a.b", "null", "base_link", "FEEDBACK", "RBDL", "class",
+)  # fmt: skip
 LINES = (
-    "\t",
-    "- a",
-    "a: b",
-    "? x",
-    "<<: *x",
-    "&x {a: *x}",
-    "...",
-    "---",
-    "%YAML 3",
-    "!!python/object:os.system x",
-    "'",
-    '"',
-    "|",
-    ">",
-    "[" * 40,
-    "{" * 40,
-    "[" * 3000,
-    "*nobody",
-    "\x07",
-    "\ud800",
-    "@",
-    "`",
-    "# \u2028",
-    "!foo a",
-    "!foo [a]",
-    "!foo {a: 1}",
-    ": ",
-    "{a: 1, a: 2}",
-)
+    "\t", "- a", "a: b", "? x", "<<: *x", "&x {a: *x}", "...", "---", "%YAML 3", "!!python/object:os.system x", "'",
+    '"', "|", ">", "[" * 40, "{" * 40, "[" * 3000, "*nobody", "\x07", "\ud800", "@", "`", "# \u2028", "!foo a",
+    "!foo [a]", "!foo {a: 1}", ": ", "{a: 1, a: 2}",
+)  # fmt: skip
 DIGITS = ("1e400", "-1e300", "1e-300", "nan", "inf", "0", "-1", "", "1e9", "0x1F", "1_0", ".nan", "999999999999")
 KEY = re.compile(r"^( *)([A-Za-z_]\w*)(?=:)", re.MULTILINE)
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d*)?(?:e-?\d+)?(?![\w.])")
@@ -194,24 +120,11 @@ def _word(place, key, draw, places):
 
 
 def _kind(place, key, draw, _):
-    place[key] = draw.choice(
-        (
-            None,
-            True,
-            [],
-            {},
-            [place[key]],
-            {"a": place[key]},
-            [[1]],
-            str(place[key])[:50],
-            7,
-            {"list": []},
-            [None],
-            [True, "a", 1],
-            {"file": "main.yaml"},
-            {"path": "/", "file": "."},
-        )
-    )
+    kinds = (
+        None, True, [], {}, [place[key]], {"a": place[key]}, [[1]], str(place[key])[:50], 7, {"list": []}, [None],
+        [True, "a", 1], {"file": "main.yaml"}, {"path": "/", "file": "."},
+    )  # fmt: skip
+    place[key] = draw.choice(kinds)
 
 
 def _nest(place, key, draw, _):
@@ -261,22 +174,8 @@ def _letter(text, draw):
 
 ATTRIBUTE = re.compile(r'([\w:]+)="([^"]*)"')
 VALUES = (
-    "",
-    " ",
-    "0 0",
-    "0 0 0 0",
-    "nan 0 0",
-    "inf",
-    "0",
-    "-1",
-    "-0.1 1 1",
-    "1e400",
-    "0x1",
-    "one",
-    "1,2,3",
-    "&#0;",
-    "&x;",
-)
+    "", " ", "0 0", "0 0 0 0", "nan 0 0", "inf", "0", "-1", "-0.1 1 1", "1e400", "0x1", "one", "1,2,3", "&#0;", "&x;",
+)  # fmt: skip
 
 
 def _attribute(text, draw):

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from support.bullet import raw_bullet
 from support.walk.digest import Digest
-from support.walk.files import SRDF, URDF
 
 from solfer.components import Component
 from solfer.config import Configuration, load
@@ -17,8 +16,6 @@ from solfer.interfaces.port import Port
 from solfer.lower_level import LowerLevelServer
 from solfer.middleware.bridge.routes import routes
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.model import Description
-from solfer.model.urdf.cut import cut
 from solfer.numerics.rotations import quaternion_product
 from solfer.plugins import Plugin, Registry, budget_of, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
@@ -35,19 +32,6 @@ from solfer.transport.messages import BodyMessage, ImuMessage, JointMessage, Poi
 CYCLES, STEPS = 6, 12
 JOINTS = ("shoulder", "elbow", "roll")
 TURN = np.array((0.1, -0.2, 0.3, 0.9)) / np.linalg.norm((0.1, -0.2, 0.3, 0.9))
-
-
-def write_robot(folder: Path) -> None:
-    """Write the descriptions of the robot, and of another one with fewer joints."""
-    (folder / "urdf.urdf").write_text(URDF)
-    (folder / "bare.urdf").write_text(URDF.replace('effort="40"', 'effort="20"'))
-    (folder / "srdf.srdf").write_text(SRDF)
-    (folder / "other.srdf").write_text(SRDF.replace('value="0.2"', 'value="0.3"'))
-    (folder / "other.urdf").write_text(cut(Description.from_text(URDF), "hand", "lower"))
-    (folder / "way.csv").write_text("0.5,0.1,0,0.1,0,0,0,1\n")
-    (folder / "other_way.csv").write_text("0.5,0,0,0.2,0,0,0,1\n")
-    (folder / "soft").mkdir(exist_ok=True)
-    (folder / "smaller.urdf").write_text(cut(Description.from_text(URDF), "arm", "lower"))
 
 
 class Walker(Component):

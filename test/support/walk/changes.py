@@ -1,32 +1,38 @@
-"""Changes of tags, and what is run with and without them."""
+"""The changes of test/data/walk/changes.yaml, and what is run with and without them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from support.walk import benches
-from support.walk.files import SPRING
+import yaml
+from support.walk import benches, estimators, wheels
+from support.walk.files import DATA
 
-MAIN, ROBOT, IN, OUT = "main/mwoibn/", "main/mwoibn/robot/", "main/mwoibn/feedback/", "main/mwoibn/controller/"
-ROS, XBOT, MODULES = "main/mwoibn/ros/", "main/mwoibn/xbot/", "main/mwoibn/modules/"
-BUNDLE, MOCK, WORLD = "bundle/", "mock/", "world/"
-CONTACT, TIP = "contacts/cart/contacts/contact0/", "contacts/cart/contacts/contact1/"
+from solfer.components.support_shaping import SupportShaping
 
-ABOUT_ALL_AXES = dict(
-    zip(
-        ("xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"),
-        (0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6),
-        strict=True,
+BENCHES: dict[str, Callable[[Path], str]] = {
+    bench.__name__: bench
+    for bench in (
+        benches.shared,
+        benches.simulation,
+        benches.server,
+        benches.bridge,
+        benches.hardware,
+        benches.layer,
+        benches.named_layer,
+        wheels.driving,
+        wheels.lifting,
+        wheels.far,
+        wheels.shaping,
+        wheels.standing,
     )
-)
-"""A rotation that differs from that of the files in all its entries."""
-
-
-STIFFER = {name: SPRING | {"Ks": 5.0} for name in benches.JOINTS}
-OTHERS = {
-    MAIN + "calibration/others": {
-        "joints": {name: {"name": name, "sign": -1, "offset": 0.2} for name in benches.JOINTS}
-    }
+} | {
+    "lifted": partial(wheels.lifting, kind=SupportShaping),
+    "strayed": partial(wheels.far, kind=SupportShaping),
+    "odometry": estimators.ODOMETRY,
+    "stamped_odometry": estimators.STAMPED,
+    "ground_forces": estimators.GROUND,
 }
 
 
@@ -38,47 +44,39 @@ class Change(NamedTuple):
     before: Mapping[str, Any] = {}
 
 
-WALK, IMU, ANGLES, SETS = (benches.module(name) for name in ("walk", "imu", "angles", "sets"))
-TOUCHING, MAPPED, MOVING = (benches.module(name) for name in ("contacts", "mapped", "joint_states"))
-CARRYING, SPRINGS = (benches.module(name) for name in ("carrying", "springs"))
-REACHING, HANDS, BALANCING = (benches.module(name) for name in ("reaching", "hands", "balancing"))
-REAL = benches.module("walk", system="HW")
-IN_RT, IMU_IN_RT = (benches.module(name, middleware="XBOT", layer="RT") for name in ("walk", "imu"))
+@cache
+def _bench(run: str) -> Callable[[Path], str]:
+    """Return what runs: a bench, or a module of the main file with options, such as `walk system=HW`."""
+    name, *options = run.split()
+    return BENCHES.get(name) or benches.module(name, **dict(option.split("=") for option in options))
 
 
-COMMANDED_GAINS = {f"{OUT}arm_controller/interface/{gain}": True for gain in ("stiffness", "damping")}
-"""With these a plugin may send the lower level gains."""
+def _changes(
+    group: Mapping[str, Any], around: Change, below: str = "", named: str = ""
+) -> Iterator[tuple[str, Change]]:
+    """Yield the changes of a group by tag; the file says what its keys mean."""
+    below += group.get("below", "")
+    named += group.get("named", "")
+
+    def placed(values: Mapping[str, Any]) -> dict[str, Any]:
+        return {(below + path[2:] if path[0] == "." else path).rstrip("/"): value for path, value in values.items()}
+
+    bench = _bench(group["run"]) if "run" in group else around.bench
+    before = {**around.before, **placed(group.get("before", {}))}
+    for tag, value in group.get("values", {}).items():
+        yield named + tag, Change(bench, {below + tag.replace(".", "/"): value}, before)
+    for tag in group.get("tags", ()):
+        yield named + tag, Change(bench, placed(group["to"]), before)
+    for part in group.get("changes", ()):
+        yield from _changes(part, Change(bench, {}, before), below, named)
 
 
-def each(bench: Callable[[Path], str], prefix: str, **values: Any) -> dict[str, Change]:
-    """Return changes of tags by their name below a path; `__` stands for a dot."""
-    names = {name.replace("__", "."): value for name, value in values.items()}
-    return {name: Change(bench, {prefix + name.replace(".", "/"): value}) for name, value in names.items()}
+def _of(part: str) -> dict[str, dict[str, Change]]:
+    return {section: dict(_changes(group, Change(benches.layer, {}))) for section, group in TABLE[part].items()}
 
 
-def rotation(bench: Callable[[Path], str], path: str, prefix: str = "offset_orientation.") -> dict[str, Change]:
-    """Return changes of all entries of a rotation, which are not free of each other."""
-    return {prefix + entry: Change(bench, {path: ABOUT_ALL_AXES}) for entry in ABOUT_ALL_AXES}
-
-
-def position(bench: Callable[[Path], str], path: str) -> dict[str, Change]:
-    """Return changes of a position."""
-    return {f"offset_position.{axis}": Change(bench, {f"{path}/{axis}": 0.7}) for axis in "xyz"}
-
-
-def pipe(path: str, bench: Callable[[Path], str]) -> dict[str, Change]:
-    """Return changes of what pipes of both directions have."""
-    joints, base = ("joints", "odometry") if path == IN else ("desired", "pose")
-    filtered = "joints" if path == IN else "arm_controller"
-    return {
-        "dofs.chain": Change(bench, {f"{path}{joints}/dofs/chain": "arm"}),
-        "dofs.type": Change(bench, {f"{path}{joints}/dofs/type": "OTHER"}),
-        "dofs.name": Change(bench, {f"{path}{base}/dofs/name": "wheel"}),
-        "dofs.mapping": Change(bench, {f"{path}{joints}/dofs/mapping": "OTHER"}),
-        "interface.position": Change(bench, {f"{path}{joints}/interface/position": False}),
-        "interface.velocity": Change(bench, {f"{path}{joints}/interface/velocity": False}),
-        "interface.effort": Change(bench, {f"{path}{joints}/interface/effort": False}),
-        **each(bench, f"{path}{filtered}/", filter__run=False, filter__frequency=30.0, filter__damping=0.5),
-        "convention.twist.frame": Change(bench, {f"{path}{base}/convention": {"twist": {"frame": "world"}}}),
-        "layer": Change(benches.bridge, {f"{path}{joints}/layer": "NRT"}),
-    }
+TABLE = yaml.safe_load((DATA / "changes.yaml").read_text())
+RUNS = _of("runs")
+REFUSED = {(section, tag): change for section, changes in _of("refused").items() for tag, change in changes.items()}
+ONE_VALUE = {(section, tag): reason for section, tags in TABLE["one_value"].items() for tag, reason in tags.items()}
+WARNED = {(section, tag): reason for section, tags in TABLE["warned"].items() for tag, reason in tags.items()}

@@ -1,13 +1,15 @@
-"""The tags of `wheeled_motion`, each with a change that has to change how CENTAURO drives."""
+"""CENTAURO that drives by `wheeled_motion` or `support_shaping`, with tags of a file of the walk."""
 
 import hashlib
+import logging
+import re
 from functools import cache
 from pathlib import Path
 
 from support.unit.declarations import named
-from support.walk.changes import Change, each
 
 from solfer import Robot
+from solfer.components.support_shaping import SupportShaping
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
@@ -17,11 +19,6 @@ from solfer.interfaces.support import LiftContacts
 from solfer.interfaces.task_references import Vector
 
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
-COMPONENT = "driving/driving/"
-STEERING = {"icm": 0.5, "sp": 0.5, "damp_icm": 1e-3, "damp_sp": 1e-5, "damp": 1e-2, "tracking": 3.0}
-AS_STEERINGS_SAY = {COMPONENT + "across": 0.0}
-FAST_STEERING = {COMPONENT + "pace": False, COMPONENT + "tunnings/slow/STEERING": 190.0}
-FAST_STEERING |= {COMPONENT + "vertex_speed": 1.0, COMPONENT + "vertex_acceleration": 100.0}
 
 
 @cache
@@ -88,41 +85,41 @@ def far(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
     return ""
 
 
-WHEELS = {
-    **each(
-        driving,
-        COMPONENT,
-        chain="position_lower_body",
-        track="front",
-        IK=["CONSTRAINTS", "BASE", "STEERING"],
-        tunning="fast",
-        base="center_of_mass",
-        minor_axis=0.06,
-        major_axis=0.02,
-        law="original",
-        across=0.0,
-        base_speed=0.02,
-        turn_speed=0.02,
-        vertex_speed=0.01,
-        vertex_acceleration=1.0,
-        acceleration=1.0,
-        turn_acceleration=1.0,
-        support_margin=0.5,
-        correction=1e-3,
-        turn_correction=1e-3,
-    ),
-    "furthest": Change(far, {COMPONENT + "furthest": 0.1}),
-    "lift_margin": Change(lifting, {COMPONENT + "lift_margin": 0.1}, {COMPONENT + "base": "center_of_mass"}),
-    "tunnings": Change(driving, {COMPONENT + "tunnings/slow/STEERING": 12.0}),
-    **{
-        f"reference_axis.NAME.{axis}": Change(driving, {f"{COMPONENT}reference_axis/wheel_1/{axis}": value})
-        for axis, value in (("x", 0.1), ("y", 0.1), ("z", 2.0))
-    },
-    **{
-        f"steerings.NAME.{tag}": Change(driving, {f"{COMPONENT}steerings/reactif/{tag}": value}, AS_STEERINGS_SAY)
-        for tag, value in STEERING.items()
-    },
-    "steering": Change(driving, {COMPONENT + "steering": "other"}, AS_STEERINGS_SAY),
-    "rest": Change(driving, {COMPONENT + "rest": False}, AS_STEERINGS_SAY),
-    "pace": Change(driving, {COMPONENT + "pace": False}),
-}
+class _Words(logging.Handler):
+    """Keeps what is logged."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.words: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message."""
+        self.words.append(record.getMessage())
+
+
+def shaping(folder: Path) -> str:
+    """Drive the curve of `driving` with a pushed base; return a digest, and the limits of which it warns."""
+    logger, words = logging.getLogger("solfer.components.support_shaping.report"), _Words()
+    logger.addHandler(words)
+    robot = centauro()
+    robot.contacts.forces  # noqa: B018 they are made
+    for contact in robot.contacts:
+        contact.wrench[:3] = 0.0, 0.0, 200.0 if contact is robot.contacts["rear_left_leg"] else 100.0
+    try:
+        motion = driving(folder, SupportShaping)
+        return motion + str(sorted({name for text in words.words for name in re.findall("'([^']+)'", text)}))
+    finally:
+        logger.removeHandler(words)
+        for contact in robot.contacts:
+            contact.wrench[:] = 0.0
+
+
+def standing(folder: Path) -> str:
+    """Stand for a while; return the share of the motion that goes on."""
+    component, robot = made(folder, SupportShaping), centauro()
+    for _ in range(400):
+        robot.update()
+        component.update()
+        component.send()
+        robot.state.position[:30], robot.state.velocity[:30] = robot.command.position[:30], robot.command.velocity[:30]
+    return str(component.shaping.governor.ratio)

@@ -87,18 +87,16 @@ def test_right_arguments_are_accepted(capsys, monkeypatch):
         assert capsys.readouterr().out == f"{name}.launch\n"
 
 
-def test_a_missing_rviz_is_one_error(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("name", "missing", "remedy"),
+    [("rviz", "program 'rviz'", "apt-get install rviz"), ("view", "module 'viser'", "requirements-view.txt")],
+)
+def test_what_a_launch_lacks_is_one_error(monkeypatch, capsys, name, missing, remedy):
     monkeypatch.setenv("PATH", "")
-    assert main(["launch", f"{LAUNCH}/rviz.launch"]) == 2
-    err = capsys.readouterr().err
-    assert "error: rviz.launch: there is no program 'rviz'" in err and "apt-get install rviz" in err
-
-
-def test_a_missing_page_is_one_error(monkeypatch, capsys):
     monkeypatch.setattr("solfer_tools.cli.commands.launch.find_spec", lambda name: None)
-    assert main(["launch", f"{LAUNCH}/view.launch"]) == 2
+    assert main(["launch", f"{LAUNCH}/{name}.launch"]) == 2
     err = capsys.readouterr().err
-    assert "error: view.launch: there is no module 'viser'" in err and "requirements-view.txt" in err
+    assert f"error: {name}.launch: there is no {missing}" in err and remedy in err
 
 
 @pytest.mark.parametrize("file", [*FILES, *TEMPLATES], ids=lambda file: file.name)

@@ -77,6 +77,7 @@ def test_ten_mistakes_are_reported_in_one_run():
 @pytest.mark.parametrize(
     ("right", "wrong", "words"),
     [
+        ("  xbot: *ends", "  xbot: {feedback: {link_side_online: {layr: online}}}", "unknown key 'layr'"),
         ("  feedbacks:\n", "  feedbacks:\n    spare: [link_side_ofline]\n", "unknown feedback pipe 'link_side_ofline'"),
         ("    direct:\n", "    spare: {lst: []}\n    direct:\n", "unknown key 'lst'"),
         ("  feedback:\n    link", "  feedback:\n    spare: {space: JOIN}\n    link", "expected 'JOINT', 'OPERATIONAL'"),
@@ -87,13 +88,6 @@ def test_ten_mistakes_are_reported_in_one_run():
 def test_what_no_module_uses_is_checked(right, wrong, words):
     replace("centauro.yaml", (right, wrong))
     assert any(words in str(error) for error in check("centauro.yaml").errors)
-
-
-@pytest.mark.usefixtures("folder")
-def test_the_other_middlewares_part_is_checked():
-    replace("centauro.yaml", ("  xbot: *ends", "  xbot: {feedback: {link_side_online: {layr: online}}}"))
-    (error,) = check("centauro.yaml").errors
-    assert error.name == "layr" and error.names == ("layer",)
 
 
 @pytest.mark.usefixtures("folder")

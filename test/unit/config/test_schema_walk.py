@@ -7,9 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from support.walk import benches
-from support.walk.entries import ONE_VALUE, REFUSED, RUNS, WARNED, Change
-from support.walk.files import FILES, changed
+from support.walk.changes import ONE_VALUE, REFUSED, RUNS, WARNED, Change
+from support.walk.files import write
 
 from solfer.errors import SolferError, SolferErrors
 
@@ -31,19 +30,10 @@ class Walk:
 
     def __init__(self, folder: Path):
         self.folder = folder
-        benches.write_robot(folder)
-        self.write(FILES)
         self.digest = cache(self._digest)
 
-    def write(self, files: dict) -> None:
-        """Write files, and remove all others."""
-        for path in self.folder.glob("*.yaml"):
-            path.unlink()
-        for name, content in files.items():
-            (self.folder / f"{name}.yaml").write_text(json.dumps(content))
-
     def _digest(self, bench, changes: str) -> str:
-        self.write(changed(FILES, json.loads(changes)))
+        write(self.folder, json.loads(changes))
         return bench(self.folder)
 
     def acts(self, change: Change) -> bool:
@@ -83,7 +73,7 @@ def test_other_values_alone_are_refused(walk, place):
 def test_runs_without_a_change_are_alike(walk):
     changes = [change for entries in RUNS.values() for change in entries.values()]
     for bench, before in {change.bench: change.before for change in changes}.items():
-        walk.write(changed(FILES, before))
+        write(walk.folder, before)
         assert bench(walk.folder) == bench(walk.folder)
 
 

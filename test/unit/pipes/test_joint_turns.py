@@ -56,7 +56,8 @@ def motion(count=800, seed=3):
 
 @pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
 def test_all_drivers_give_the_same_motion(count):
-    made, angles = scene(), motion()
+    made = scene()
+    angles = motion()
     assert np.ptp(angles) > math.tau
     seen = [made.measure(count(angle)) for angle in angles]
     assert np.subtract(seen, seen[0]) == pytest.approx(angles - angles[0], abs=1e-9)
@@ -125,12 +126,14 @@ def test_a_reference_is_in_the_count_of_the_driver():
         assert made.robot.command.position[6] == pytest.approx(desired, abs=1e-9)
 
 
-def test_the_motor_side_has_a_count_of_its_own():
+@pytest.mark.parametrize(("begin", "is_alone"), [(0.0, False), (40.0, True)])
+def test_the_motor_side_has_a_count_of_its_own(begin, is_alone):
     made = scene()
     motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
     writer = made.context.middleware.writer("motors", "solfer/JointCommand")
-    for angle in motion():
-        made.measure(wrapped(angle))
+    for angle in motion() + begin:
+        if not is_alone:
+            made.measure(wrapped(angle))
         writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
         motor.run()
         assert made.robot.motor.position[6] == angle
@@ -143,7 +146,8 @@ def test_the_motor_side_begins_on_the_turn_of_the_link_side(count, turns, is_lin
     """What lies between both sides is the deflection of the gear."""
     made = scene()
     motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
-    writer, deflections = made.context.middleware.writer("motors", "solfer/JointCommand"), []
+    writer = made.context.middleware.writer("motors", "solfer/JointCommand")
+    deflections = []
 
     def measure_motor(angle):
         writer.write(JointMessage(NAMES, np.array((angle + math.tau * turns, 0.0))))
@@ -160,16 +164,6 @@ def test_the_motor_side_begins_on_the_turn_of_the_link_side(count, turns, is_lin
     assert deflections[1:] == pytest.approx(np.full(799, 0.02), abs=1e-9)
 
 
-def test_a_motor_side_that_is_alone_has_a_count_of_its_own():
-    made = scene()
-    motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
-    writer = made.context.middleware.writer("motors", "solfer/JointCommand")
-    for angle in motion() + 40.0:
-        writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
-        motor.run()
-        assert made.robot.motor.position[6] == angle
-
-
 @pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
 @pytest.mark.parametrize("sign, offset", [(1, 3.1), (-1, -2.9), (1, 40.0)])
 def test_a_calibrated_joint_begins_by_the_shortest_way_from_its_zero(count, sign, offset):
@@ -182,7 +176,9 @@ def test_a_calibrated_joint_begins_by_the_shortest_way_from_its_zero(count, sign
         received(dofs=dofs(type="actuated"), function="state", source="raw", calibration="encoders"), context
     )
     command = factory.controller(published(dofs=dofs(type="actuated"), calibration="encoders"), context)
-    writer, seen, robot = context.middleware.writer("raw", "solfer/JointCommand"), [], made.robot
+    writer = context.middleware.writer("raw", "solfer/JointCommand")
+    seen = []
+    robot = made.robot
     angles = motion() + 0.3
     for angle in angles:
         made.bus.time += 1.0 / RATE

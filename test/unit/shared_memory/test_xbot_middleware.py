@@ -77,7 +77,8 @@ def test_every_message_arrives_as_it_was_sent(world, kind, queued):
 
 
 def test_no_message_is_lost_at_a_new_layout(world):
-    reader, queue = world.node("a").reader("t", JOINT_STATE), world.node("b").queue("t", JOINT_STATE)
+    reader = world.node("a").reader("t", JOINT_STATE)
+    queue = world.node("b").queue("t", JOINT_STATE)
     writer = world.node("sender").writer("t", JOINT_STATE)
     messages = [
         JointMessage(("a", "b"), position=np.array([1.0, 2.0])),
@@ -93,15 +94,10 @@ def test_no_message_is_lost_at_a_new_layout(world):
     assert received[-1].names == ("b",) and received[-1].position is None and received[-1].velocity.tolist() == [3.0]
 
 
-def test_what_was_queued_does_not_change_any_more(world):
-    queue, writer = world.node().queue("t", JOINT_STATE), world.node("sender").writer("t", JOINT_STATE)
-    for value in range(3):
-        writer.write(JointMessage(("a",), position=np.array([float(value)])))
-    assert [message.position[0] for message in queue.drain()] == [0.0, 1.0, 2.0]
-
-
 def test_a_full_queue_drops_the_oldest_and_counts(world):
-    queue, writer = world.node().queue("t", JOINT_STATE, 3), world.node("sender").writer("t", JOINT_STATE)
+    """What it hands over has the values of its own message, not of the newest one."""
+    queue = world.node().queue("t", JOINT_STATE, 3)
+    writer = world.node("sender").writer("t", JOINT_STATE)
     for value in range(200):
         writer.write(JointMessage(("a",), position=np.array([float(value)])))
     assert [message.position[0] for message in queue.drain()] == [197.0, 198.0, 199.0]
@@ -110,7 +106,8 @@ def test_a_full_queue_drops_the_oldest_and_counts(world):
 
 def test_pending_reports_messages_that_wait(world):
     """It stays true until all is read, ignores other topics, and sees messages with more joints than before."""
-    node, sender = world.node("receiver"), world.node("sender")
+    node = world.node("receiver")
+    sender = world.node("sender")
     queues = [node.queue(topic, COMMAND) for topic in ("one", "two")]
     pending = node.pending(queues)
     assert not pending()
@@ -131,7 +128,8 @@ def test_pending_reports_messages_that_wait(world):
 def test_only_a_reader_gets_an_earlier_message(world):
     writer = world.node("sender").writer("t", JOINT_STATE)
     writer.write(JointMessage(("a",), position=np.array([1.0])))
-    reader, queue = world.node().reader("t", JOINT_STATE), world.node().queue("t", JOINT_STATE)
+    reader = world.node().reader("t", JOINT_STATE)
+    queue = world.node().queue("t", JOINT_STATE)
     assert reader.read() is MessageStatus.NEW and queue.drain() == []
 
 
@@ -145,11 +143,9 @@ def test_a_second_writer_of_one_name_is_refused(world):
 
 
 def test_each_component_of_a_node_has_a_writer(world):
-    node, reader, queue = (
-        world.node("limbs"),
-        world.node("a").reader("t", COMMAND),
-        world.node("b").queue("/t", COMMAND),
-    )
+    node = world.node("limbs")
+    reader = world.node("a").reader("t", COMMAND)
+    queue = world.node("b").queue("/t", COMMAND)
     writers = {name: node.writer(topic, COMMAND) for name, topic in (("drives", "t"), ("springs", "/t"))}
     for name, writer in writers.items():
         writer.write(JointMessage(("a",), position=np.ones(1), component=name))
@@ -169,7 +165,8 @@ def test_a_topic_carries_one_kind_of_message(world):
 
 
 def test_waiting_for_a_joint_order_ends(world):
-    node, writer = world.node(), world.node("robot").writer("joint_states", JOINT_STATE)
+    node = world.node()
+    writer = world.node("robot").writer("joint_states", JOINT_STATE)
     world.bus.every(1.0, lambda: writer.write(JointMessage(("a", "b"), position=np.zeros(2))), start=0.5)
     assert node.joint_order("joint_states", "sensor_msgs::JointState", 2.0) == ("a", "b")
     with pytest.raises(MiddlewareError, match="nothing on topic 'empty'"):
@@ -187,7 +184,8 @@ def test_parameters_are_the_nodes_own_or_the_namespaces(world):
 
 
 def test_a_parameter_ends_with_its_node(world):
-    robot, node = world.node("robot"), world.node()
+    robot = world.node("robot")
+    node = world.node()
     robot.provide("/robot_description", "<robot/>")
     with pytest.raises(MiddlewareError, match="writes here already"):
         node.provide("robot_description", "<another/>")
@@ -213,7 +211,8 @@ def test_a_parameter_of_a_killed_node_is_not_read(world):
 
 @pytest.mark.slow
 def test_reports_reach_all_nodes(world):
-    node, other = world.node(), world.node("other")
+    node = world.node()
+    other = world.node("other")
     assert other.reports() == {}
     node.report("arm", 1, "late", {"cycles": 3, "who": "me", "cost": np.float64(0.5)})
     assert other.reports()["arm"].summary == "late"
@@ -254,7 +253,8 @@ def test_a_message_of_very_many_joints_leaves_no_memory(world, tmp_path):
     def size():
         return sum(file.stat().st_blocks * 512 for file in tmp_path.rglob("*") if file.is_file())
 
-    robot, plugin = world.node("robot"), world.node("plugin")
+    robot = world.node("robot")
+    plugin = world.node("plugin")
     reader = plugin.reader("t", JOINT_STATE)
     writer = robot.writer("t", JOINT_STATE)
     few, many = (tuple(f"joint_{number}" for number in range(count)) for count in (2, 20000))
@@ -296,7 +296,8 @@ def test_a_too_long_name_is_an_error(world):
 def test_ten_thousand_cycles_keep_no_memory(world):
     """Messages, services and reports: Python's allocated blocks must not grow over a long run of the layer."""
     world.serve(scale)
-    node, other = world.node(), world.node("other")
+    node = world.node()
+    other = world.node("other")
     ends = [
         (node.writer(kind, kind), other.reader(kind, kind), other.queue(kind, kind), MESSAGES[kind])
         for kind in (JOINT_STATE, "nav_msgs/Odometry", "sensor_msgs/Imu", REFUSALS)

@@ -60,17 +60,16 @@ def test_a_motion_that_should_have_ended(joint):
     assert findings and all(joint in words for words in findings)
 
 
-def test_wheels_that_drive_off_again():
+@pytest.mark.parametrize(
+    ("begin", "end", "speed", "words"),
+    [(3.0, 3.2, 0.06, "0.06 rad/s, 1.50 s after"), (END, END + 1.3, 0.1, "0.10 rad/s")],
+)
+def test_wheels_that_turn_without_commands(begin, end, speed, words):
+    """They drive off again, or take too long to rest."""
     samples = robot(True)
-    samples.velocities[(samples.times > 3.0) & (samples.times < 3.2), 2] = 0.06
-    assert "a wheel without commands turned at 0.06 rad/s, 1.50 s after" in finding_of(samples, FORGOTTEN)
+    samples.velocities[(samples.times > begin) & (samples.times < end), 2] = speed
+    assert f"a wheel without commands turned at {words}" in finding_of(samples, FORGOTTEN)
     assert not check_motion(JOINTS, samples, ASKED_FOR).findings
-
-
-def test_wheels_that_take_too_long_to_rest():
-    samples = robot(True)
-    samples.velocities[(samples.times > END) & (samples.times < END + 1.3), 2] = 0.1
-    assert "a wheel without commands" in finding_of(samples, FORGOTTEN)
 
 
 @pytest.mark.parametrize("speed", [ASKED + 0.2, -0.2])

@@ -12,7 +12,8 @@ class OversleepingClock:
     """Sleeps until a deadline, and so much longer as a test says."""
 
     def __init__(self, time=0.0):
-        self.time, self.oversleeps = time, {}
+        self.time = time
+        self.oversleeps = {}
 
     def now(self):
         return self.time
@@ -23,7 +24,9 @@ class OversleepingClock:
 
 def run(clock, cycles, costs=(), catch_up=0.0):
     """Run a loop; returns it, and when each cycle began, how late that was and how many periods it left out."""
-    loop, begins, costs = FixedRateLoop(clock, RATE, catch_up), [], dict(costs)
+    loop = FixedRateLoop(clock, RATE, catch_up)
+    begins = []
+    costs = dict(costs)
 
     def cycle(late, skipped):
         begins.append((clock.time, late, skipped))
@@ -54,16 +57,14 @@ def test_a_late_wake_up_leaves_out_whole_periods():
     assert [skipped for _, _, skipped in begins] == [0, 0, 3, 0]
 
 
-def test_a_lag_is_made_up_where_that_is_requested():
-    loop, begins = run(OversleepingClock(), 8, {1: 4.5 * PERIOD}, catch_up=5 * PERIOD)
-    assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, 5.5, 5.5, 5.5, 5.5, 6, 7]
-    assert loop.skipped == 0
-
-
-def test_only_what_exceeds_the_lag_is_left_out():
-    loop, begins = run(OversleepingClock(), 8, {1: 9.5 * PERIOD}, catch_up=5 * PERIOD)
-    assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == [0, 1, *[10.5] * 5, 11]
-    assert loop.skipped == 4
+@pytest.mark.parametrize(
+    ("lag", "cycles", "skipped"), [(4.5, [0, 1, 5.5, 5.5, 5.5, 5.5, 6, 7], 0), (9.5, [0, 1, *[10.5] * 5, 11], 4)]
+)
+def test_a_lag_is_made_up_where_that_is_requested(lag, cycles, skipped):
+    """Only what exceeds the largest lag is left out."""
+    loop, begins = run(OversleepingClock(), 8, {1: lag * PERIOD}, catch_up=5 * PERIOD)
+    assert [round(begin / PERIOD, 6) for begin, _, _ in begins] == cycles
+    assert loop.skipped == skipped
 
 
 def test_a_restart_is_due_at_once():

@@ -1,6 +1,5 @@
 """What a plugin is generated with from its configuration: which feedbacks it needs, where its commands begin."""
 
-import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -8,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from support.walk import benches
-from support.walk.changes import MODULES
-from support.walk.files import FILES, changed
+from support.walk.files import write
 
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
@@ -23,14 +21,12 @@ from solfer.plugins.plugin import Plugin, PluginState
 from solfer.robot.description.shipped import robot_files
 
 DESIRED = "desired", "sensor_msgs/JointState"
-FEEDBACK, CONTROLLER = "main/mwoibn/feedback/", "main/mwoibn/controller/"
+FEEDBACK, CONTROLLER = "feedback/", "controller/"
 
 
 def made(folder, **changes):
     """Make the walker of the walk's files, with changes by path; return it and those who publish to it."""
-    benches.write_robot(folder)
-    for name, content in changed(FILES, changes).items():
-        (folder / f"{name}.yaml").write_text(json.dumps(content))
+    write(folder, changes)
     configuration, others = load(folder / "main.yaml", "sets"), benches.Others(folder)
     generator = Registry().find("sets", configuration.module.class_)
     return generate(configuration, MemoryMiddleware(others.bus, "sets"), generator), others
@@ -39,8 +35,8 @@ def made(folder, **changes):
 @pytest.mark.parametrize(("initialize", "required"), [(True, {"joints"}), (False, {"joints", "imu"})])
 def test_states_are_required_before_commands(tmp_path, initialize, required):
     """Those that are marked, else all of the link side; motors never are."""
-    listening = {"main/mwoibn/robot/turning/feedback/list": ["joints", "motors", "imu"]}
-    chosen = {MODULES + "sets/robot": "turning", FEEDBACK + "joints/initialize": initialize}
+    listening = {"robot/turning/feedback/list": ["joints", "motors", "imu"]}
+    chosen = {"modules/sets/robot": "turning", FEEDBACK + "joints/initialize": initialize}
     plugin, _ = made(tmp_path, **listening, **chosen)
     assert {pipe.name for pipe in plugin.feedbacks if pipe.required} == required
 
@@ -62,8 +58,8 @@ def test_commands_begin_at_what_is_measured(tmp_path):
 
 
 def test_an_idle_plugin_publishes_and_commands_nothing(tmp_path):
-    pipes = {MODULES + "sets/controller": ["arm_controller", "desired"]}
-    plugin, others = made(tmp_path, **{MODULES + "sets/mode": "idle"}, **pipes)
+    pipes = {"modules/sets/controller": ["arm_controller", "desired"]}
+    plugin, others = made(tmp_path, **{"modules/sets/mode": "idle"}, **pipes)
     ear = MemoryMiddleware(others.bus, "ear")
     commands, desired = (ear.queue(*end) for end in (("arm_controller/command", "solfer/JointCommand"), DESIRED))
     for k in range(1, 30):
@@ -106,7 +102,7 @@ def test_a_check_finds_what_a_start_refuses(repository, monkeypatch):
 
 @pytest.mark.slow
 def test_who_hears_of_a_plugin_is_looked_for(tmp_path, caplog):
-    plugin, others = made(tmp_path, **{MODULES + "sets/controller": ["arm_controller", "desired"]})
+    plugin, others = made(tmp_path, **{"modules/sets/controller": ["arm_controller", "desired"]})
     for k in range(1, 80):
         others.bus.run_until(others.bus.time + 0.1)
         others.publish(k)

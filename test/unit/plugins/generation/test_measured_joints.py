@@ -1,12 +1,11 @@
 """A plugin commands no joint that nothing measures: not at its start, nor after one of several drivers has ended."""
 
-import json
 import logging
 
 import numpy as np
 import pytest
 from support.walk import benches
-from support.walk.files import FILES, changed
+from support.walk.files import write
 
 from solfer.config import load
 from solfer.errors import PipeError
@@ -15,13 +14,13 @@ from solfer.plugins import Registry, generate
 from solfer.plugins.plugin import PluginState
 from solfer.transport.messages import JointMessage
 
-MAIN = "main/mwoibn/"
-IN, OUT = MAIN + "feedback/joints/", MAIN + "controller/"
+IN = "feedback/joints/"
+OUT = "controller/"
 BOTH = ["arm_controller", "wheel_controller"]
 HALVES = {
-    MAIN + "ros/feedback/joints/source": "halves",
-    MAIN + "feedbacks/some": ["joints"],
-    MAIN + "controllers/few": BOTH,
+    "ros/feedback/joints/source": "halves",
+    "feedbacks/some": ["joints"],
+    "controllers/few": BOTH,
     OUT + "arm_controller/filter": None,
     IN + "dofs/mapping": "FEEDBACK",
     IN + "filter": None,
@@ -45,9 +44,7 @@ class Halves:
     """A plugin on a robot whose joints have several drivers, which publish on one topic."""
 
     def __init__(self, folder, first, **changes):
-        benches.write_robot(folder)
-        for name, content in changed(FILES, HALVES | changes).items():
-            (folder / f"{name}.yaml").write_text(json.dumps(content))
+        write(folder, HALVES | changes)
         self.others = benches.Others(folder)
         self._drivers = {}
         self.publish(first)
@@ -149,7 +146,7 @@ def test_a_driver_of_other_joints_is_no_fault(tmp_path, chain, caplog):
     """The plugin commands the arm, or the wheel: it neither waits for the other joints nor needs them."""
     own, others = DRIVERS[0] if chain != "wheels" else reversed(DRIVERS[0])
     pipe = BOTH[chain == "wheels"]
-    halves = Halves(tmp_path, own, **{MAIN + "controllers/few": [pipe], IN + "dofs/chain": chain})
+    halves = Halves(tmp_path, own, **{"controllers/few": [pipe], IN + "dofs/chain": chain})
     (feedback,) = halves.plugin.feedbacks
     halves.run(0.5, own)
     assert halves.running
@@ -163,7 +160,7 @@ def test_a_driver_of_other_joints_is_no_fault(tmp_path, chain, caplog):
 
 @pytest.mark.parametrize(("chain", "driver"), [("arm", ("roll",)), ("wheels", ("shoulder", "elbow"))])
 def test_other_joints_alone_are_named_as_the_reason(tmp_path, chain, driver, caplog):
-    halves = Halves(tmp_path, driver, **{MAIN + "controllers/few": [BOTH[chain == "wheels"]], IN + "dofs/chain": chain})
+    halves = Halves(tmp_path, driver, **{"controllers/few": [BOTH[chain == "wheels"]], IN + "dofs/chain": chain})
     halves.run(0.5, driver)
     reason = f"(halves), which refuses messages of driver_of_{driver[0]}: it has none of the pipe's {3 - len(driver)} "
     assert not halves.running and reason in halves.plugin.health()[1]
