@@ -9,6 +9,7 @@ MOST = 15
 """Attributes that a class may assign to itself. Records of tags and compiled functions assign none."""
 
 MORE = {
+    "Component": 16,
     "Kinematics": 26,
     "Robot": 23,
     "Simulation": 21,

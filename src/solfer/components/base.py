@@ -30,11 +30,14 @@ class Component:
         period: Time of one control cycle [s]; 0 before `set_rate`.
         passed: Time that has passed for the robot since the cycle before [s]: `period`, or several of them where a loop
             that was late left some out; less where the robot is slower than the clock, as in a slow simulation.
+        time_step: Time over which it integrates in this cycle [s]: `passed`, but no more than 0.05 s or the period.
         time_lost: Time that has passed by the clock meanwhile, and not for the robot [s].
             What times out or brakes counts with it.
         pace: Share of their speed with which motions may go on, below 1 while the loop is too slow for the robot.
         start_position: Where the joints are at `init`, shape (n,) [rad, m]: where they are measured, and after a short
             interruption where they were commanded to be, as long as they follow that as springs do under a load.
+        model: The Robot that it works on.
+        name: Name of its configuration.
         efforts: DoFs that it moves by their efforts, shape (m,): pipes have to carry them.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
@@ -44,33 +47,19 @@ class Component:
     Tags: ClassVar[type | None] = None
 
     def __init__(self, robot: "Robot", tags: Any = None, name: str = ""):
-        self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
+        self.model = robot
+        self.tags = tags
+        self.name = name or type(self).__name__
         self.kinematics = True
         self.dynamics = False
         self.modify = False
-        self.period = self.passed = self.time_lost = 0.0
+        self.period = self.passed = self.time_step = self.time_lost = 0.0
         self.pace = 1.0
         self.start_position = robot.state.position
         self.efforts: np.ndarray = np.zeros(0, dtype=np.int64)
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}
         self.clock: Callable[[], float] = float
-
-    @property
-    def model(self) -> "Robot":
-        """The Robot that this component works on."""
-        return self._robot
-
-    @property
-    def name(self) -> str:
-        """Name of the component's configuration."""
-        return self._name
-
-    @property
-    def time_step(self) -> float:
-        """Time over which a component integrates in this cycle [s]: `passed`, but no more than 0.05 s or the period."""
-        # after a longer gap it goes on from where it is
-        return min(self.passed, max(self.period, 0.05))
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz]; called once before `init`.
@@ -80,7 +69,13 @@ class Component:
         """
         if not 0.0 < rate < math.inf:
             raise ComponentError(f"'{self.name}' at a rate of {rate} Hz", expected="a positive number")
-        self.period = self.passed = 1.0 / rate
+        self.period = 1.0 / rate
+        self.let_pass(self.period)
+
+    def let_pass(self, passed: float) -> None:
+        """Let time pass until the next cycle [s]; after a longer gap motions go on from where they are."""
+        self.passed = passed
+        self.time_step = min(passed, max(self.period, 0.05))
 
     def init(self) -> None:
         """Set the initial conditions; the Robot's state is measured and its kinematics are up to date."""

@@ -1,6 +1,8 @@
 """The full dynamics of a robot: M(q) a + h(q, v) = effort."""
 
 from collections.abc import Callable, Hashable
+from functools import partial
+from operator import itemgetter
 from typing import Protocol
 
 from solfer.dynamics.elements import BIAS, INERTIA, Elements
@@ -34,15 +36,13 @@ class DynamicModel(Elements):
 
     def stamp(self, name: str) -> Callable[[], Hashable]:
         """Return a function whose result changes with the state that an element is computed of."""
-        version = self.robot.state.version
-        if name == BIAS:
-            return lambda: (version("position"), version("velocity"))
-        return lambda: version("position")
+        inputs = ("position", "velocity") if name == BIAS else ("position",)
+        return partial(itemgetter(*inputs), self.robot.state.versions)
 
     def _place(self) -> None:
         """Move the bodies to their places in the state; part of every element, and done once for all."""
         self.robot.update()
-        version = self.robot.state.version("position")
+        version = self.robot.state.versions["position"]
         if version != self._placed:
             self._recursion.place()
             self._placed = version

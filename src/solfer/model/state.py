@@ -20,19 +20,6 @@ TWIST_COVARIANCE = "twist_covariance"
 """The same of linear and angular velocity in the axes of the base's link [m/s, rad/s]."""
 
 
-class _Interface:
-    """A default interface as an attribute: reading gives the live array, assigning copies into it."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, state: "State | None", owner: type | None = None) -> Any:
-        return self if state is None else state._arrays[self._name]
-
-    def __set__(self, state: "State", values: np.ndarray) -> None:
-        state.write(self._name, values)
-
-
 class State:
     """Position, velocity, acceleration and torque of all DoFs, and any interface that is added.
 
@@ -48,22 +35,24 @@ class State:
         velocity: [rad/s, m/s], shape (n,).
         acceleration: [rad/s^2, m/s^2], shape (n,).
         torque: [Nm, N], shape (n,).
-        defaults: These four one below the other, shape (4, n); the same memory.
+        defaults: These four one below the other, shape (4, n); the same memory. To assign one of them copies into it.
+        versions: How often each interface changed, by its name; to be read only.
         histories: What pipes hand over message by message, in the order of the pipes; those with `history` alone.
     """
 
-    position = _Interface()
-    velocity = _Interface()
-    acceleration = _Interface()
-    torque = _Interface()
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    torque: np.ndarray
 
     def __init__(self, dofs: Sequence[str]):
         self.dofs = tuple(dofs)
         self.defaults = np.zeros((len(DEFAULTS), self.size))
         self._arrays = dict(zip(DEFAULTS, self.defaults, strict=True))
-        self._versions = dict.fromkeys(self._arrays, 0)
+        self.versions = dict.fromkeys(self._arrays, 0)
         self._added: set[str] = set(self._arrays)
         self.histories: list[History] = []
+        vars(self).update(self._arrays)
 
     def window(self) -> "State":
         """Return the same State for another user: both have one memory, with all that is ever added, and one version.
@@ -71,12 +60,7 @@ class State:
         Only `add` distinguishes them: each user may add an interface of the same name and size, and both get one array.
         """
         other = State.__new__(State)
-        other.dofs = self.dofs
-        other._arrays = self._arrays
-        other._versions = self._versions
-        other.defaults = self.defaults
-        other.histories = self.histories
-        other._added = set(State(()).interfaces)
+        vars(other).update(vars(self), _added=set(DEFAULTS))
         return other
 
     @property
@@ -103,7 +87,7 @@ class State:
         size = self.size if size is None else size
         if name not in self._arrays:
             self._arrays[name] = np.zeros(size)
-            self._versions[name] = 0
+            self.versions[name] = 0
         elif len(self._arrays[name]) != size:
             raise SizeMismatch(
                 f"an interface '{name}' of {size} numbers, which another component has with {len(self._arrays[name])}",
@@ -130,12 +114,12 @@ class State:
         if part.tobytes() == values.tobytes():
             return False
         array[... if indices is None else indices] = values
-        self._versions[name] += 1
+        self.versions[name] += 1
         return True
 
     def touch(self, *names: str) -> None:
         """Move the versions of interfaces whose arrays were written directly."""
-        versions = self._versions
+        versions = self.versions
         for name in names:
             if name not in versions:
                 raise UnknownName("interface", name, versions)
@@ -143,9 +127,15 @@ class State:
 
     def version(self, name: str) -> int:
         """Return how often the interface changed."""
-        if name not in self._versions:
+        if name not in self.versions:
             raise UnknownName("interface", name, self._arrays)
-        return self._versions[name]
+        return self.versions[name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in DEFAULTS:
+            self.write(name, value)
+        else:
+            super().__setattr__(name, value)
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._arrays:

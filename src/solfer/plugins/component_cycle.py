@@ -58,7 +58,7 @@ class ComponentCycle:
     def advance(self, now: float) -> float:
         """Let time pass for the component until `now` [s]; return how much has passed [s]."""
         component = self._component
-        component.passed = passed = self.robot_time.advance(now)
+        component.let_pass(passed := self.robot_time.advance(now))
         component.time_lost = self.robot_time.lost
         return passed
 

@@ -194,9 +194,15 @@ class Plugin:
         if verdict is not WORK:
             self._obey(verdict, now)
             return
-        self._update_robot(life)
         component = self.component
         work = self._work
+        if life is STARTING:
+            self.robot.update()
+            self._start()
+        if work.dynamics is not None:
+            work.dynamics.update()  # the kinematics, too
+        elif component.kinematics:
+            self.robot.update()
         component.pace = self.overload.advance(work.advance(now))
         following = self.outputs.following
         if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
@@ -329,15 +335,6 @@ class Plugin:
         if was_running:
             self.requests.note(RESET, f"waits {self._readiness.lacks}")
             self.component.reset()
-
-    def _update_robot(self, life: PluginState) -> None:
-        """Compute the kinematics and the dynamics that the component requests; at a start, start."""
-        if life is STARTING or self.component.kinematics:
-            self.robot.update()
-        if life is STARTING:
-            self._start()
-        if self._work.dynamics is not None:
-            self._work.dynamics.update()
 
     def _wait(self) -> None:
         """Wait for what the plugin lacks, and log it if it has changed."""

@@ -117,19 +117,22 @@ class Handler(Generic[PointT]):
     @property
     def value(self) -> np.ndarray:
         """Values of all points as of the last `update`, shape (size,); live until points are added or removed."""
-        self._lay_out()
+        if not self._is_laid_out:
+            self._lay_out()
         return self._memory.value
 
     @property
     def jacobian(self) -> np.ndarray:
         """Jacobians of all points as of the last `update` with Jacobians, shape (rows, cols); live as `value`."""
-        self._lay_out()
+        if not self._is_laid_out:
+            self._lay_out()
         return self._memory.jacobian
 
     @property
     def offset(self) -> np.ndarray:
         """Offsets of DynamicPoints, zeros for all others, as of the last `update`, shape (rows,); live as `value`."""
-        self._lay_out()
+        if not self._is_laid_out:
+            self._lay_out()
         return self._memory.offset
 
     @property
@@ -153,9 +156,11 @@ class Handler(Generic[PointT]):
         Raises:
             PointError: One of the points calls this itself, or changes the Handler.
         """
-        self._require_rest()
+        if self._is_running:
+            self._require_rest()
         if not self._program.is_current:
-            self._lay_out()
+            if not self._is_laid_out:
+                self._lay_out()
             self._program.complete(self._sequence, self._memory.robot, self._memory.jacobian.shape[1])
         self._is_running = True
         try:
@@ -166,8 +171,6 @@ class Handler(Generic[PointT]):
 
     def _lay_out(self) -> None:
         """Move the arrays of the points to their places in the concatenated arrays."""
-        if self._is_laid_out:
-            return
         self._memory.provide(self.size, self.rows, self.cols, common_robot(*self._points))
         self._sequence = [part for point in self._points for part in self._memory.place(point)]
         self._program.expire()

@@ -30,6 +30,11 @@ class Contacts(Handler[Contact]):
         robot: The Robot.
         records: Its contacts.
 
+    Attributes:
+        wrenches: Forces, then torques of the ground on the robot at the contacts in world axes, shape (k, 6) [N, Nm].
+            Live until contacts come or go, and the same memory as each contact's `wrench`: their source, a measurement
+            or an estimate, writes them.
+
     Raises:
         PointError: Two have one name, or a wheel lacks its radii.
     """
@@ -38,7 +43,7 @@ class Contacts(Handler[Contact]):
         super().__init__()
         self._robot = robot
         self._names: list[str] = []
-        self._wrenches = np.zeros((0, 6))
+        self.wrenches = np.zeros((0, 6))
         self._constraints: Handler[ContactConstraint] | None = None
         for record in records:
             self.add(make_contact(record, robot), record.name)
@@ -54,18 +59,9 @@ class Contacts(Handler[Contact]):
         return self.value.reshape(-1, 3)
 
     @property
-    def wrenches(self) -> np.ndarray:
-        """Forces, then torques of the ground on the robot at the contacts in world axes, shape (k, 6) [N, Nm].
-
-        Live until contacts come or go, and the same memory as each contact's `wrench`: their source, a measurement or
-        an estimate, writes them.
-        """
-        return self._wrenches
-
-    @property
     def forces(self) -> np.ndarray:
         """Reaction forces of the ground in world axes, shape (k, 3) [N]; the first half of `wrenches`."""
-        return self._wrenches[:, :3]
+        return self.wrenches[:, :3]
 
     @property
     def constraints(self) -> Handler[ContactConstraint]:
@@ -154,6 +150,6 @@ class Contacts(Handler[Contact]):
 
     def _share_wrenches(self) -> None:
         """Make one array for the wrenches of all contacts."""
-        self._wrenches = np.empty((len(self), 6))
-        for contact, wrench in zip(self, self._wrenches, strict=True):
+        self.wrenches = np.empty((len(self), 6))
+        for contact, wrench in zip(self, self.wrenches, strict=True):
             contact.move_wrench(wrench)

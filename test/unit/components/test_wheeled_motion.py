@@ -241,7 +241,7 @@ def test_joints_stay_within_their_limits(make):
 def test_the_base_stops_without_messages(make, left_out, silent, braking):
     """Silence and braking, 0.2 m/s at 0.3 m/s2, count by the clock, also where cycles are left out."""
     component = make()
-    component.passed = (1 + left_out) * PERIOD
+    component.let_pass((1 + left_out) * PERIOD)
     cycle(component, 200, (0.2, 0.0, 0.0))
     cycle(component, silent)
     assert_allclose(component.references.velocity[0], 0.2)

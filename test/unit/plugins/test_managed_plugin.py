@@ -20,6 +20,10 @@ class Obedient:
         if self.fails == name:
             raise RuntimeError(f"fails in {name}")
 
+    @property
+    def life(self):
+        return PluginState.RUNNING if self.running else PluginState.STARTING
+
     def blend_in(self, duration):
         self.duration = duration
 

@@ -182,7 +182,7 @@ def test_a_single_plugin_needs_no_services():
 def test_a_set_that_makes_no_sense_is_refused(names, rates, said):
     plugins = Several(names=("one", "two")).plugins[: len(names)]
     for plugin, name, rate in zip(plugins, names, rates, strict=True):
-        plugin.component._name, plugin.rate = name, rate
+        plugin.component.name, plugin.rate = name, rate
     with pytest.raises(MiddlewareError, match=said):
         PluginSet(plugins)
 

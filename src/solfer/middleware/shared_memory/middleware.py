@@ -45,26 +45,28 @@ class _ServedCalls:
 
     Args:
         namespace: The namespace.
+
+    Attributes:
+        notification: Sent with each notification of the namespace.
+        is_busy: Whether a service works on a call, or is new.
     """
 
     def __init__(self, namespace: Namespace):
         self._servers: list[ServiceServer] = []
-        self._notification = namespace.any_notification()
-        self._busy = True
+        self.notification = namespace.any_notification()
+        self.is_busy = True
 
     def add(self, server: ServiceServer) -> None:
         """Add a service."""
-        self._busy = True
+        self.is_busy = True
         self._servers.append(server)
 
     def poll(self) -> None:
-        """Receive calls. Does not block."""
-        notification = self._notification
-        if self._busy or notification.words[notification.place] != notification.received:
-            notification.acknowledge()
-            for server in self._servers:
-                server.poll()
-            self._busy = any(server.busy for server in self._servers)
+        """Receive calls, if there are any. Does not block."""
+        self.notification.acknowledge()
+        for server in self._servers:
+            server.poll()
+        self.is_busy = any(server.busy for server in self._servers)
 
     def close(self) -> None:
         """End all services."""
@@ -131,7 +133,10 @@ class XbotMiddleware(Middleware):
 
     def poll(self) -> None:
         """Receive calls of services and replies to requests. Does not block."""
-        self._served.poll()
+        served = self._served
+        notification = served.notification
+        if served.is_busy or notification.words[notification.place] != notification.received:
+            served.poll()
         if self._calls.open:
             self._calls.poll()
 

@@ -119,7 +119,7 @@ class ManagedPlugin:
             self.abort(located(error), error)
             return
         if self.state is RUNNING:
-            if not self.plugin.running:
+            if self.plugin.life is not RUNNING:
                 self._go(STARTING, self.plugin.health()[1])
             elif self.reason != self.plugin.overload.reason:
                 self._go(RUNNING, self.plugin.overload.reason)

@@ -120,7 +120,8 @@ class Outputs:
         for joint_pipe, values in self._unguarded:
             if not self._finite(values):
                 _refuse(joint_pipe)
-        self.blend.step()
+        if self.blend.active:
+            self.blend.step()
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""

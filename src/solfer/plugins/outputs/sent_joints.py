@@ -45,7 +45,9 @@ class SentJoints:
 
     def keep(self) -> None:
         """Keep what is sent in this cycle."""
-        farthest = max([self._keep(*block) for block in self._blocks], default=0.0)
+        farthest = 0.0
+        for block in self._blocks:
+            farthest = max(farthest, self._keep(*block))
         if self.is_sent:
             self.distance += farthest
         self.is_sent = self._are_followed = True

@@ -39,6 +39,10 @@ class StartBlend:
         shortest: Shortest T where it is not zero [s].
         measured: Whether each DoF's position is measured, shape (robot.size,); others are not blended. None: all are.
         efforts: Whether each DoF's effort is measured, shape (robot.size,); None: none is.
+
+    Attributes:
+        shortest: See above.
+        active: Whether the start is not over yet.
     """
 
     def __init__(
@@ -64,21 +68,18 @@ class StartBlend:
             for field, values in pipe.fields
         ]
         self._cycles = self._left = 0
-        self._planned = True
-
-    @property
-    def active(self) -> bool:
-        """Whether the start is not over yet."""
-        return self._left > 0 or not self._planned
+        self._is_planned = True
+        self.active = False
 
     def start(self, position: np.ndarray) -> None:
         """Start again at the next `step`, with joints at `position`, shape (robot.size,) [rad, m]."""
         self._position = position
-        self._planned = False
+        self._is_planned = False
+        self.active = True
 
     def step(self) -> None:
         """Blend what the pipes have collected, in place; to be called once a cycle, before sending."""
-        if not self._planned:
+        if not self._is_planned:
             self._plan()
         if self._left > 0:
             u = 1.0 - self._left / self._cycles
@@ -86,6 +87,7 @@ class StartBlend:
             for field in self._fields:
                 field.blend(share)
             self._left -= 1
+        self.active = self._left > 0
 
     def _plan(self) -> None:
         """Set where blending begins, and its duration."""
@@ -94,7 +96,7 @@ class StartBlend:
         away = any(field.gap.any() for field in self._fields)
         duration = max(self.shortest, *(field.time() for field in self._fields)) if away else 0.0
         self._cycles = self._left = math.ceil(duration * self._rate)
-        self._planned = True
+        self._is_planned = True
         if away:
             logger.info("%s: commands blend in over %.2f s from where the joints are", self._owner, duration)
 

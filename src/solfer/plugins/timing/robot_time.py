@@ -52,7 +52,8 @@ class RobotTime:
             self._ahead = 0.0
             self._follows = False
         if not self._follows:
-            self._follow(not -EARLIEST <= self._ahead <= LATEST)
+            if not -EARLIEST <= self._ahead <= LATEST:
+                self._follow(True)
             return by_clock
         self._looked += by_clock
         # the clock counts again where the robot was no more than 0.02 s slower or faster within a second

@@ -21,6 +21,7 @@ from solfer.transport.messages import (
 
 Converter = Callable[[Any], Any]
 
+_SCALARS = frozenset((float, int, bool, str))
 _XYZ = ("x", "y", "z")
 _XYZW = ("x", "y", "z", "w")
 _PLACES: dict[str, tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = {
@@ -74,13 +75,23 @@ def value_of(cls: type, message: Message) -> Any:
 
 def plain(value: Any) -> Any:
     """Convert a dataclass to a mapping of its fields, nested ones as well; arrays become tuples."""
-    if dataclasses.is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    kind = type(value)
+    if dataclasses.is_dataclass(kind):
+        fields = {}
+        for name in _names(kind):
+            each = getattr(value, name)
+            fields[name] = each if type(each) in _SCALARS else plain(each)
+        return fields
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, tuple | list):
-        return tuple(plain(each) for each in value)
+        return tuple(value) if _SCALARS.issuperset(map(type, value)) else tuple(map(plain, value))
     return value
+
+
+@functools.cache
+def _names(cls: type) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(cls))
 
 
 def made(cls: type, fields: Mapping[str, Any]) -> Any:

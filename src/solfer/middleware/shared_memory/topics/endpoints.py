@@ -161,6 +161,7 @@ class XbotQueue(Queue):
         self._sender_segments = SenderSegments(namespace, topic, message, end=Ring)
         self._notification = self._sender_segments.notification
         self._messages: deque[Any] = deque(maxlen=size)
+        self.waits = self  # see `Queue.waits`
         self._sender_segments.update()
         for sender_segment in self._sender_segments.current:
             sender_segment.end.skip()
@@ -169,11 +170,6 @@ class XbotQueue(Queue):
     def ends(self) -> "list[Slot | Ring]":
         """The ends from which the messages come, until the notification of the topic is sent."""
         return [sender_segment.end for sender_segment in self._sender_segments.current]
-
-    @property
-    def waits(self) -> "XbotQueue":
-        """See `Queue.waits`."""
-        return self
 
     def __bool__(self) -> bool:
         notification = self._notification
