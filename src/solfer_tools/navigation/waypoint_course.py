@@ -1,10 +1,8 @@
 """Waypoints on `cmd_vel`."""
 
-import math
-
 from solfer.transport import Middleware
 from solfer.transport.messages import FieldsMessage
-from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose
+from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose, rotated
 from solfer_tools.navigation.waypoints import WaypointFollower
 
 
@@ -53,9 +51,7 @@ class WaypointCourse(Course):
         moves = follower.step(place, period, pace)
         self._rested = 0.0 if moves else self._rested + period
         x, y, rate = follower.velocity
-        cos = math.cos(pose.heading)
-        sin = math.sin(pose.heading)
-        self._publish(cos * x + sin * y, cos * y - sin * x, rate)
+        self._publish(*rotated(x, y, -pose.heading), rate)
         if moves:
             return True
         if self._rested >= self._settles and pose.still >= 0.3:

@@ -101,11 +101,14 @@ class VariationRecord(Record):
     @property
     def kind(self) -> str:
         """Which of its keys is given."""
-        return next(key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None)
+        return self._given()[0]
+
+    def _given(self) -> tuple[str, ...]:
+        return tuple(key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None)
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "VariationRecord":
-        given = [key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None]
+        given = self._given()
         if len(given) != 1:
             raise ValueError("one of `grid`, `list`, `choice`, `uniform`, `log_uniform` and `normal`")
         if given[0] in ("uniform", "log_uniform"):
