@@ -25,7 +25,7 @@ import uuid
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from solfer.errors import StudyError
+from solfer.errors import StudyError, writing
 from solfer_tools.study.plan import OUTCOME, ROW, Plan, PlannedRun, ShortHash, Study, study_of
 from solfer_tools.study.result import Result
 
@@ -129,7 +129,7 @@ class StudyFolder:
             StudyError: The folder cannot be written, or has runs of another study or of other code.
         """
         runs = list(plan.runs)
-        with writing(path):
+        with writing_to(path):
             (path / RUNS).mkdir(parents=True, exist_ok=True)
             if (path / STUDY).exists():
                 before = cls(path)
@@ -181,7 +181,7 @@ class StudyFolder:
         """
         self._data.runs.append(run)
         self.runs = (*self.runs, run)
-        with writing(self.path):
+        with writing_to(self.path):
             _write(self.path, self._data)
 
     def of(self, run: PlannedRun) -> Path:
@@ -213,7 +213,7 @@ class StudyFolder:
             StudyError: The folder cannot be written, or leads elsewhere.
         """
         folder = self.of(run)
-        with writing(folder):
+        with writing_to(folder):
             folder.mkdir(parents=True, exist_ok=True)
             self._check_inside(run)
             last = max(self._attempts(run), default=0)
@@ -235,7 +235,7 @@ class StudyFolder:
         folder = self.of(run)
         temporary = folder / f"{RESULT}.{uuid.uuid4().hex}"
         try:
-            with writing(folder):
+            with writing_to(folder):
                 folder.mkdir(parents=True, exist_ok=True)
                 temporary.write_bytes(json.dumps(result.as_json(), indent=1, sort_keys=True).encode())
                 with suppress(FileExistsError):
@@ -334,7 +334,7 @@ class StudyFolder:
         writer.writeheader()
         writer.writerows(rows)
         files = [self.path / "table.csv"]
-        with writing(self.path):
+        with writing_to(self.path):
             write_whole(files[0], text.getvalue().encode())
             with suppress(ImportError):
                 files.append(_write_parquet(self.path / "table.parquet", head, rows))
@@ -456,14 +456,6 @@ def _started(process: int) -> str:
     return ""
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing_to(path: Path) -> AbstractContextManager[None]:
     """Raise a StudyError where a file or folder cannot be written."""
-    try:
-        yield
-    except OSError as error:
-        raise StudyError(
-            f"it cannot be written: {error.strerror or error}",
-            where=str(path),
-            expected="a folder with room, of this user",
-        ) from None
+    return writing("it", path, StudyError, "a folder with room, of this user")

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from concurrent.futures import Future
 from functools import partial
 
 from viser import GuiApi, GuiButtonHandle, GuiEvent
@@ -10,7 +9,7 @@ from viser import GuiApi, GuiButtonHandle, GuiEvent
 from solfer.errors import MiddlewareError
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage
-from solfer.transport.topics import Topics
+from solfer_tools.scene.discovery import TopicRequests
 from solfer_tools.view.commands.requests import PageRequests
 
 CMD_VEL = "cmd_vel"
@@ -40,8 +39,7 @@ class DrivingPad:
         self._direction = (0.0, 0.0, 0.0)
         self._pressed = -math.inf
         self._drives = False
-        self._topics: Future[Topics] | None = None
-        self._next = -math.inf
+        self._topics = TopicRequests(middleware)
         self._module = gui.add_dropdown("base", ("",))
         self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
         directions = {  # x, y, yaw
@@ -57,18 +55,11 @@ class DrivingPad:
 
     def find_modules(self) -> None:
         """Look once a second which components drive the base."""
-        now = self._middleware.now()
-        if self._topics is None and now >= self._next:
-            self._topics = self._middleware.topics()
-            self._next = now + 1.0
-        if self._topics is None or not self._topics.done():
-            return
-        topics = self._topics
-        self._topics = None
         try:
-            received = topics.result().received
-        except MiddlewareError:  # it is asked again
+            topics = self._topics.answer()
+        except MiddlewareError:
             return
+        received = () if topics is None else topics.received
         modules = sorted(name.removesuffix(f"/{CMD_VEL}") for name in received if name.endswith(f"/{CMD_VEL}"))
         if modules and tuple(modules) != tuple(self._module.options):
             self._module.options = tuple(modules)
