@@ -169,6 +169,11 @@ def heading_of(quaternion: np.ndarray) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def twist(x: float, y: float, rate: float) -> FieldsMessage:
+    """Make the message of velocities x and y [m/s] and a rate of the heading [rad/s]."""
+    return FieldsMessage({"linear": {"x": x, "y": y, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": rate}})
+
+
 def rotated(x: float, y: float, angle: float) -> tuple[float, float]:
     """Return a vector after a rotation by an angle [rad]."""
     cos = math.cos(angle)

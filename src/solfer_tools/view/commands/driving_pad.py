@@ -8,7 +8,7 @@ from viser import GuiApi, GuiButtonHandle, GuiEvent
 
 from solfer.errors import MiddlewareError
 from solfer.transport import Middleware, Writer
-from solfer.transport.messages import FieldsMessage
+from solfer_tools.navigation.course import twist
 from solfer_tools.scene.discovery import TopicRequests
 from solfer_tools.view.commands.requests import PageRequests
 
@@ -75,9 +75,7 @@ class DrivingPad:
         if module not in self._writers:
             topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
             self._writers[module] = self._middleware.declared_writer(topic, "geometry_msgs/Twist")
-        linear = {"x": x, "y": y, "z": 0.0}
-        angular = {"x": 0.0, "y": 0.0, "z": 2.0 * yaw}  # 2 rad/s at 1 m/s
-        self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
+        self._writers[module].write(twist(x, y, 2.0 * yaw))  # 2 rad/s at 1 m/s
         self._drives = pressed
 
     def release(self) -> None:
