@@ -7,6 +7,7 @@ exit with code 2. Third-party exceptions stop at the border of the room where th
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 LONGEST_NAME = 200  # characters of a name that could be a typing error; a long one takes long to compare
 
@@ -276,6 +277,18 @@ def _places(error: BaseException) -> list[str]:
     authors = [each for each in foreign if not any(folder in each[0].co_filename for folder in _LIBRARIES)]
     shown = (authors or foreign)[-FRAMES:] or ([] if isinstance(error, SolferError) else walked[-1:])
     return [f"{code.co_filename}:{line} in {code.co_name}" for code, line in shown]
+
+
+@contextmanager
+def writing(
+    what: str, where: object, kind: type[SolferError] = SolferError, expected: str = "a file that you may write to"
+) -> Iterator[None]:
+    """Raise an error of a kind where a file or a folder cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or error
+        raise kind(f"{what} cannot be written: {why}", where=str(where), expected=expected) from error
 
 
 def raise_all(errors: Sequence[SolferError]) -> None:

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 from solfer.simulation import Simulation
+from solfer.simulation.bullet import load_pybullet
 
 
 class RawBullet(NamedTuple):
@@ -25,4 +26,5 @@ class RawBullet(NamedTuple):
 
 def raw_bullet(simulation: Simulation) -> RawBullet:
     robot = simulation.body.robot
-    return RawBullet(robot._bullet, robot._client, robot.number, joints=robot._indices, links=robot._numbers)
+    client = robot._world.number
+    return RawBullet(load_pybullet(), client, robot.number, joints=robot._indices, links=robot._numbers)

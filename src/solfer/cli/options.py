@@ -1,6 +1,7 @@
 """Options that several sub-commands share."""
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,16 @@ def add_search_paths(parser: argparse.ArgumentParser) -> None:
 def add_system(parser: argparse.ArgumentParser) -> None:
     """Add --system, which replaces the `system` of the file."""
     parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
+
+
+def add_namespace(
+    parser: argparse.ArgumentParser, actions: Iterable[argparse.ArgumentParser], default: str, meaning: str
+) -> None:
+    """Add --namespace before and after each action of a sub-command; an action prints its own usage after a mistake."""
+    parser.add_argument("--namespace", default=default, metavar="NAME", help=meaning)
+    for action in actions:
+        action.add_argument("--namespace", default=argparse.SUPPRESS, metavar="NAME", help=meaning)
+        action.set_defaults(parser=action)
 
 
 def rate_number() -> Number:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from solfer.config import Record, read
-from solfer.config.records.bounds import DIRECTION, LENGTH, OFFSET
+from solfer.config.records.bounds import DIRECTION, LENGTH, OFFSET, Name
 
 _Coordinate = Annotated[float, Field(**OFFSET)]
 Place = tuple[_Coordinate, _Coordinate, _Coordinate]
@@ -53,8 +53,8 @@ class ConstraintRecord(Record):
 class ContactRecord(Record):
     """A contact in a file."""
 
-    name: str = Field(min_length=1, description="name of the contact")
-    end_frame: str = Field(min_length=1, description="link that touches the ground")
+    name: Name = Field(description="name of the contact")
+    end_frame: Name = Field(description="link that touches the ground")
     type: Literal["contact_point", "wheel"] = Field(description="`contact_point` or `wheel`")
     position: Place = Field(description="the point in the link's frame [m]")
     offset: Place | None = Field(

@@ -74,8 +74,8 @@ class Kinematics:
         """Make the memory of one position and velocity: what `update` computes."""
         self._data = working_data(self._model)
         poses = [(link, self._data.oMf[frame]) for link, frame in self._frames.items()]
-        self._positions = {link: _read_only(pose.translation) for link, pose in poses}
-        self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
+        self._positions = {link: read_only(pose.translation) for link, pose in poses}
+        self._rotations = {link: read_only(pose.rotation) for link, pose in poses}
         self._com = self._data.com[0]
         self._com_jacobian = self._data.Jcom.reshape(3, self.size)
         self._com_is_current = self._frames_are_current = False
@@ -353,7 +353,8 @@ def _limits(values: list[float | None], absent: float) -> np.ndarray:
     return np.array([absent if value is None else value for value in values])
 
 
-def _read_only(array: np.ndarray) -> np.ndarray:
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Return a live view of an array that cannot be written to."""
     view = array.view()
     view.flags.writeable = False
     return view

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from solfer.errors import RecordingError
+from solfer.errors import RecordingError, writing
 from solfer.recording.model import Recording
 
 
@@ -26,14 +26,11 @@ def save_arrays(recording: Recording, path: Path) -> None:
     for name, channel in recording.channels.items():
         arrays |= {name: channel.values, f"{name}.time": channel.times, f"{name}.columns": np.array(channel.columns)}
     try:
-        with draft.open("xb") as file:  # does not follow a link at this path
-            made = True
-            np.savez(file, **arrays)
-        draft.rename(path)
-    except OSError as error:
-        raise RecordingError(
-            f"the arrays cannot be written: {error.strerror}", where=str(path), expected="a file that you may write to"
-        ) from error
+        with writing("the arrays", path, RecordingError):
+            with draft.open("xb") as file:  # does not follow a link at this path
+                made = True
+                np.savez(file, **arrays)
+            draft.rename(path)
     finally:
         with contextlib.suppress(OSError):
             if made:

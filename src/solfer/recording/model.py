@@ -116,6 +116,11 @@ class Recording:
         """Names of the plugins that have channels, in their order."""
         return tuple(dict.fromkeys(name.partition("/")[0] for name in self.channels if "/" in name))
 
+    @property
+    def filled(self) -> list[Channel]:
+        """The channels that have rows."""
+        return [channel for channel in self.channels.values() if len(channel.times)]
+
     def __getitem__(self, name: str) -> Channel:
         """Return a channel.
 

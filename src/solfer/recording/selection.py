@@ -66,8 +66,9 @@ def _narrowed(channel: Channel, places: list[int]) -> Channel:
 
 def span(recording: Recording) -> tuple[float, float]:
     """Return the times of the first and the last row [s]; zeros without any."""
-    filled = [channel.times for channel in recording.channels.values() if len(channel.times)]
-    return min((float(each[0]) for each in filled), default=0.0), max((float(each[-1]) for each in filled), default=0.0)
+    filled = recording.filled
+    first = min((float(each.times[0]) for each in filled), default=0.0)
+    return first, max((float(each.times[-1]) for each in filled), default=0.0)
 
 
 def between(recording: Recording, begin: float | None, end: float | None, start: float) -> Recording:

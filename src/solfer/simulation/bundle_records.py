@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from solfer.config import FileRecord, Record
+from solfer.config.records.bounds import Name
 from solfer.lower_level.records import JointControllerRecord, LowerLevelRecord
 from solfer.simulation.sensors.records import SensorsRecord
 from solfer.simulation.world.records import DEFAULT_FRICTION, FRICTION, GROUND_FRICTION
@@ -13,14 +14,14 @@ from solfer.simulation.world.records import DEFAULT_FRICTION, FRICTION, GROUND_F
 class PartRecord(Record):
     """A part of the robot that can be controlled as a robot of its own."""
 
-    at: str = Field(min_length=1, description="link above the cut")
+    at: Name = Field(description="link above the cut")
     keep: Literal["upper", "lower"] = Field(description="what stays of the robot")
 
 
 class StartRecord(Record):
     """How a simulation begins."""
 
-    state: str = Field(min_length=1, description="named state of the SRDF")
+    state: Name = Field(description="named state of the SRDF")
 
 
 class FrictionRecord(Record):
@@ -36,7 +37,7 @@ class FrictionRecord(Record):
 class BundleRecord(Record):
     """A robot: its files, its controllers, and how it is simulated. Paths are relative to the bundle's file."""
 
-    name: str = Field(min_length=1, description="name of the robot")
+    name: Name = Field(description="name of the robot")
     urdf: FileRecord = Field(description="model")
     srdf: FileRecord | None = Field(default=None, description="groups and named states")
     contacts: FileRecord | None = Field(default=None, description="contact points")

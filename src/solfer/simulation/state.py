@@ -5,15 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.model.kinematics import Kinematics
+from solfer.model.kinematics import Kinematics, read_only
 from solfer.simulation.physics import ContactPoint
-
-
-def read_only(array: np.ndarray) -> np.ndarray:
-    """Return a live view of an array that cannot be written to."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
 
 
 class Moment:

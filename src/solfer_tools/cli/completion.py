@@ -14,8 +14,7 @@ from solfer.errors import SolferError
 
 def complete(parser: argparse.ArgumentParser) -> None:
     """Answer a shell that completes a command line, and end the program; else do nothing."""
-    if "_ARGCOMPLETE" in os.environ:
-        finder(parser)(parser)
+    finder(parser)(parser)
 
 
 def finder(parser: argparse.ArgumentParser) -> CompletionFinder:

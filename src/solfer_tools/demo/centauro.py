@@ -4,7 +4,6 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from solfer.robot import Robot
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.transport import Middleware
 from solfer_tools.demo import report, story
-from solfer_tools.demo.record import MotionRecorder
+from solfer_tools.demo.record import MotionRecorder, TopicRecorder
 
 LOW = "mammal_wide_straight"
 """Named state with straight legs, in which the robot begins."""
@@ -22,13 +21,6 @@ HIGH = "mammal_wide_high"
 
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ended."""
-
-
-class Latest(Protocol):
-    """What keeps messages of the robot."""
-
-    def newest(self, topic: str) -> Any:
-        """Return the newest message of 'measured' or 'base'."""
 
 
 class Progress:
@@ -72,21 +64,37 @@ def demonstrate(
     Raises:
         SolferError: The robot does not start, or a plugin refuses.
     """
-    middleware = show.middleware
     recorder = MotionRecorder(show.robot)
-    storyteller = story.StoryTeller(middleware, recorder, Progress(), plugins=services)
-    storyteller.wait_for_robot(60.0, show.check)
-    if not middleware.running():
-        return INTERRUPTED
-    print(f"CENTAURO stands; first motion {time.monotonic() - show.started:.1f} s after the start", flush=True)
-    robot = load_robot(middleware)
-    for step in steps(robot, recorder):
+    storyteller = story.StoryTeller(show.middleware, recorder, Progress(), plugins=services)
+    robot = robot_that_stands(show, storyteller, recorder)
+    for step in [] if robot is None else steps(robot, recorder):
         show.check()
         storyteller.publish(step)
-        if not middleware.running():
-            return INTERRUPTED
+        if not show.middleware.running():
+            break
+    if robot is None or not show.middleware.running():
+        return INTERRUPTED
     storyteller.rest("stands", 1.0)
     return conclude(show, robot, recorder, plugin=plugin)
+
+
+def robot_that_stands(show: story.Show, storyteller: story.StoryTeller, recorder: MotionRecorder) -> Robot | None:
+    """Wait until the robot stands, and return it at its measured posture; None: the middleware has ended.
+
+    Raises:
+        MiddlewareError: The robot does not start.
+    """
+    storyteller.wait_for_robot(60.0, show.check)
+    return placed_robot(show.middleware, recorder, show.started) if show.middleware.running() else None
+
+
+def placed_robot(middleware: Middleware, recorder: TopicRecorder, started: float) -> Robot:
+    """Report that the robot stands, and build it at its measured posture."""
+    print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start", flush=True)
+    robot = load_robot(middleware)
+    robot.state.position[:] = posture(robot, recorder)
+    robot.update()
+    return robot
 
 
 def steps_of(robot: Robot, recorder: MotionRecorder) -> list[story.StoryStep]:
@@ -131,7 +139,7 @@ def parts(robot: Robot) -> dict[str, set[str]]:
     return {"upper body": set(robot.dofs) - lower, "lower body": lower}
 
 
-def posture(robot: Robot, recorder: "Latest") -> np.ndarray:
+def posture(robot: Robot, recorder: TopicRecorder) -> np.ndarray:
     """Return the robot's DoFs as they were measured last, shape (n,)."""
     position = np.zeros(robot.size)
     joints = recorder.newest("measured")

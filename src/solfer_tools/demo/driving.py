@@ -11,7 +11,7 @@ from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.health import Health
 from solfer.transport.plugin_state import SAFE_STOP
-from solfer_tools.demo.centauro import INTERRUPTED, Progress, load_robot, posture
+from solfer_tools.demo.centauro import INTERRUPTED, Progress, placed_robot
 from solfer_tools.demo.driving_record import DrivingRecorder
 from solfer_tools.demo.waving import Waving, hands_of, robot_time
 from solfer_tools.navigation import Navigation, ScenarioCourse
@@ -113,7 +113,7 @@ class Driving:
             nonlocal cycles, shown
             navigation.cycle(skipped)
             waving.send(robot_time(self._recorder) - robot_begin)
-            self._recorder.look()
+            self._recorder.collect()
             if cycles % 10 == 0:
                 check()
                 errors.check()
@@ -143,7 +143,7 @@ class Driving:
         while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(20) >= 0.05):
             course.rest()
             time.sleep(1.0 / COURSE_RATE)
-            self._recorder.look()
+            self._recorder.collect()
             looks += 1
 
 
@@ -175,13 +175,10 @@ def wait_for_robot(
             )
         check()
         time.sleep(0.05)
-        recorder.look()
+        recorder.collect()
     if not middleware.running():
         return None
-    print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start", flush=True)
-    robot = load_robot(middleware)
-    robot.state.position[:] = posture(robot, recorder)
-    robot.update()
+    robot = placed_robot(middleware, recorder, started)
     legs = Robot.load(middleware.parameter("/robot_lower_body"))
     course = located("package://solfer/config/figures/course.yaml", ".")
     return Driving(middleware, recorder, robot, legs=legs, course=course)

@@ -1,17 +1,19 @@
 """Figures of the demonstration of Fig. 5: the true motion of the robot, against the desired one of its recording."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from solfer.recording.model import Channel, Recording
 from solfer.robot import Robot
+from solfer.transport import BodyMessage
 from solfer.transport.middleware import HealthReport
 from solfer_tools.demo.driving_record import DrivingRecorder
 from solfer_tools.demo.report import LAYER, Row, layer, published
 from solfer_tools.demo.waving import hands_of
+from solfer_tools.navigation.course import heading_of
 
 SAMPLE_PERIOD = 0.04
 """Period in which the motion of the robot is sampled [s]."""
@@ -77,7 +79,7 @@ class Tracked:
 
 def tracked(recorder: DrivingRecorder, seen: Seen, recording: Recording) -> dict[str, Tracked]:
     """Return the measured places beside the desired ones of the recording: centre of mass, vertices and hands."""
-    times = recorder.clock.times(seen.time)
+    times = recorder.clocks["measured"].times(seen.time)
     count = len(times)
     vertices = tuple(f"{wheel}.{axis}" for wheel in WHEEL_NAMES for axis in "xy")
     hands = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")
@@ -97,22 +99,11 @@ def tracked(recorder: DrivingRecorder, seen: Seen, recording: Recording) -> dict
 
 def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
     """Compute what the robot, and its legs, did from joints and the true base."""
-    joints = recorder.messages("measured")
-    times = np.array([each.stamp for each in joints])
-    places = np.array([each.position for each in joints])
-    dofs = [robot.dof(name) for name in joints[0].names]
     kinematics = robot.kinematics
     of_legs = [robot.dof(name) for name in legs.dofs]
     rows = []
-    last = -math.inf
-    for message in recorder.messages("base"):
-        if message.stamp - last < SAMPLE_PERIOD or message.stamp > times[-1]:
-            continue
-        last = message.stamp
+    for base in _bases(robot, recorder):
         q = robot.state.position
-        q[dofs] = places[min(int(np.searchsorted(times, last)), len(times) - 1)]
-        kinematics.base.from_pose(message.position, message.orientation, q[:6])
-        robot.update()
         rotation = kinematics.rotation("pelvis")
         place = kinematics.position("pelvis")
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
@@ -125,9 +116,29 @@ def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
         center = yaw.T @ (robot.center_of_mass.value - place)
         vertices = np.array([(_vertex(robot, wheel) - place) @ yaw for wheel in WHEEL_NAMES])[:, :2]
         hands = np.array(list(hands_of(robot).values()))
-        rows.append((last, q.copy(), np.array((place[0], place[1], heading)), tracked, center, vertices, hands))
-    time, position, base, *others = (np.array(column) for column in zip(*rows, strict=True))
-    return Seen(time, position, _from_begin(base), *others)
+        rows.append((base.stamp, q.copy(), np.array((place[0], place[1], heading)), tracked, center, vertices, hands))
+    time, position, bases, *others = (np.array(column) for column in zip(*rows, strict=True))
+    return Seen(time, position, _from_begin(bases), *others)
+
+
+def _bases(robot: Robot, recorder: DrivingRecorder) -> Iterator[BodyMessage]:
+    """Yield the true base once each `SAMPLE_PERIOD`, and let the Robot be as it was measured then."""
+    joints = recorder.messages["measured"]
+    times = np.array([each.stamp for each in joints])
+    dofs = [robot.dof(name) for name in joints[0].names]
+    q = robot.state.position
+    v = robot.state.velocity
+    last = -math.inf
+    for base in recorder.messages["base"]:
+        if base.stamp - last < SAMPLE_PERIOD or base.stamp > times[-1]:
+            continue
+        last = base.stamp
+        near = joints[min(int(np.searchsorted(times, last)), len(joints) - 1)]
+        q[dofs], v[dofs] = near.position, near.velocity
+        robot.kinematics.base.from_pose(base.position, base.orientation, q[:6])
+        v[:6] = 0.0
+        robot.update()
+        yield base
 
 
 def _vertex(robot: Robot, wheel: str) -> np.ndarray:
@@ -194,8 +205,7 @@ def table(
 
 def _drift(recorder: DrivingRecorder, seen: Seen, distance: float) -> str:
     """Report how far the estimate of the base is off at the end; the robot rests there, so that stamps do not count."""
-    estimates = recorder.messages("odometry")
-    poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in estimates])
+    poses = np.array([(*each.position[:2], heading_of(each.orientation)) for each in recorder.messages["odometry"]])
     x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
     off = math.hypot(x, y)
     turned = math.degrees(math.remainder(heading, math.tau))
@@ -210,38 +220,16 @@ def bounded(value: float, most: float, unit: str) -> str:
     return "" if value <= most else f"{EXCESS_MARK}{most:g} {unit}"
 
 
-def _heading(quaternion: np.ndarray) -> float:
-    """Compute the heading of a Hamilton quaternion (x, y, z, w) [rad]."""
-    x, y, z, w = quaternion
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-
-
 def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
     """Compute the displacement of the wheels' material over the ground, as a fraction of the path of their centres."""
-    joints = recorder.messages("measured")
-    times = np.array([each.stamp for each in joints])
-    dofs = [robot.dof(name) for name in joints[0].names]
     kinematics = robot.kinematics
-    last = -math.inf
     slid = gone = 0.0
-    for message in recorder.messages("base"):
-        if message.stamp - last < SAMPLE_PERIOD or message.stamp > times[-1]:
-            continue
-        last = message.stamp
-        q = robot.state.position
-        v = robot.state.velocity
-        near = joints[min(int(np.searchsorted(times, last)), len(joints) - 1)]
-        q[dofs], v[dofs] = near.position, near.velocity
-        kinematics.base.from_pose(message.position, message.orientation, q[:6])
-        v[:6] = 0.0
-        robot.update()
+    for base in _bases(robot, recorder):
         place = kinematics.position("pelvis")
-        linear = message.linear
-        angular = message.angular
         for wheel in WHEEL_NAMES:
-            rates = kinematics.jacobian(wheel) @ v
-            center = rates[:3] + linear + np.cross(angular, kinematics.position(wheel) - place)
-            spin = rates[3:] + angular
+            rates = kinematics.jacobian(wheel) @ robot.state.velocity
+            center = rates[:3] + base.linear + np.cross(base.angular, kinematics.position(wheel) - place)
+            spin = rates[3:] + base.angular
             material = center + np.cross(spin, (0.0, 0.0, -RING_RADIUS - TUBE_RADIUS))
             slid += float(np.linalg.norm(material[:2]))
             gone += float(np.linalg.norm(center[:2]))
@@ -251,7 +239,7 @@ def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
 def _forces(robot: Robot, recorder: DrivingRecorder) -> str:
     """Report how much of the weight the estimated forces carry."""
     weight = 9.81 * robot.kinematics.mass
-    sums = np.array([each.values[:, 2].sum() for each in recorder.messages("forces")]) / weight
+    sums = np.array([each.values[:, 2].sum() for each in recorder.messages["forces"]]) / weight
     return f"carry {100.0 * float(sums.mean()):.1f} % of the weight, {100.0 * float(sums.std()):.1f} % RMS about it"
 
 
@@ -265,10 +253,11 @@ def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
             rows.append((f"cycle of {name}", f"{median:.2f} ms median, {most:.2f} ms 99 %"))
     if "full_compensation" in reports:
         rows += published(reports["full_compensation"].values)
-    factor = reports["simulation"].values.get("real-time factor") if "simulation" in reports else None
+    simulation = reports["simulation"].values if "simulation" in reports else {}
+    factor = simulation.get("real-time factor")
     if factor is None:
         return [*rows, ("real-time factor", "not reported")]
-    lost = float(reports["simulation"].values.get("time lost [s]", 0.0))
+    lost = float(simulation.get("time lost [s]", 0.0))
     return [*rows, ("real-time factor", f"{float(factor):.2f} lately, {lost:.1f} s lost")]
 
 
@@ -286,11 +275,9 @@ def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waite
     lowest_factor = 0.95
     factor = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
     lost = float(reports["simulation"].values.get("time lost [s]", 0.0)) if "simulation" in reports else 0.0
-    reasons = (
-        [f"{lost:.1f} s of simulated time were lost"]
-        if factor < lowest_factor or lost > (1.0 - lowest_factor) * taken
-        else []
-    )
+    reasons = []
+    if factor < lowest_factor or lost > (1.0 - lowest_factor) * taken:
+        reasons.append(f"{lost:.1f} s of simulated time were lost")
     for name in (*PLUGINS, LAYER):
         values = reports[name].values if name in reports else {}
         skipped, cycles = (float(values.get(key, 0.0)) for key in ("skipped periods", "cycles"))

@@ -1,10 +1,13 @@
 """Records measured and desired motion of the robot."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from solfer.transport import BodyMessage, JointMessage, Middleware
+from solfer.transport import Middleware
+from solfer_tools.navigation.course import heading_of
 
 
 class ArrivalClock:
@@ -53,38 +56,55 @@ class Trace:
         return self.values[value][:, self.names.index(name)]
 
 
-class MotionRecorder:
-    """Collects all messages of the robot's topics; call `collect` a few times a second.
+class TopicRecorder:
+    """Collects all messages of topics; call `collect` many times a second.
 
     Args:
         middleware: Middleware of the topics.
+        topics: Topic and message of each, by its name here.
+
+    Attributes:
+        messages: What has arrived, by name.
+        clocks: Read the time on the clock of recordings; stamps are of the wall clock, or of simulated time.
     """
 
-    def __init__(self, middleware: Middleware):
-        self._queues = {
-            "measured": middleware.queue("joint_states", "sensor_msgs/JointState", 4000),
-            "desired": middleware.queue("position_controller/command", "solfer/JointCommand", 4000),
-            "base": middleware.queue("floating_base", "nav_msgs/Odometry", 4000),
-        }
-        self._messages: dict[str, list[JointMessage | BodyMessage]] = {name: [] for name in self._queues}
-        self._clocks = {name: ArrivalClock() for name in self._queues}
+    def __init__(self, middleware: Middleware, topics: Mapping[str, tuple[str, str]]):
+        self._queues = {name: middleware.queue(topic, carries, 4000) for name, (topic, carries) in topics.items()}
+        self.messages: dict[str, list[Any]] = {name: [] for name in topics}
+        self.clocks = {name: ArrivalClock() for name in topics}
         self._now = middleware.now
 
     def collect(self) -> None:
         """Store the messages that have arrived."""
         for name, queue in self._queues.items():
             arrived = queue.drain()
-            self._messages[name] += arrived
+            self.messages[name] += arrived
             if arrived:
-                self._clocks[name].note(arrived[-1].stamp, self._now())
+                self.clocks[name].note(arrived[-1].stamp, self._now())
 
-    def newest(self, topic: str) -> JointMessage | BodyMessage | None:
-        """Return the newest message of 'measured', 'desired' or 'base'; None before the first."""
-        return self._messages[topic][-1] if self._messages[topic] else None
+    def newest(self, name: str) -> Any:
+        """Return the newest message of a topic; None before the first."""
+        return self.messages[name][-1] if self.messages[name] else None
+
+
+class MotionRecorder(TopicRecorder):
+    """Collects what the robot measures and is commanded.
+
+    Args:
+        middleware: Middleware of the topics.
+    """
+
+    def __init__(self, middleware: Middleware):
+        topics = {
+            "measured": ("joint_states", "sensor_msgs/JointState"),
+            "desired": ("position_controller/command", "solfer/JointCommand"),
+            "base": ("floating_base", "nav_msgs/Odometry"),
+        }
+        super().__init__(middleware, topics)
 
     def joints(self, topic: str) -> Trace:
         """Return positions and velocities of 'measured' or positions of 'desired'."""
-        messages = self._messages[topic]
+        messages = self.messages[topic]
         names = messages[0].names
         values = {
             value: np.array([getattr(message, value) for message in messages])
@@ -95,16 +115,9 @@ class MotionRecorder:
 
     def base(self) -> Trace:
         """Return positions [m] and yaw [rad] of the floating base, columns x y z yaw."""
-        messages = self._messages["base"]
-        rows = [(*message.position, _yaw(message.orientation)) for message in messages]
+        rows = [(*message.position, heading_of(message.orientation)) for message in self.messages["base"]]
         return Trace(self._times("base"), ("x", "y", "z", "yaw"), {"position": np.array(rows)})
 
     def _times(self, topic: str) -> np.ndarray:
         """Return the times of all messages on one clock: simulation and plugins of a real-time layer stamp by two."""
-        return self._clocks[topic].times(np.array([message.stamp for message in self._messages[topic]]))
-
-
-def _yaw(quaternion: np.ndarray) -> float:
-    """Compute the heading of a Hamilton quaternion (x, y, z, w) [rad]."""
-    x, y, z, w = quaternion
-    return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        return self.clocks[topic].times(np.array([message.stamp for message in self.messages[topic]]))

@@ -1,6 +1,5 @@
 """Schemes of the demonstration, figures of the paper and squats: launch files, and the requests to the robot."""
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -73,13 +72,9 @@ def watch(
     recorder = MotionRecorder(show.robot)
     progress = centauro.Progress()
     teller = story.StoryTeller(middleware, recorder, progress, plugins=())
-    teller.wait_for_robot(60.0, show.check)
-    if not middleware.running():
+    robot = centauro.robot_that_stands(show, teller, recorder)
+    if robot is None:
         return centauro.INTERRUPTED
-    print(f"CENTAURO stands; first motion {time.monotonic() - show.started:.1f} s after the start", flush=True)
-    robot = centauro.load_robot(middleware)
-    robot.state.position[:] = centauro.posture(robot, recorder)
-    robot.update()
     act = actor(robot)
     begin = robot_time(recorder)
     passed = 0.0

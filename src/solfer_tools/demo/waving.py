@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
 
 import numpy as np
 
 from solfer.robot import Robot
 from solfer.transport import Middleware
 from solfer.transport.messages import VectorMessage
+from solfer_tools.demo.record import TopicRecorder
 
 FRAME = "pelvis"
 """Link from which the hands are seen."""
@@ -53,14 +53,7 @@ class Waving:
             self._writers[name].write(self._messages[name])
 
 
-class MeasurementRecorder(Protocol):
-    """Receives what the robot measures."""
-
-    def newest(self, name: str) -> Any:
-        """Return the newest message 'measured'; None before the first."""
-
-
-def robot_time(recorder: MeasurementRecorder) -> float:
+def robot_time(recorder: TopicRecorder) -> float:
     """Return the time of the newest measurement by the robot's clock [s].
 
     Hands wave by it: in a simulation that is slower than the clock of those who command it they would be rushed.

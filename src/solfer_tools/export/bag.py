@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from solfer.errors import MissingDependency, RecordingError
+from solfer.errors import MissingDependency, RecordingError, writing
 from solfer.recording.block import CONTENT, Block, RecordedTopic, together, topics_of
 from solfer.recording.model import COLUMNS_KIND, Recording
 
@@ -20,7 +20,7 @@ COLUMNS_MESSAGE = "std_msgs/msg/Float64MultiArray"
 
 def groups_of(recording: Recording) -> list[RecordedTopic]:
     """Group channels of the same times to topics; those without rows are left out."""
-    groups = together(channel for channel in recording.channels.values() if len(channel.times))
+    groups = together(recording.filled)
     return [topic for channels in groups for topic in topics_of(channels)]
 
 
@@ -45,7 +45,7 @@ def save_bag(recording: Recording, path: Path) -> Iterator[None]:
         ) from error
     store = get_typestore(Stores.ROS1_NOETIC)
     ros2 = get_typestore(Stores.ROS2_HUMBLE)
-    try:
+    with writing("the bag", path, RecordingError):
         path.unlink(missing_ok=True)
         with Writer(path) as bag:
             streams = []
@@ -58,10 +58,6 @@ def save_bag(recording: Recording, path: Path) -> Iterator[None]:
             for time, place, message in heapq.merge(*streams, key=itemgetter(0)):
                 bag.write(place, time, message)
                 yield
-    except OSError as error:
-        raise RecordingError(
-            f"the bag cannot be written: {error.strerror}", where=str(path), expected="a file that you may write to"
-        ) from error
 
 
 def _times(topic: RecordedTopic) -> np.ndarray:

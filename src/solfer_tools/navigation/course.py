@@ -5,6 +5,8 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+
 from solfer.transport import BodyMessage, Middleware, Reader, Writer
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.messages import FieldsMessage
@@ -108,8 +110,7 @@ class MeasuredPose:
         if self._reader.age() > STALE_AGE:
             return f"odometry on {self._reader.topic}"
         message: BodyMessage = self._reader.message
-        qx, qy, qz, qw = message.orientation
-        heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        heading = heading_of(message.orientation)
         x, y, z = message.position.tolist()
         if not math.isfinite(heading + x + y + z):
             return f"finite numbers on {self._reader.topic}"
@@ -142,13 +143,13 @@ class MeasuredPose:
         x0, y0, heading0 = self._before
         self._before = x, y, heading
         yaw = self.heading - heading0
-        dx, dy = _rotated(x - x0, y - y0, yaw)
+        dx, dy = rotated(x - x0, y - y0, yaw)
         self._move_to(self.x + dx, self.y + dy, heading + yaw)
 
     def _correct(self, x: float, y: float, heading: float, located: tuple[float, float, float]) -> None:
         """Approach the pose in the map, or take it where it is too far away for noise."""
         x0, y0, yaw = located
-        dx, dy = _rotated(x, y, yaw)
+        dx, dy = rotated(x, y, yaw)
         dx += x0 - self.x
         dy += y0 - self.y
         left = math.remainder(heading + yaw - self.heading, math.tau)
@@ -162,7 +163,19 @@ class MeasuredPose:
         self._move_to(self.x + ratio * dx, self.y + ratio * dy, self.heading + ratio * left)
 
 
-def _rotated(x: float, y: float, angle: float) -> tuple[float, float]:
+def heading_of(quaternion: np.ndarray) -> float:
+    """Return the heading of a Hamilton quaternion (x, y, z, w) [rad]."""
+    x, y, z, w = quaternion
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def twist(x: float, y: float, rate: float) -> FieldsMessage:
+    """Make the message of velocities x and y [m/s] and a rate of the heading [rad/s]."""
+    return FieldsMessage({"linear": {"x": x, "y": y, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": rate}})
+
+
+def rotated(x: float, y: float, angle: float) -> tuple[float, float]:
+    """Return a vector after a rotation by an angle [rad]."""
     cos = math.cos(angle)
     sin = math.sin(angle)
     return cos * x - sin * y, sin * x + cos * y

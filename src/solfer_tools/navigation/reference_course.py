@@ -16,10 +16,39 @@ from solfer.transport.declared.fields import message_of
 from solfer.transport.messages import VectorMessage
 from solfer_tools.navigation.course import STALE_AGE, Course
 
-GET_REFERENCE = "solfer/GetReference"
-
 ANSWER_TIMEOUT = 30.0
 """Longest time until a target says where a reference is [s]."""
+
+
+class BegunReference:
+    """Requests where the references of a target begin.
+
+    Args:
+        middleware: Carries the requests.
+        service: Name of the service.
+
+    Attributes:
+        service: See above.
+    """
+
+    def __init__(self, middleware: Middleware, service: str):
+        self._middleware = middleware
+        self.service = service
+        self._answer: Future[ReferenceReply] | None = None
+
+    def values(self, task: str) -> np.ndarray | str:
+        """Return the numbers of a task's reference, shape (n,), or what is missing; one task after the other."""
+        if self._answer is None:
+            self._answer = self._middleware.request(
+                self.service, "solfer/GetReference", GetReference(task), reply=ReferenceReply, timeout=ANSWER_TIMEOUT
+            )
+        if not self._answer.done():
+            return f"an answer of {self.service}"
+        reply = self._answer.result()
+        self._answer = None
+        if not reply.success:  # it may not have started yet
+            return f"{self.service}, which refuses: {reply.message}"
+        return np.array(reply.values)
 
 
 class _Reference:
@@ -49,25 +78,15 @@ class _TaskReference(_Reference):
 
     def __init__(self, middleware: Middleware, target: str, name: str, record: ReferenceRecord, quantity: str):
         super().__init__(name, record, build_reference(record, quantity))
-        self._middleware = middleware
-        self._service = f"{target}/get_reference"
+        self._begun = BegunReference(middleware, f"{target}/get_reference")
         self.writer = middleware.declared_writer(f"{target}/{name}/reference", REFERENCE_MESSAGES[quantity][0])
-        self._answer: Future[ReferenceReply] | None = None
 
     def awaits(self) -> str:
         """Request the place of the reference; return what is missing."""
-        if self._answer is None:
-            request = GetReference(self.name)
-            self._answer = self._middleware.request(
-                self._service, GET_REFERENCE, request, ReferenceReply, ANSWER_TIMEOUT
-            )
-        if not self._answer.done():
-            return f"an answer of {self._service}"
-        reply = self._answer.result()
-        self._answer = None
-        if not reply.success:  # it may not have started yet
-            return f"{self._service}, which refuses: {reply.message}"
-        self.place(np.array(reply.values))
+        values = self._begun.values(self.name)
+        if isinstance(values, str):
+            return values
+        self.place(values)
         return ""
 
     def publish(self, time: float, pace: float) -> None:

@@ -3,18 +3,16 @@
 import abc
 import math
 from collections.abc import Sequence
-from concurrent.futures import Future
 
 import numpy as np
 
 from solfer.errors import SolferError
 from solfer.interfaces.support import BASE_PORT, LEAD, VERTICES_PORT
-from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.numerics.planar_move import PlanarMove
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage, PointsMessage, VectorMessage
-from solfer_tools.navigation.course import MeasuredPose
-from solfer_tools.navigation.reference_course import ANSWER_TIMEOUT, GET_REFERENCE
+from solfer_tools.navigation.course import MeasuredPose, rotated
+from solfer_tools.navigation.reference_course import BegunReference
 from solfer_tools.scenarios import Player
 
 
@@ -59,8 +57,7 @@ class ScenarioVelocities(ScenarioMotion):
         self._support = middleware.writer(f"{name}wheels_support", "solfer/WheelsSupport")
         self._state = middleware.writer(f"{name}wheels_state", "solfer/WheelsState")
         self._pose = MeasuredPose(middleware, odometry) if odometry else None
-        self._cos = 1.0
-        self._sin = 0.0
+        self._heading = 0.0
         self.writers = self._support, self._state
 
     def awaits(self) -> str:
@@ -69,8 +66,7 @@ class ScenarioVelocities(ScenarioMotion):
             return ""
         missing = self._pose.awaits()
         if not missing:
-            self._cos = math.cos(self._pose.heading)
-            self._sin = math.sin(self._pose.heading)
+            self._heading = self._pose.heading
             self._pose = None
         return missing
 
@@ -81,8 +77,7 @@ class ScenarioVelocities(ScenarioMotion):
         """See `ScenarioMotion.publish`."""
         player = self._player
         x, y, z, rate = (pace * player.base_velocity).tolist()
-        along = self._cos * x - self._sin * y
-        across = self._sin * x + self._cos * y
+        along, across = rotated(x, y, self._heading)
         vertices = tuple((pace * player.vertex_velocity).ravel().tolist())
         self._support.write(FieldsMessage({"position": (), "velocity": vertices}))
         camber = tuple(player.camber.tolist())
@@ -141,13 +136,12 @@ class ScenarioPositions(ScenarioMotion):
             raise SolferError("positions carry no camber", where="--positions", expected="a scenario without `cs`")
         self._player = player
         self._middleware = middleware
-        self._service = f"{name}get_reference"
+        self._begun = BegunReference(middleware, f"{name}get_reference")
         self._base_writer = middleware.writer(f"{name}{BASE_PORT}", "geometry_msgs/PoseStamped")
         self._vertices_writer = middleware.writer(f"{name}{VERTICES_PORT}", "solfer/RobotPoints")
         self._pose = MeasuredPose(middleware, odometry)
         self.writers = self._base_writer, self._vertices_writer
         self._begin: dict[str, np.ndarray] = {}
-        self._answer: Future[ReferenceReply] | None = None
         self._heading = self._ended = 0.0
         self._base = np.zeros(4)
         self._vertices = np.zeros_like(player.vertex_velocity)
@@ -175,9 +169,7 @@ class ScenarioPositions(ScenarioMotion):
         begin = self._begin[BASE_PORT]
         player = self._player
         x, y, z, yaw = (self._base + LEAD * pace * player.base_velocity).tolist()
-        cos = math.cos(self._heading)
-        sin = math.sin(self._heading)
-        place = begin[0] + cos * x - sin * y, begin[1] + sin * x + cos * y, begin[2] + z
+        place = begin[:3] + (*rotated(x, y, self._heading), z)
         half = 0.5 * (self._heading + yaw)
         self._base_writer.write(VectorMessage("world", np.array((*place, 0.0, 0.0, math.sin(half), math.cos(half)))))
         vertices = self._begin[VERTICES_PORT] + self._vertices + LEAD * pace * player.vertex_velocity
@@ -190,20 +182,12 @@ class ScenarioPositions(ScenarioMotion):
 
     def _request(self, task: str) -> str:
         """Request the begin of a reference; return what is missing."""
-        if self._answer is None:
-            self._answer = self._middleware.request(
-                self._service, GET_REFERENCE, GetReference(task), reply=ReferenceReply, timeout=ANSWER_TIMEOUT
-            )
-        if not self._answer.done():
-            return f"an answer of {self._service}"
-        reply = self._answer.result()
-        self._answer = None
-        if not reply.success:  # it may not have started yet
-            return f"{self._service}, which refuses: {reply.message}"
-        values = np.array(reply.values)
+        values = self._begun.values(task)
+        if isinstance(values, str):
+            return values
         if task == VERTICES_PORT:
             if len(values) != self._vertices.size:
-                vertices = f"{len(values) // 3} vertices of {self._service}"
+                vertices = f"{len(values) // 3} vertices of {self._begun.service}"
                 raise SolferError(vertices, expected=f"{len(self._vertices)}, one for each leg")
             values = values.reshape(-1, 3)
         else:

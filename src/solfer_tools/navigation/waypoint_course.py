@@ -1,10 +1,7 @@
 """Waypoints on `cmd_vel`."""
 
-import math
-
 from solfer.transport import Middleware
-from solfer.transport.messages import FieldsMessage
-from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose
+from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose, rotated, twist
 from solfer_tools.navigation.waypoints import WaypointFollower
 
 
@@ -53,9 +50,7 @@ class WaypointCourse(Course):
         moves = follower.step(place, period, pace)
         self._rested = 0.0 if moves else self._rested + period
         x, y, rate = follower.velocity
-        cos = math.cos(pose.heading)
-        sin = math.sin(pose.heading)
-        self._publish(cos * x + sin * y, cos * y - sin * x, rate)
+        self._twist.write(twist(*rotated(x, y, -pose.heading), rate))
         if moves:
             return True
         if self._rested >= self._settles and pose.still >= 0.3:
@@ -66,7 +61,7 @@ class WaypointCourse(Course):
     def rest(self) -> None:
         """See `Course.rest`."""
         self._follower.stop()
-        self._publish(0.0, 0.0, 0.0)
+        self._twist.write(twist(0.0, 0.0, 0.0))
 
     @property
     def number(self) -> int:
@@ -82,8 +77,3 @@ class WaypointCourse(Course):
     def left(self) -> float:
         """See `Course.left`."""
         return self._follower.left
-
-    def _publish(self, x: float, y: float, rate: float) -> None:
-        linear = {"x": x, "y": y, "z": 0.0}
-        angular = {"x": 0.0, "y": 0.0, "z": rate}
-        self._twist.write(FieldsMessage({"linear": linear, "angular": angular}))

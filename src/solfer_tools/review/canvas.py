@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solfer.errors import MissingDependency, RecordingError
+from solfer.errors import MissingDependency, RecordingError, writing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +90,7 @@ def saved(figures: Sequence[tuple[str, "Figure"]], path: Path) -> Iterator[Path]
         RecordingError: The suffix is neither .pdf nor .png, or a file cannot be written.
     """
     check_suffix(path)
-    try:
+    with writing("the picture", path, RecordingError):
         if path.suffix == ".pdf":
             from matplotlib.backends.backend_pdf import PdfPages
 
@@ -103,12 +103,6 @@ def saved(figures: Sequence[tuple[str, "Figure"]], path: Path) -> Iterator[Path]
             file = path.with_name(f"{path.stem}_{name}.png") if len(figures) > 1 else path
             figure.savefig(file, dpi=110)
             yield file
-    except OSError as error:
-        raise RecordingError(
-            f"the picture cannot be written: {error.strerror}",
-            where=str(path),
-            expected="a file that you may write to",
-        ) from error
 
 
 def check_suffix(path: Path) -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.recording.model import Recording
+from solfer.recording.selection import span
 from solfer_tools.review.canvas import FONT_SIZE, new_figure
 from solfer_tools.review.plugin_page import lines
 
@@ -18,8 +19,8 @@ def columns_page(recording: Recording) -> "Figure":
     Args:
         recording: The columns; see `solfer.recording.selection.select`.
     """
-    channels = [channel for channel in recording.channels.values() if len(channel.times)]
-    start = min((channel.times[0] for channel in channels), default=0.0)
+    channels = recording.filled
+    start, _ = span(recording)
     figure = new_figure(12.0, 0.5 + 2.4 * max(1, len(channels)))
     grid = np.atleast_1d(figure.subplots(max(1, len(channels)), 1, sharex=True))
     for axes, channel in zip(grid, channels, strict=False):

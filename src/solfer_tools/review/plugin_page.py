@@ -7,6 +7,7 @@ import numpy as np
 
 from solfer.recording.model import Channel, Recording
 from solfer.recording.requests import EventGroup, grouped
+from solfer.recording.selection import span
 from solfer_tools.review.canvas import (
     DESIRED_COLOR,
     FIRST_COLOR,
@@ -40,7 +41,7 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
     tracks = tracks_of(recording, plugin)
     # [rad, m, rad/s, m/s]; the others are listed
     moving = [track for track in tracks if track.span > 2e-3]
-    start = min((channel.times[0] for channel in recording.channels.values() if len(channel.times)), default=0.0)
+    start, _ = span(recording)
     extras = _extras(recording, plugin)
     rows = -(-len(moving) // PLOT_COLUMNS)
     errors = [track for track in moving if track.desired is not None]
@@ -166,7 +167,7 @@ def _largest(times: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.nda
 
 def _extras(recording: Recording, plugin: str) -> list[tuple[str, list[Channel]]]:
     """Return the other plots: a title, and the channels in it."""
-    filled = [each for each in recording.channels.values() if len(each.times) and each.columns]
+    filled = [each for each in recording.filled if each.columns]
     channels = [each for each in filled if each.name.startswith(f"{plugin}/")]
     timing = [each for each in channels if each.name == f"{plugin}/timing"]
     ages = [each for each in channels if each.name.endswith("/age")]

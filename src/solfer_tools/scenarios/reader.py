@@ -70,7 +70,7 @@ def _pattern(node: YamlNode, problems: Problems) -> list[Step]:
         return []
     pattern = node.get(PATTERN)
     if pattern is None:
-        others = set(dict(node.items())) - set(field_names(ScenarioRecord))
+        others = set(node.entries()) - set(field_names(ScenarioRecord))
         if not any(nearest(PATTERN, [name]) for name in others):  # else reported as an unknown key
             problems.missing(node.head, f"the key '{PATTERN}' is missing", "the steps, numbered from 1 on")
         return []
@@ -105,7 +105,7 @@ def _step(node: YamlNode, problems: Problems) -> Step | None:
         return None
     verb = node.get("type")
     if verb is None:
-        has = [name for name in dict(node.items()) if nearest("type", [name], likeness=0.7)]
+        has = [name for name in node.entries() if nearest("type", [name], likeness=0.7)]
         problems.add(node.head, "the key 'type' is missing", f"the verb: {', '.join(VERBS)}", has and ("type",))
         return None
     name = verb.value if isinstance(verb.value, str) else verb.kind

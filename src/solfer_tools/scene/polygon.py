@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 
 def hull(points: np.ndarray) -> list[int]:
@@ -14,16 +15,11 @@ def hull(points: np.ndarray) -> list[int]:
     Returns:
         Indices of the corners; fewer than three: the points lie on a line.
     """
-    order = sorted(range(len(points)), key=lambda index: (points[index, 0], points[index, 1]))
-    half: list[int] = []
-    for side in (order, order[::-1]):
-        start = len(half)
-        for index in side:
-            while len(half) - start >= 2 and _cross(points, half[-2], half[-1], third=index) <= 0.0:
-                half.pop()
-            half.append(index)
-        del half[-1:]
-    return half
+    try:
+        corners: list[int] = ConvexHull(points[:, :2]).vertices.tolist()
+    except (QhullError, ValueError):  # fewer than three, or all on a line
+        return []
+    return corners
 
 
 def shrunk(corners: np.ndarray, margins: Sequence[float]) -> np.ndarray:
@@ -42,12 +38,6 @@ def shrunk(corners: np.ndarray, margins: Sequence[float]) -> np.ndarray:
         inward = np.array((-dy, dx)) / np.hypot(dx, dy)
         left = _cut(left, (left[:, :2] - start[:2]) @ inward - margin)
     return left
-
-
-def _cross(points: np.ndarray, first: int, second: int, third: int) -> float:
-    (ax, ay), (bx, by), (cx, cy) = points[[first, second, third], :2].tolist()
-    cross: float = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    return cross
 
 
 def _cut(corners: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -80,11 +81,8 @@ def carry_out_all(
     progress = StudyProgress(folder, len(folder.runs), log)
     left = sum(not folder.is_done(run) for run in folder.distinct_runs)
     if left:
-        started = engine_of(engine, folder.path, min(workers, left), follow=False, options=options)
-        try:
+        with closing(engine_of(engine, folder.path, min(workers, left), follow=False, options=options)) as started:
             _wait(folder, started, progress)
-        finally:
-            started.close()
     progress.look()
     progress.show(is_last=True)
     return folder.write_table()

@@ -13,8 +13,6 @@ from typing import Any
 
 from solfer.errors import StudyError
 
-ENGINES = ("local", "dask", "slurm")
-
 
 class WorkerEngine(abc.ABC):
     """Workers of a study."""

@@ -25,15 +25,15 @@ import uuid
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import replace
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from solfer.errors import StudyError
+from solfer.errors import StudyError, writing
 from solfer_tools.study.plan import OUTCOME, ROW, Plan, PlannedRun, ShortHash, Study, study_of
 from solfer_tools.study.result import Result
 
@@ -72,30 +72,30 @@ class Identity(BaseModel):
     time: float
 
 
+@dataclass(frozen=True)
 class Claim:
     """A run that a worker has taken up.
 
-    Args:
+    Attributes:
         file: Its file.
     """
 
-    def __init__(self, file: Path):
-        self._file = file
+    file: Path
 
     @property
     def attempt(self) -> int:
         """Number of the attempt, from 1 on."""
-        return int(self._file.name.removeprefix(CLAIM_PREFIX))
+        return int(self.file.name.removeprefix(CLAIM_PREFIX))
 
     @property
     def folder(self) -> Path:
         """Folder of the run."""
-        return self._file.parent
+        return self.file.parent
 
     def renew(self) -> None:
         """Show that the worker lives."""
         with suppress(FileNotFoundError):
-            os.utime(self._file)
+            os.utime(self.file)
 
 
 class StudyFolder:
@@ -129,7 +129,7 @@ class StudyFolder:
             StudyError: The folder cannot be written, or has runs of another study or of other code.
         """
         runs = list(plan.runs)
-        try:
+        with writing_to(path):
             (path / RUNS).mkdir(parents=True, exist_ok=True)
             if (path / STUDY).exists():
                 before = cls(path)
@@ -137,8 +137,6 @@ class StudyFolder:
                 before.repeat_interrupted()
             file = os.path.abspath(study.file)
             _write(path, StudyFile(study=study.text(), file=file, record=record, code=plan.code, runs=runs))
-        except OSError as error:
-            raise _unwritten(path, error) from None
         return cls(path)
 
     def load(self) -> None:
@@ -183,10 +181,8 @@ class StudyFolder:
         """
         self._data.runs.append(run)
         self.runs = (*self.runs, run)
-        try:
+        with writing_to(self.path):
             _write(self.path, self._data)
-        except OSError as error:
-            raise _unwritten(self.path, error) from None
 
     def of(self, run: PlannedRun) -> Path:
         """Return the folder of a run."""
@@ -217,21 +213,18 @@ class StudyFolder:
             StudyError: The folder cannot be written, or leads elsewhere.
         """
         folder = self.of(run)
-        try:
+        with writing_to(folder):
             folder.mkdir(parents=True, exist_ok=True)
             self._check_inside(run)
             last = max(self._attempts(run), default=0)
             if self.is_done(run) or (last and not self._is_dead(folder / f"{CLAIM_PREFIX}{last}")):
                 return None
             file = folder / f"{CLAIM_PREFIX}{last + 1}"
-            place = os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o644)
-        except FileExistsError:
-            return None  # another worker was faster
-        except OSError as error:
-            raise _unwritten(folder, error) from None
-        with os.fdopen(place, "w") as opened:
-            opened.write(_identity().model_dump_json())
-        return Claim(file)
+            with suppress(FileExistsError):  # another worker was faster
+                with file.open("x") as opened:
+                    opened.write(_identity().model_dump_json())
+                return Claim(file)
+        return None
 
     def finish(self, run: PlannedRun, result: Result) -> None:
         """Write the result of a run; the first one counts.
@@ -242,12 +235,11 @@ class StudyFolder:
         folder = self.of(run)
         temporary = folder / f"{RESULT}.{uuid.uuid4().hex}"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(json.dumps(result.as_json(), indent=1, sort_keys=True).encode())
-            with suppress(FileExistsError):
-                os.link(temporary, folder / RESULT)
-        except OSError as error:
-            raise _unwritten(folder, error) from None
+            with writing_to(folder):
+                folder.mkdir(parents=True, exist_ok=True)
+                temporary.write_bytes(json.dumps(result.as_json(), indent=1, sort_keys=True).encode())
+                with suppress(FileExistsError):
+                    os.link(temporary, folder / RESULT)
         finally:
             temporary.unlink(missing_ok=True)
 
@@ -342,12 +334,10 @@ class StudyFolder:
         writer.writeheader()
         writer.writerows(rows)
         files = [self.path / "table.csv"]
-        try:
+        with writing_to(self.path):
             write_whole(files[0], text.getvalue().encode())
             with suppress(ImportError):
                 files.append(_write_parquet(self.path / "table.parquet", head, rows))
-        except OSError as error:
-            raise _unwritten(self.path, error) from None
         return files
 
     def _is_dead(self, claim: Path) -> bool:
@@ -466,7 +456,6 @@ def _started(process: int) -> str:
     return ""
 
 
-def _unwritten(path: Path, error: OSError) -> StudyError:
-    return StudyError(
-        f"it cannot be written: {error.strerror or error}", where=str(path), expected="a folder with room, of this user"
-    )
+def writing_to(path: Path) -> AbstractContextManager[None]:
+    """Raise a StudyError where a file or folder cannot be written."""
+    return writing("it", path, StudyError, "a folder with room, of this user")

@@ -5,12 +5,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from solfer.config import FileRecord, Record
-from solfer.config.records.bounds import OFFSET, SEED, Bounds
+from solfer.config.records.bounds import SEED, Bounds, Name, Offset
 
 TIME: Bounds = {"ge": 0.0, "le": 1e5}
 """Times of a motion [s]."""
 
-Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
 Force = Annotated[tuple[Annotated[float, Field(ge=-1e5, le=1e5)], ...], Field(min_length=3, max_length=3)]
 """Components of a force [N]."""
 
@@ -24,7 +23,7 @@ DRAWN_KEYS = ("uniform", "log_uniform", "normal", "choice")
 class PayloadRecord(Record):
     """A mass that is fixed to a link, and that no controller knows."""
 
-    link: str = Field(min_length=1, description="the link")
+    link: Name = Field(description="the link")
     mass: float = Field(ge=0.0, le=1e4, description="its mass [kg]")
     center: Offset = Field(default=(0.0, 0.0, 0.0), description="where it is in the frame of the link [m]")
 
@@ -32,7 +31,7 @@ class PayloadRecord(Record):
 class PushRecord(Record):
     """A force on a link."""
 
-    link: str = Field(min_length=1, description="the link")
+    link: Name = Field(description="the link")
     at: float = Field(ge=0.0, le=1e5, description="when it begins, after the begin of the motion [s]")
     force: Force = Field(description="force at the link's origin, in world axes [N]")
     duration: float = Field(default=0.2, gt=0.0, le=10.0, description="how long it acts [s]")
@@ -41,9 +40,9 @@ class PushRecord(Record):
 class SimulationRecord(Record):
     """The simulated robot, and how it differs from the one that its controllers know."""
 
-    robot: str = Field(default="centauro", min_length=1, description="robot of this package, or the file of one")
-    world: str = Field(default="flat", min_length=1, description="world of this package, or the file of one")
-    state: str | None = Field(default=None, min_length=1, description="named state in which it begins")
+    robot: Name = Field(default="centauro", description="robot of this package, or the file of one")
+    world: Name = Field(default="flat", description="world of this package, or the file of one")
+    state: Name | None = Field(default=None, description="named state in which it begins")
     transport: FileRecord | None = Field(default=None, description="faults of the transport; default: it has none")
     perfect: bool = Field(default=False, description="whether sensors measure without errors and without delay")
     noise: float = Field(default=1.0, ge=0.0, le=1e3, description="factor of the errors of IMU and joints")
@@ -85,9 +84,8 @@ class MovingRecord(Record):
 class VariationRecord(Record):
     """A value that varies: each value of `grid` with all others, those of `list` side by side, or one that is drawn."""
 
-    path: str | None = Field(
+    path: Name | None = Field(
         default=None,
-        min_length=1,
         description="keys that lead to it: `simulation/mass`, `motion/scenario`, or `configuration/modules/NAME/TAG`; "
         "default: the name of the variation",
     )
@@ -101,11 +99,14 @@ class VariationRecord(Record):
     @property
     def kind(self) -> str:
         """Which of its keys is given."""
-        return next(key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None)
+        return self._given()[0]
+
+    def _given(self) -> tuple[str, ...]:
+        return tuple(key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None)
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "VariationRecord":
-        given = [key for key in ("grid", "list", *DRAWN_KEYS) if getattr(self, key) is not None]
+        given = self._given()
         if len(given) != 1:
             raise ValueError("one of `grid`, `list`, `choice`, `uniform`, `log_uniform` and `normal`")
         if given[0] in ("uniform", "log_uniform"):
@@ -132,7 +133,7 @@ class MeasureRecord(Record):
     absolute: bool = Field(default=False, description="whether the absolute values count")
     since: float = Field(default=0.0, **TIME, description="first time that counts, after the begin of the motion [s]")
     until: float | None = Field(default=None, **TIME, description="last time that counts [s]; default: the end")
-    derive: str | None = Field(default=None, min_length=1, description="expression of measures and variations")
+    derive: Name | None = Field(default=None, description="expression of measures and variations")
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "MeasureRecord":
@@ -161,8 +162,8 @@ class RunLimitsRecord(Record):
 class SearchRecord(Record):
     """A search for values with the least or largest measure, by Optuna."""
 
-    minimize: str | None = Field(default=None, min_length=1, description="measure")
-    maximize: str | None = Field(default=None, min_length=1, description="measure")
+    minimize: Name | None = Field(default=None, description="measure")
+    maximize: Name | None = Field(default=None, description="measure")
     trials: int = Field(default=100, ge=1, le=1_000_000, description="how many values are tried")
     parameters: dict[str, VariationRecord] = Field(min_length=1, description="what is searched: drawn variations")
 

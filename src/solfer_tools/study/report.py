@@ -15,7 +15,7 @@ import numpy as np
 
 from solfer.errors import StudyError, UnknownName
 from solfer_tools.review import FIRST_COLOR, FONT_SIZE, WRONG_COLOR, check_suffix, new_figure, save
-from solfer_tools.study.folder import RECORDING, RUNS, StudyFolder, write_whole
+from solfer_tools.study.folder import RECORDING, RUNS, StudyFolder, write_whole, writing_to
 
 if TYPE_CHECKING:
     from solfer_tools.review import Figure
@@ -70,12 +70,8 @@ def write_report(folder: StudyFolder) -> Path:
     page = f"<!doctype html><html><head><meta charset=utf-8><title>{html.escape(title)}</title>"
     page += f"<style>{STYLE}</style></head><body>{''.join(parts)}<script>{SORT}</script></body></html>\n"
     file = folder.path / "report.html"
-    try:
+    with writing_to(file):
         write_whole(file, page.encode())
-    except OSError as error:
-        raise StudyError(
-            f"it cannot be written: {error.strerror}", where=str(file), expected="a folder with room, of this user"
-        ) from None
     return file
 
 

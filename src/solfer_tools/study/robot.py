@@ -20,7 +20,7 @@ def bundle_of(record: SimulationRecord, seed: int) -> BundleRecord:
     Raises:
         ConfigError, UnknownName: There is no such robot, or its file is wrong.
     """
-    bundle = read_bundle(_robot(record))
+    bundle = read_bundle(_found(record, "robot"))
     sensors = bundle.sensors.perfect() if record.perfect else bundle.sensors.scaled(record.noise)
     changes: dict[str, float] = {"seed": (sensors.seed + seed) % 2**32}
     if record.delay is not None:
@@ -35,7 +35,9 @@ def simulation_of(record: SimulationRecord, bundle: BundleRecord, description: s
         SolferError: A link, a state, a world or a part of it does not exist, or the robot cannot be put into it.
     """
     changed = with_masses(description, record)
-    simulation = Simulation.from_file(bundle, gui, record.state, description_text=changed, world=_world(record))
+    simulation = Simulation.from_file(
+        bundle, gui, record.state, description_text=changed, world=_found(record, "world")
+    )
     try:
         for name, coefficient in record.friction.items():
             simulation.set_friction(name, coefficient)
@@ -63,7 +65,7 @@ def files_of(record: SimulationRecord) -> list[Path]:
     Raises:
         ConfigError, UnknownName: One of them does not exist, or is wrong.
     """
-    files = [*_files_of_robot(_robot(record)), _world(record)]
+    files = [*_files_of_robot(_found(record, "robot")), _found(record, "world")]
     if record.transport is not None:
         files.append(record.transport.location)
     for file in files:
@@ -71,9 +73,7 @@ def files_of(record: SimulationRecord) -> list[Path]:
     return files
 
 
-# which look through all ROS packages
-_find_robot = cache(find_robot)
-_find_world = cache(find_world)
+FINDERS = {"robot": cache(find_robot), "world": cache(find_world)}  # which look through all ROS packages
 
 
 @cache
@@ -83,18 +83,14 @@ def _files_of_robot(robot: Path) -> list[Path]:
     return [robot, *(each.location for each in named if each is not None)]
 
 
-def _robot(record: SimulationRecord) -> Path:
+def _found(record: SimulationRecord, key: str) -> Path:
+    """Find the file of the robot or of the world, by its name or beside the file that names it."""
+    name = getattr(record, key)
+    is_path = "/" in name or name.endswith((".yaml", ".urdf"))
     try:
-        return _find_robot(_beside(record, "robot"))
+        return FINDERS[key](str(Path(record.folder(key)) / name) if is_path else name)
     except UnknownName as error:
-        raise error.at(record.where("robot")) from None
-
-
-def _world(record: SimulationRecord) -> Path:
-    try:
-        return _find_world(_beside(record, "world"))
-    except UnknownName as error:
-        raise error.at(record.where("world")) from None
+        raise error.at(record.where(key)) from None
 
 
 def with_masses(description: str, record: SimulationRecord) -> str:
@@ -142,9 +138,3 @@ def _add_payload(root: ElementTree.Element, payload: PayloadRecord) -> None:
 
 def _text(vector: np.ndarray) -> str:
     return " ".join(repr(value) for value in vector.tolist())
-
-
-def _beside(record: SimulationRecord, key: str) -> str:
-    """Return a name, or the path of a file beside the one that names it."""
-    name = getattr(record, key)
-    return str(Path(record.folder(key)) / name) if "/" in name or name.endswith((".yaml", ".urdf")) else name

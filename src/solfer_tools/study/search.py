@@ -4,6 +4,7 @@ import logging
 import math
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +43,10 @@ def search(
         load_if_exists=True,
         direction="minimize" if record.minimize else "maximize",
     )
-    waiting = {run.index: run for run in folder.runs if not _is_reported(study, run.index)}  # trials may be equal
+    finished = {trial.number for trial in study.trials if trial.state.is_finished()}
+    waiting = {run.index: run for run in folder.runs if run.index not in finished}  # trials may be equal
     progress = StudyProgress(folder, record.trials, log)
-    started = engine_of(engine, folder.path, workers, follow=True, options=options)
-    try:
+    with closing(engine_of(engine, folder.path, workers, follow=True, options=options)) as started:
         while True:
             for trial, run in list(waiting.items()):
                 if (result := folder.result(run)) is not None:
@@ -60,8 +61,6 @@ def search(
                 break
             started.check()
             time.sleep(POLL_PERIOD)
-    finally:
-        started.close()
     progress.show(is_last=True)
     if any(trial.value is not None for trial in study.trials):
         best = study.best_trial
@@ -79,17 +78,14 @@ def _search(study: Any, folder: StudyFolder, record: SearchRecord) -> PlannedRun
 
     number = len(folder.runs)
     study.sampler = optuna.samplers.TPESampler(seed=folder.study.record.seed + number)
-    trial = study.ask() if len(study.trials) <= number else _resumed(study, number)
+    if len(study.trials) <= number:
+        trial = study.ask()
+    else:
+        trial = optuna.trial.Trial(study, study.trials[number]._trial_id)
     values = {name: _suggested(trial, name, each) for name, each in record.parameters.items()}
     run = folder.study.planned(number, folder.study.record.seed, values)
     folder.add(run)
     return run
-
-
-def _resumed(study: Any, number: int) -> Any:
-    import optuna
-
-    return optuna.trial.Trial(study, study.trials[number]._trial_id)
 
 
 def _suggested(trial: Any, name: str, record: VariationRecord) -> Any:
@@ -97,10 +93,6 @@ def _suggested(trial: Any, name: str, record: VariationRecord) -> Any:
         return record.choice[trial.suggest_int(name, 0, len(record.choice) - 1)]
     low, high = record.uniform or record.log_uniform or (0.0, 1.0)
     return trial.suggest_float(name, low, high, log=record.log_uniform is not None)
-
-
-def _is_reported(study: Any, number: int) -> bool:
-    return number < len(study.trials) and study.trials[number].state.is_finished()
 
 
 def _report(study: Any, number: int, record: SearchRecord, result: Result) -> None:

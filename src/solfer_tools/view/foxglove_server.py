@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError, MissingDependency
-from solfer.interfaces.declaration import Accepted
 from solfer.numerics.rotations import quaternion_from_rotation
-from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, SetParameters
 from solfer_tools.scene import ContactForce, SceneState
 from solfer_tools.view.columns import PlottedColumns
 from solfer_tools.view.commands.control import PageControl
@@ -114,7 +112,7 @@ class FoxgloveServer(ServerListener):
         changed = [name for name, value in values.items() if self._published.get(name) != value]
         if changed:
             self._published = values
-            self._server.publish_parameter_values([_parameter(name, values[name]) for name in changed])
+            self._server.publish_parameter_values([Parameter(name, value=values[name]) for name in changed])
         if state is None:
             return
         stamp = Timestamp.from_epoch_secs(time.time())
@@ -153,7 +151,8 @@ class FoxgloveServer(ServerListener):
         if not self._relay.knows(client.id, request_id):
             return []
         values = self._values()
-        return [_parameter(name, value) for name, value in values.items() if not param_names or name in param_names]
+        requested = (name for name in values if not param_names or name in param_names)
+        return [Parameter(name, value=values[name]) for name in requested]
 
     def on_set_parameters(
         self, client: Client, parameters: list[Parameter], request_id: str | None = None
@@ -167,14 +166,10 @@ class FoxgloveServer(ServerListener):
 
     def _set(self, changed: Parameter) -> None:
         part, _, parameter = changed.name.partition(".")
-        value = changed.get_value()
         self._published.pop(changed.name, None)  # what is refused is published as it is
         if self._control is None or not self._control.is_free:
             return
-        text = value if isinstance(value, str) else json.dumps(value)
-        request = SetParameters((parameter,), (text,))
-        forget = partial(self._parameters.forget, part)
-        self._requests.call(f"{part}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, lambda _: forget())
+        self._parameters.change(self._requests, part, parameter, changed.get_value())
 
     def _values(self) -> dict[str, Any]:
         """Return the values of all parameters, '<part>.<name>'."""
@@ -239,7 +234,3 @@ def _value(kind: str, text: str) -> Any:
     except ValueError:
         return text
     return float(value) if kind == "number" else value
-
-
-def _parameter(name: str, value: Any) -> Parameter:
-    return Parameter(name, value=value)

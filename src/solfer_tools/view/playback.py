@@ -1,5 +1,7 @@
 """A recording that is played: what was published once is published again."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from solfer.errors import RecordingError, SolferError, UnknownName
@@ -51,7 +53,7 @@ class Playback:
     def __init__(self, recording: Recording, middleware: Middleware, robot: Robot):
         self._recording = recording
         self._robot = robot
-        self._joints = [each for each in _widest_first(recording, MEASURED_CHANNEL) if len(each.times)]
+        self._joints = _widest_first(recording.filled)
         if not self._joints:
             raise RecordingError("no plugin measures joints", expected="a recording with <plugin>/measured/position")
         times = self._joints[0].times
@@ -62,7 +64,7 @@ class Playback:
         self.plays = True
         self._topics = PlayedTopics(middleware)
         self._commands: list[tuple[Channel, Writer]] = []
-        channels = [each for each in recording.channels.values() if len(each.times)]
+        channels = recording.filled
         for channel in channels:
             plugin, _, rest = channel.name.partition("/")
             if channel.kind == JOINTS_KIND and rest.startswith("command/") and part_of(rest) == "position":
@@ -89,8 +91,7 @@ class Playback:
 
     def names(self) -> list[str]:
         """See `PlottedColumns`."""
-        channels = self._recording.channels.values()
-        return [f"{each.name}/{name}" for each in channels if len(each.times) for name in each.columns]
+        return [f"{each.name}/{name}" for each in self._recording.filled for name in each.columns]
 
     def value(self, name: str) -> float:
         """See `PlottedColumns`."""
@@ -144,7 +145,7 @@ def robot_of_recording(recording: Recording) -> Robot:
     Raises:
         RecordingError: It describes none.
     """
-    widest = next(iter(_widest_first(recording, MEASURED_CHANNEL)), None)
+    widest = next(iter(_widest_first(recording.channels.values())), None)
     plugin = widest.name.partition("/")[0] if widest is not None else ""
     texts = [recording.attachments.get(f"{plugin}/robot.{kind}") for kind in ("urdf", "srdf")]
     if texts[0] is None:
@@ -159,6 +160,7 @@ def robot_of_recording(recording: Recording) -> Robot:
         return plain
 
 
-def _widest_first(recording: Recording, end: str) -> list[Channel]:
-    found = [each for each in recording.channels.values() if each.name.partition("/")[2] == end]
+def _widest_first(channels: Iterable[Channel]) -> list[Channel]:
+    """Return the channels of measured positions, those of most joints first."""
+    found = [each for each in channels if each.name.partition("/")[2] == MEASURED_CHANNEL]
     return sorted(found, key=lambda channel: -len(channel.columns))

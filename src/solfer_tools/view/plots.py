@@ -49,7 +49,8 @@ class Plots:
     def update(self, now: float) -> None:
         """Take a sample at some time [s]; where time goes back the plot begins again."""
         if self._times and now < self._times[-1]:
-            self._empty()
+            for kept in (self._times, *self._samples.values()):
+                kept.clear()
         names = self._columns.names()
         if len(names) + 1 != len(self._choice.options):
             self._choice.options = (NO_COLUMN, *names)
@@ -72,10 +73,6 @@ class Plots:
     def _clear(self) -> None:
         self._samples.clear()
         self._draw()
-
-    def _empty(self) -> None:
-        for kept in (self._times, *self._samples.values()):
-            kept.clear()
 
     def _draw(self) -> None:
         if self._plot is not None:

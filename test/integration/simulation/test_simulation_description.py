@@ -169,7 +169,7 @@ locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
 simulation = Simulation.from_file(read_bundle(sys.argv[1]))
 robot = simulation.body.robot
 assert locale.localeconv()["decimal_point"] == ","
-print(robot.mass(), *pybullet.getJointInfo(robot.number, 0, robot._client)[8:12])
+print(robot.mass(), *pybullet.getJointInfo(robot.number, 0, robot._world.number)[8:12])
 """
 
 

@@ -27,8 +27,8 @@ def folder(tmp_path):
 
 def owned(claim, **identity):
     """Write another owner into the file of a claim."""
-    found = json.loads(claim._file.read_text())
-    claim._file.write_text(json.dumps({**found, **identity}))
+    found = json.loads(claim.file.read_text())
+    claim.file.write_text(json.dumps({**found, **identity}))
 
 
 def test_of_many_workers_one_takes_up_a_run(folder):
@@ -55,10 +55,10 @@ def test_a_run_of_another_machine_is_taken_up_when_its_heartbeat_is_old(folder):
     owned(claim, machine="another one")
     assert folder.claim(run) is None
     old = time.time() - CLAIM_TIMEOUT - 5.0
-    os.utime(claim._file, (old, old))
+    os.utime(claim.file, (old, old))
     claim.renew()
     assert folder.claim(run) is None
-    os.utime(claim._file, (old, old))
+    os.utime(claim.file, (old, old))
     assert folder.claim(run).attempt == 2
 
 

@@ -5,16 +5,13 @@ too. `estop` sets a latch and waits until the layer has seen it; exit code 2: no
 """
 
 import argparse
-from typing import Any
 
-from solfer.cli.options import add_times
+from solfer.cli.options import add_namespace, add_times
 from solfer.cli.rt.record import add_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
-    namespace: dict[str, Any] = {"metavar": "NAME", "help": "namespace of the shared memory (default: solfer)"}
-    parser.add_argument("--namespace", default="solfer", **namespace)
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     add_times(actions.add_parser("top", help="as `solfer top`: health, and durations of cycles, components and stages"))
     record = actions.add_parser("record", help="write what all plugins measure, desire and send to a file")
@@ -29,9 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     estop = actions.add_parser("estop", help="trip the emergency stop")
     estop.add_argument("reason", nargs="?", default="by command line", help="why")
     estop.add_argument("--clear", action="store_true", help="release it; refused unless all plugins are at rest")
-    for action in actions.choices.values():
-        action.add_argument("--namespace", default=argparse.SUPPRESS, **namespace)  # before or after the action
-        action.set_defaults(parser=action)
+    add_namespace(parser, actions.choices.values(), "solfer", "namespace of the shared memory (default: solfer)")
 
 
 def run(options: argparse.Namespace) -> int:

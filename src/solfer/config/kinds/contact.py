@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from solfer.config.kinds.point import MESSAGES, POINTS_MESSAGE, require_without
+from solfer.config.records.bounds import Name
 from solfer.config.records.pipes import Content, ControllerRecord, FeedbackRecord, KindRecords
 from solfer.config.records.record import Record
 
@@ -16,7 +17,7 @@ class ContactTags(Record):
 
     space: Literal["CONTACT", "CONTACTS"] = Field(description="`CONTACT`, or `CONTACTS` for several in one message")
     dofs: None = Field(default=None, description="nothing: a contact has no DoFs")
-    contact: str | None = Field(default=None, min_length=1, description="CONTACT: its name, if not that of the pipe")
+    contact: Name | None = Field(default=None, description="CONTACT: its name, if not that of the pipe")
     names: tuple[str, ...] | None = Field(
         default=None, min_length=1, description="CONTACTS: their names; left out: all that the Robot has"
     )

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from solfer.config.records.bounds import Name
 from solfer.config.records.conventions import ConventionRecord
 from solfer.config.records.pipes import Content, ControllerRecord, FeedbackRecord, KindRecords
 from solfer.config.records.record import Record
@@ -60,8 +61,8 @@ class PointTags(Record):
     interface: Literal["world", "fixed"] = Field(
         default="world", description="axes of the numbers: those of the world, or `fixed` to the link"
     )
-    link: Annotated[str | None, NameOf("link")] = Field(
-        default=None, min_length=1, description="the link, for the interface `fixed`"
+    link: Annotated[Name | None, NameOf("link")] = Field(
+        default=None, description="the link, for the interface `fixed`"
     )
     names: tuple[str, ...] | None = Field(default=None, min_length=1, description="POINTS: their names, in order")
     count: int | None = Field(default=None, ge=1, le=1000, description="POINTS: how many, where they have no names")

@@ -47,12 +47,15 @@ class CheckReport:
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """All warnings, ordered by file and line."""
-        return tuple(notice for notice in self.problems.notices if notice.severity == "warning")
+        return self._notices("warning")
 
     @property
     def information(self) -> tuple[Notice, ...]:
         """What is worth knowing and no fault of the configuration, ordered by file and line."""
-        return tuple(notice for notice in self.problems.notices if notice.severity == "info")
+        return self._notices("info")
+
+    def _notices(self, severity: str) -> tuple[Notice, ...]:
+        return tuple(notice for notice in self.problems.notices if notice.severity == severity)
 
 
 def check(
@@ -143,12 +146,10 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
     """Check robot configurations, and the pipes that they and the sets name."""
     libraries = {kind: Library(tree, middleware, kind, problems=problems) for kind in (FEEDBACK, CONTROLLER)}
     for direction, library in libraries.items():
-        sets = tree.get(f"{direction}s")
-        for _, node in sets.items() if sets else ():
+        for node in tree.entries(f"{direction}s").values():
             library.check_list(library.list_of(node))
-    robots = tree.get("robot")
     misspelt = misspelt_key(tree)
-    for name, node in robots.items() if robots else ():
+    for name, node in tree.entries("robot").items():
         if misspelt is not None and misspelt.where == str(node.head):
             problems.put(node.head, misspelt)
             continue
@@ -163,10 +164,10 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
 
 def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | None, problems: Problems) -> None:
     """Check each pipe, or without `used`, for a middleware that is not chosen, each pipe that its section names."""
-    generic = tree.get(direction)
-    special = tree.get(MIDDLEWARES[middleware].section, direction)
+    generic = tree.entries(direction)
+    special = tree.entries(MIDDLEWARES[middleware].section, direction)
     for part in (special,) if used is None else (generic, special):
-        for name, node in part.items() if part else ():
+        for name, node in part.items():
             found = Problems(complete=False)
             Library(tree, middleware, direction, problems=found).pipe(name, node.head)
             problems.absorb(found, notices=(direction, name) not in (used or ()))

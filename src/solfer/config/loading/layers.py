@@ -82,7 +82,7 @@ class Layers:
             if value is not None:
                 written = self.main.get(key) or self.main
                 self.main = _with(self.main, (key,), replace(written, value=value))
-        self.names = tuple(name for name, _ in _modules(self.main).items())
+        self.names = tuple(_modules(self.main).entries())
         self.file = os.fspath(file)
         self._folders = tuple(folders)
         self._read: dict[str, tuple[YamlNode | None, Problems]] = {}
@@ -143,10 +143,8 @@ class Layers:
 
     def variants(self, problems: Problems) -> Iterator[YamlNode]:
         """Merge everything below the root key, without a secondary file, for each system with each layer."""
-        systems = self.main.get("robot", "systems")
-        layers = self.main.get("layers")
-        for system in [node for _, node in systems.items()] if systems else [None]:
-            for layer in [node for _, node in layers.items()] if layers else [None]:
+        for system in self.main.entries("robot", "systems").values() or (None,):
+            for layer in self.main.entries("layers").values() or (None,):
                 yield self._merged(self.main, (system, layer), problems)
 
     def _merged(self, main: YamlNode, files: Iterable[YamlNode | None], problems: Problems) -> YamlNode:
@@ -180,8 +178,7 @@ class Layers:
 
     def _refuse_main_only(self, over: YamlNode, problems: Problems) -> None:
         paths: list[tuple[Key, ...]] = [("system",), ("layers",), ("robot", "systems")]
-        modules = over.get("modules")
-        for name, module in modules.items() if modules else ():
+        for name, module in over.entries("modules").items():
             paths += [("modules", name, key) for key in ("layer", "secondary_file")]
             if name not in self.names:
                 known = UnknownName("module", name, self.names)
@@ -220,7 +217,7 @@ def _chosen(kind: str, folder: YamlNode | None, choice: YamlNode | None, problem
     named = folder.get(choice.value)
     choices = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}  # other words are reported with their records
     if named is None and choice.value in choices[kind]:
-        problems.unknown(choice.mark, kind, choice.value, [name for name, _ in folder.items()])
+        problems.unknown(choice.mark, kind, choice.value, folder.entries())
     return named
 
 

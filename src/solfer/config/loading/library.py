@@ -36,8 +36,7 @@ class Library:
         self._generic, self._special = tree.get(direction), tree.get(self._middleware.section, direction)
         self._tree = tree
         self._problems = problems
-        parts = [part for part in (self._generic, self._special) if part is not None]
-        self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
+        self.names = tuple(tree.entries(direction) | tree.entries(self._middleware.section, direction))
         self.used: set[tuple[str, str]] = set()
         self.dofs: list[DofsRecord] = []
 
@@ -53,8 +52,7 @@ class Library:
 
     def find_set(self, chosen: YamlNode) -> YamlNode | None:
         """Return the set that `chosen` names; None, with an error, if there is none."""
-        sets = self._tree.get(self._sets)
-        known = dict(sets.items()) if sets else {}
+        known = self._tree.entries(self._sets)
         if chosen.value not in known:
             self._problems.unknown(chosen.mark, f"{self._direction} set", str(chosen.value), known)
         return known.get(str(chosen.value))
@@ -171,11 +169,10 @@ def read_calibrations(
     tree: YamlNode, pipes: Iterable[AnyPipeRecord], problems: Problems
 ) -> dict[str, CalibrationRecord]:
     """Read all calibrations; those that `pipes` name have to exist, and belong to the hardware's pipes."""
-    section = tree.get("calibration")
-    calibrations = named_records(section, CalibrationRecord, problems)
+    calibrations = named_records(tree.get("calibration"), CalibrationRecord, problems)
     for calibration in calibrations.values():
         _check_names(calibration, problems)
-    known = [name for name, _ in section.items()] if section else []
+    known = tree.entries("calibration")
     pipes = tuple(pipes)
     for pipe in pipes:
         if pipe.calibration is None:

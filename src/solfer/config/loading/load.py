@@ -156,14 +156,13 @@ class Reading:
 
     def _robot_node(self, chosen: YamlNode | None) -> YamlNode | None:
         """Return the robot configuration that `chosen` names."""
-        robots = self._tree.get("robot")
-        if chosen is None or robots is None or not isinstance(chosen.value, str):
+        if chosen is None or self._tree.get("robot") is None or not isinstance(chosen.value, str):
             return None  # reported with the module or the skeleton
-        known = [key for key, _ in robots.items() if key not in NOT_CONFIGURATIONS]
+        known = {key: node for key, node in self._tree.entries("robot").items() if key not in NOT_CONFIGURATIONS}
         if chosen.value not in known:
             self._problems.unknown(chosen.mark, "robot configuration", chosen.value, known)
             return None
-        return robots.nearest((chosen.value,))
+        return known[chosen.value]
 
     def _robot(self, node: YamlNode, name: str) -> RobotRecord | None:
         return parse(node, RobotRecord, self._problems, name=name, configuration=str(node.head.path[-1]))
@@ -244,8 +243,7 @@ class Reading:
 
 def misspelt_key(tree: YamlNode) -> UnknownName | None:
     """Return the error of a key of `robot` that is like another one and no robot configuration; None: there is none."""
-    robot = tree.get("robot")
-    for key, node in robot.items() if robot else ():
+    for key, node in tree.entries("robot").items():
         if key not in NOT_CONFIGURATIONS and not isinstance(node.value, dict) and nearest(str(key), NOT_CONFIGURATIONS):
             return UnknownName("key of 'robot'", str(key), NOT_CONFIGURATIONS, where=str(node.head))
     return None

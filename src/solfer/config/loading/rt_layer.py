@@ -105,8 +105,7 @@ class RtLayer:
 
     def _paced(self, plugin: SharedPlugin) -> SharedPlugin:
         """Return a plugin with the rate of the executor, if that has one."""
-        rate = self.executor.rate or plugin.configuration.rate
-        return replace(plugin, configuration=replace(plugin.configuration, rate=rate))
+        return replace(plugin, configuration=plugin.configuration.at(self.executor.rate or plugin.configuration.rate))
 
 
 def read_layer(file: str | os.PathLike, default: Naming = str) -> RtLayer:

@@ -4,7 +4,9 @@ Each number of a record has a lower and an upper bound: numbers beyond them mean
 computations. All bounds are wider than any robot needs.
 """
 
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 Bounds = dict[str, Any]
 """Keyword arguments of `Field`."""
@@ -41,3 +43,15 @@ NOISE: Bounds = {"ge": 0.0, "le": 1e4}
 
 GAIN: Bounds = {"ge": 0.0, "le": 1e5}
 """Stiffness [Nm/rad, N/m] and damping [Nms/rad, Ns/m] that joints are given."""
+
+Name = Annotated[str, Field(min_length=1)]
+"""A name, or another text that is not empty."""
+
+Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
+"""A place on a link [m]."""
+
+Place = Annotated[tuple[Annotated[float, Field(**COORDINATE)], ...], Field(min_length=3, max_length=3)]
+"""A place in a world [m]."""
+
+Direction = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]
+"""A vector that is made for its direction, of any length."""

@@ -8,14 +8,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from solfer.config.records.bounds import COORDINATE
+from solfer.config.records.bounds import COORDINATE, Name
 from solfer.config.records.record import Record
 
 
 class JointCalibrationRecord(Record):
     """One joint: `robot position = sign * (hardware position - offset)`."""
 
-    name: str | None = Field(default=None, min_length=1, description="the hardware's name (default: the robot's)")
+    name: Name | None = Field(default=None, description="the hardware's name (default: the robot's)")
     sign: Literal[1, -1] = Field(default=1, description="1, or -1 where the hardware counts the other way round")
     offset: float = Field(default=0.0, **COORDINATE, description="reading of the hardware at the robot's zero [rad, m]")
 

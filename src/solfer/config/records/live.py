@@ -185,7 +185,7 @@ def _replaced(node: YamlNode | None, path: Path, new: YamlNode, above: Path = ()
             _replaced(each, rest, new, above=below) if index == key else each for index, each in enumerate(node.value)
         ]
         return YamlNode(tuple(items), node.mark, node.key)
-    entries: dict[str, YamlNode] = dict(node.items()) if node is not None else {}
+    entries: dict[str, YamlNode] = {} if node is None else node.entries()
     entries[str(key)] = _replaced(entries.get(str(key)), rest, new, above=below)
     mark = _Requested("", 1, 1, path=above) if node is None else node.mark
     return YamlNode(entries, mark, mark if node is None else node.key)

@@ -1,10 +1,10 @@
 """Records of a main configuration: its skeleton, robot configurations and modules."""
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from solfer.config.records.bounds import COUNT, DURATION, RATE, TIMEOUT
+from solfer.config.records.bounds import COUNT, DURATION, RATE, TIMEOUT, Name
 from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareName
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord
@@ -61,7 +61,7 @@ class ModuleRecord(Record):
     layer: Literal["NRT", "RT"] = Field(description="layer that the plugin runs in: `NRT` or `RT`")
     mode: Literal["full", "idle"] = Field(description="`full`, or `idle`: nothing is sent to the lower level")
     silent: bool = Field(default=False, description="whether nothing is published to other plugins either")
-    robot: str = Field(min_length=1, description="robot configuration")
+    robot: Name = Field(description="robot configuration")
     controller: str | tuple[str, ...] = Field(description="set of controller pipes, or a list of pipes")
     blend: float = Field(
         default=0.5,
@@ -90,7 +90,7 @@ class ModuleRecord(Record):
         alias="class",
         description="component or generator, as `package.module:Class`; without it the plugin of `-p` counts",
     )
-    requires: tuple[Annotated[str, Field(min_length=1)], ...] = Field(
+    requires: tuple[Name, ...] = Field(
         default=(),
         description="in a shared plugin or an RT layer: names of others in it; where one of them stops, this one stops",
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from solfer.config.records.bounds import TIMEOUT
+from solfer.config.records.bounds import TIMEOUT, Name
 from solfer.config.records.conventions import (
     AnglesRecord,
     ConventionRecord,
@@ -77,13 +77,12 @@ class Content:
 class DofsRecord(Record):
     """The DoFs that a pipe carries, and their order at its other end."""
 
-    chain: str = Field(min_length=1, description="SRDF group, or `all`: the part of the robot")
-    type: str = Field(
-        min_length=1,
+    chain: Name = Field(description="SRDF group, or `all`: the part of the robot")
+    type: Name = Field(
         description="`all`, `actuated` or `unactuated` DoFs of the chain, `body` for a link, or a map's name",
     )
     name: str | None = Field(default=None, description="the link, for the type `body`")
-    mapping: str = Field(min_length=1, description="bidirectional map between the robot's order and the pipe's")
+    mapping: Name = Field(description="bidirectional map between the robot's order and the pipe's")
 
     @model_validator(mode="after")
     def _body_has_a_name(self) -> "DofsRecord":
@@ -169,7 +168,7 @@ class PipeRecord(Record):
         default=None, description="conventions of a rigid body's state, or of Points with an orientation"
     )
     filter: FilterRecord | None = Field(default=None, description="low-pass filter")
-    calibration: str | None = Field(default=None, min_length=1, description="calibration of the hardware's joints")
+    calibration: Name | None = Field(default=None, description="calibration of the hardware's joints")
     message: str | None = Field(
         default=None,
         description="`package/Type` of the message; XBOT, left out: the one that fits the other end",
@@ -232,9 +231,8 @@ class FeedbackRecord(PipeRecord):
         "`histories`; left out: the newest message alone counts",
     )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
-    sensor: Annotated[str | None, NameOf("link")] = Field(
+    sensor: Annotated[Name | None, NameOf("link")] = Field(
         default=None,
-        min_length=1,
         description="XBOT, OPERATIONAL with `layer: online`: link of the inertial sensor that is read, in place of "
         "`dofs.name`; `source` counts only together with `message`",
     )
@@ -331,12 +329,11 @@ class ControllerRecord(PipeRecord):
         default="reference",
         description="State that it sends: `reference` (desired), `state` (measured) or `motor` (measured, motor side)",
     )
-    frame_id: str = Field(
-        default="world", min_length=1, description="OPERATIONAL: name of the world in the messages, such as `odom`"
+    frame_id: Name = Field(
+        default="world", description="OPERATIONAL: name of the world in the messages, such as `odom`"
     )
-    controller: str | None = Field(
+    controller: Name | None = Field(
         default=None,
-        min_length=1,
         description="controller of the lower level that gets the commands, so that plugins on disjoint joints have "
         "pipes of their own to it; default: the one with the pipe's name",
     )
@@ -348,15 +345,13 @@ class ControllerRecord(PipeRecord):
     sink: str | None = Field(
         default=None, description="topic; of a lower-level controller it follows the controller's name"
     )
-    ff_service: str | None = Field(
+    ff_service: Name | None = Field(
         default=None,
-        min_length=1,
         description="service below the controller's name that switches feed-forward torques; each start switches "
         "them on",
     )
-    load_service: str | None = Field(
+    load_service: Name | None = Field(
         default=None,
-        min_length=1,
         description="service below the controller's name that loads the gains of `source.controller` at each start; "
         "default: `/load_gains` of a controller with springs",
     )

@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from solfer.config.records.bounds import Name
 from solfer.config.records.record import Record
 from solfer.config.yaml.files import located
 
@@ -16,7 +17,7 @@ class FileRecord(Record):
     """
 
     path: str = Field(default="", description="folder")
-    file: str = Field(min_length=1, description="file, in the folder if there is one")
+    file: Name = Field(description="file, in the folder if there is one")
 
     @model_validator(mode="before")
     @classmethod
@@ -36,9 +37,9 @@ class FileRecord(Record):
 class TextRecord(Record):
     """A text that lies in a parameter (a word: its name) or in a file (`file`, with `path` or without)."""
 
-    parameter: str | None = Field(default=None, min_length=1, description="name of the parameter")
+    parameter: Name | None = Field(default=None, description="name of the parameter")
     path: str = Field(default="", description="folder")
-    file: str | None = Field(default=None, min_length=1, description="file, in the folder if there is one")
+    file: Name | None = Field(default=None, description="file, in the folder if there is one")
 
     @model_validator(mode="before")
     @classmethod

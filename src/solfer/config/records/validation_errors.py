@@ -97,7 +97,7 @@ def _like(key: Key, others: list[str]) -> list[str]:
 
 def _misspelt(key: str, beside: YamlNode, problems: Problems) -> bool:
     """Note that a key is missing where a similar one stands; return whether there is one."""
-    others = dict(beside.items())
+    others = beside.entries()
     for other in _like(key, list(others)):
         problems.add(others[other].head, f"the key '{key}' is missing: '{other}' may be misspelt", names=(key,))
         return True

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from solfer.config.records.bounds import Name
 from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
 
@@ -25,10 +26,9 @@ class TorqueLimitsRecord(Record):
 class WorkspaceRecord(Record):
     """How far a link may be from another one, or from a place in the world; a QP alone keeps it."""
 
-    link: str = Field(min_length=1, description="link, frame below `frames`, or group: each of its links")
-    relative: str = Field(
+    link: Name = Field(description="link, frame below `frames`, or group: each of its links")
+    relative: Name = Field(
         default="world",
-        min_length=1,
         description="link or frame that it is near to, a group of one for each, or `world`",
     )
     nearest: float = Field(default=0.0, ge=0.0, le=1e4, description="smallest distance [m]")

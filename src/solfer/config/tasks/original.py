@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from solfer.config.records.bounds import Name
 from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
 from solfer.config.records.robot_names import NameOf
@@ -29,7 +30,7 @@ class OriginalTaskTags(Record):
         min_length=1,
         description="original: tasks by priority, `ARMS` or `ns::ARMS` by null spaces, `qp::ARMS` by QPs",
     )
-    tunning: str | None = Field(default=None, min_length=1, description="original: the one of `tunnings` that counts")
+    tunning: Name | None = Field(default=None, description="original: the one of `tunnings` that counts")
     tunnings: dict[str, dict[str, Gain | tuple[Gain, ...]]] | None = Field(
         default=None, **LIVE, description="original: gains by task [1/s], twice as fast in a QP, and dampings, by name"
     )
@@ -38,17 +39,17 @@ class OriginalTaskTags(Record):
 class OriginalStackTags(OriginalTaskTags):
     """Tags of a stack of tasks as the original program has them; for a new one, there is `stack`."""
 
-    chain: Annotated[str | None, NameOf("group")] = Field(
-        default=None, min_length=1, description="original: SRDF group of the joints that move"
+    chain: Annotated[Name | None, NameOf("group")] = Field(
+        default=None, description="original: SRDF group of the joints that move"
     )
-    track: Annotated[str | None, NameOf("group")] = Field(
-        default=None, min_length=1, description="original: SRDF group of the hands' links"
+    track: Annotated[Name | None, NameOf("group")] = Field(
+        default=None, description="original: SRDF group of the hands' links"
     )
-    reference: str | None = Field(
-        default=None, min_length=1, description="original: link that the hands are seen from, world axes, or `world`"
+    reference: Name | None = Field(
+        default=None, description="original: link that the hands are seen from, world axes, or `world`"
     )
-    workspace_init: Annotated[str | None, NameOf("group")] = Field(
-        default=None, min_length=1, description="original: SRDF group of the links that the hands stay near, in order"
+    workspace_init: Annotated[Name | None, NameOf("group")] = Field(
+        default=None, description="original: SRDF group of the links that the hands stay near, in order"
     )
 
     @property

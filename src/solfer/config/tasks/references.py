@@ -4,15 +4,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from solfer.config.records.bounds import COORDINATE, DIRECTION
+from solfer.config.records.bounds import COORDINATE, Direction, Name, Place
 from solfer.config.records.record import Record
 
 KINDS = ("circle", "line", "sine", "waypoints", "file")
 """Kinds of references."""
 
 Period = Annotated[float, Field(ge=0.05, le=3600.0)]
-Place = Annotated[tuple[Annotated[float, Field(**COORDINATE)], ...], Field(min_length=3, max_length=3)]
-Normal = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[tuple[Annotated[float, Field(ge=-1.0, le=1.0)], ...], Field(min_length=4, max_length=4)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
 
@@ -25,7 +23,7 @@ class CircleReferenceRecord(Record):
     plane: Literal["xy", "yx", "xz", "zx", "yz", "zy"] | None = Field(
         default=None, description="two axes: the centre is at minus the first, the motion begins along the second"
     )
-    normal: Normal | None = Field(
+    normal: Direction | None = Field(
         default=None, description="instead of `plane`: the axis about which it turns, of any length"
     )
     turns: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
@@ -88,7 +86,7 @@ class ReferenceRecord(Record):
     waypoints: Annotated[tuple[WaypointReferenceRecord, ...], Field(min_length=1)] | None = Field(
         default=None, description="way-points with times, smooth between them"
     )
-    file: Annotated[str, Field(min_length=1)] | None = Field(
+    file: Name | None = Field(
         default=None,
         description="a CSV file, relative to the file that names it: time [s], then the numbers of the reference",
     )

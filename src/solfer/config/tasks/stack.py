@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from solfer.config.records.bounds import COORDINATE, DIRECTION, OFFSET
+from solfer.config.records.bounds import COORDINATE, Direction, Name, Offset, Place
 from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
 from solfer.config.tasks.limits import StackLimitsRecord
@@ -29,10 +29,6 @@ Gain = Annotated[float, Field(ge=0.0, le=1e4)]
 Rate = Annotated[float, Field(ge=-1e4, le=1e4)]
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
-Name = Annotated[str, Field(min_length=1)]
-Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
-Axis = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]
-Place = Annotated[tuple[Coordinate, ...], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[tuple[Annotated[float, Field(ge=-1e3, le=1e3)], ...], Field(min_length=4, max_length=4)]
 
 
@@ -42,13 +38,13 @@ class FrameRecord(Record):
     type: Literal["link", "ground", "wheel"] = Field(
         default="link", description="`link`: fixed to a link; `ground`: on the ground below it; `wheel`: as it rolls"
     )
-    link: str = Field(min_length=1, description="the link; for `wheel` that of a wheel among the robot's contacts")
+    link: Name = Field(description="the link; for `wheel` that of a wheel among the robot's contacts")
     offset: Offset = Field(default=(0.0, 0.0, 0.0), description="link: origin in the frame of the link [m]")
     orientation: Quaternion = Field(
         default=(0.0, 0.0, 0.0, 1.0), description="link: quaternion (x, y, z, w) from the frame to the link"
     )
     height: float = Field(default=0.0, **COORDINATE, description="ground: its height in the world [m]")
-    axis: Axis = Field(default=(1.0, 0.0, 0.0), description="ground: axis of the link that shows forward")
+    axis: Direction = Field(default=(1.0, 0.0, 0.0), description="ground: axis of the link that shows forward")
 
     @model_validator(mode="after")
     def _check(self) -> "FrameRecord":
@@ -62,21 +58,18 @@ class FrameRecord(Record):
 class TaskRecord(Record):
     """A task: what moves, and how."""
 
-    point: str = Field(
-        min_length=1,
+    point: Name = Field(
         description="what moves: " + ", ".join(f"`{kind}`" for kind in KINDS) + ", or a point of the component",
     )
     link: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = Field(
         default=None, description="link, frame or SRDF group; several links are a task `NAME/LINK` each"
     )
     offset: Offset | None = Field(default=None, description="position, pose: the point in the frame of the link [m]")
-    relative: str | None = Field(
-        default=None, min_length=1, description="link or frame that it is seen from; left out: the world"
-    )
+    relative: Name | None = Field(default=None, description="link or frame that it is seen from; left out: the world")
     axes: Literal["frame", "world"] = Field(
         default="frame", description="axes of what is relative: those of the frame, or of the world"
     )
-    axis: Axis | None = Field(default=None, description="look_at: axis of the link that turns to the target; x")
+    axis: Direction | None = Field(default=None, description="look_at: axis of the link that turns to the target; x")
     target: Name | Place | None = Field(
         default=None, description="look_at: link or frame, or a place in the world [m]; left out: 1 m ahead"
     )

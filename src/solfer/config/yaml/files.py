@@ -74,7 +74,7 @@ def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...]
     problems.absorb(file.problems)
     node = file.node
     for depth, key in enumerate(root):
-        found = dict(node.items())
+        found = node.entries()
         if key not in found:
             what = f"there is no '{dotted(root[: depth + 1])}' here"
             has = f"; {', '.join(list(found)[:5])} found instead" if found else ""

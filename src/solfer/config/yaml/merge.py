@@ -71,7 +71,7 @@ def _merge_maps(base: YamlNode, over: YamlNode, problems: Problems, path: Path) 
     for pattern, names in exclusive:
         if _matches(path, pattern) and _chosen(base, names) - _chosen(over, names) and _chosen(over, names):
             return over
-    entries = dict(base.items())
+    entries = base.entries()
     for name, value in over.items():
         entries[name] = merge(entries[name], value, problems, path=(*path, name)) if name in entries else value
     return YamlNode(entries, base.mark, base.key)

@@ -83,6 +83,11 @@ class YamlNode:
         """Return the entries of a map; nothing for all other values."""
         return iter(self.value.items() if isinstance(self.value, dict) else ())
 
+    def entries(self, *path: Key) -> "dict[str, YamlNode]":
+        """Return the entries of the map at a key path below this one; none if there is no map."""
+        found = self.get(*path)
+        return dict(found.items()) if found is not None else {}
+
     def plain(self) -> Any:
         """Return the value without places: dict, list or scalar."""
         if isinstance(self.value, dict):

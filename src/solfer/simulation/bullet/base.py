@@ -19,9 +19,8 @@ class BulletBase:
 
     def __init__(self, client: BulletClient, body: int):
         self._bullet = client.bullet
-        self._client = client.number
         self._body = body
-        self._to_com = tuple(self._bullet.getDynamicsInfo(body, -1, self._client)[3:5])
+        self._to_com = tuple(self._bullet.getDynamicsInfo(body, -1)[3:5])
         # not by PyBullet's own functions of transforms, which compute with single precision
         x, y, z, w = self._to_com[1]
         self._rotation_from_com = -x, -y, -z, w
@@ -31,15 +30,13 @@ class BulletBase:
         """Put the link's origin somewhere, at rest."""
         offset, rotation = self._to_com
         com = np.add(position, rotated(offset, orientation)).tolist()
-        self._bullet.resetBasePositionAndOrientation(
-            self._body, com, quaternion_product(orientation, rotation), self._client
-        )
-        self._bullet.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3, self._client)
+        self._bullet.resetBasePositionAndOrientation(self._body, com, quaternion_product(orientation, rotation))
+        self._bullet.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3)
 
     def state(self) -> BaseState:
         """See `RobotInEngine.base_state`."""
-        com, orientation = self._bullet.getBasePositionAndOrientation(self._body, self._client)
-        (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self._body, self._client)
+        com, orientation = self._bullet.getBasePositionAndOrientation(self._body)
+        (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self._body)
         x, y, z = rotated(self._from_com, orientation)  # from the centre of mass to the origin
         cx = -x
         cy = -y

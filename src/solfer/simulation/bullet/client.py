@@ -6,7 +6,10 @@ import locale
 import os
 import sys
 from collections.abc import Iterator
-from types import ModuleType
+from functools import partial
+from inspect import isbuiltin
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 from solfer.errors import MissingDependency, SimulationError
 
@@ -75,8 +78,8 @@ class BulletClient:
         gui: Open PyBullet's window instead of working without one.
 
     Attributes:
-        bullet: The module pybullet.
-        number: Number of the client, the last argument of all calls; negative: it is disconnected.
+        bullet: The module pybullet, whose functions get the number of this client.
+        number: Number of the client; negative: it is disconnected.
 
     Raises:
         MissingDependency: PyBullet is not installed.
@@ -84,18 +87,25 @@ class BulletClient:
     """
 
     def __init__(self, gui: bool = False):
-        self.bullet = load_pybullet()
+        bullet = load_pybullet()
         if gui and not os.environ.get("DISPLAY"):
             raise SimulationError("PyBullet's window needs a display", expected="DISPLAY to be set, or no window")
         with redirected((STDOUT,)):
-            self.number = self.bullet.connect(self.bullet.GUI if gui else self.bullet.DIRECT)
+            self.number = bullet.connect(bullet.GUI if gui else bullet.DIRECT)
         if self.number < 0:
             raise SimulationError(
                 "PyBullet does not connect", expected="a display for the window, or a simulation without one"
             )
+        # as pybullet_utils does it, but once, and not in each call
+        bound = {
+            name: partial(each, physicsClientId=self.number)
+            for name, each in vars(bullet).items()
+            if isbuiltin(each) and not name.startswith("compute")
+        }
+        self.bullet: Any = SimpleNamespace(**{**vars(bullet), **bound})
 
     def close(self) -> None:
         """Disconnect. May be called twice."""
         if self.number >= 0:
-            self.bullet.disconnect(self.number)
+            self.bullet.disconnect()
             self.number = -1

@@ -30,21 +30,20 @@ def warn_of_differences(client: BulletClient, body: int, text: str, where: str) 
 def differences(client: BulletClient, body: int, text: str) -> Iterator[str]:
     """Yield what differs between a body and the URDF that PyBullet was given, one link or joint each."""
     bullet = client.bullet
-    number = client.number
     robot = ElementTree.fromstring(text)
-    infos = [bullet.getJointInfo(body, index, number) for index in range(bullet.getNumJoints(body, number))]
-    numbers = {bullet.getBodyInfo(body, number)[0].decode(): -1} | {info[12].decode(): info[0] for info in infos}
+    infos = [bullet.getJointInfo(body, index) for index in range(bullet.getNumJoints(body))]
+    numbers = {bullet.getBodyInfo(body)[0].decode(): -1} | {info[12].decode(): info[0] for info in infos}
     for link in robot.findall("link"):
         name = link.get("name", "")
         if name not in numbers:
             yield f"link '{name}' is not there"
             continue
         mass = float(link.find("inertial/mass").get("value"))  # type: ignore[union-attr, arg-type]
-        has = bullet.getDynamicsInfo(body, numbers[name], number)[0]
+        has = bullet.getDynamicsInfo(body, numbers[name])[0]
         # a fixed base weighs nothing for PyBullet
         if not _equal(mass, has) and not (numbers[name] == -1 and has == 0.0):
             yield f"link '{name}': mass {has:g} instead of {mass:g} kg"
-        yield from _shapes(name, link, bullet.getCollisionShapeData(body, numbers[name], number))
+        yield from _shapes(name, link, bullet.getCollisionShapeData(body, numbers[name]))
     by_name = {info[1].decode(): info for info in infos}
     for joint in robot.findall("joint"):
         yield from _joint(joint, by_name)

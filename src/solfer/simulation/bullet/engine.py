@@ -28,18 +28,13 @@ class BulletEngine(PhysicsEngine):
     def __init__(self, gui: bool = False):
         self._world = BulletClient(gui)
         self._bullet = self._world.bullet
-        self._client = self._world.number
         self._window = gui
         if gui:  # its panels show nothing of use, and drawing while a robot is loaded takes a minute without a GPU
             for flag in (self._bullet.COV_ENABLE_GUI, self._bullet.COV_ENABLE_RENDERING):
-                self._bullet.configureDebugVisualizer(flag, 0, physicsClientId=self._client)
-        self._bullet.setGravity(0.0, 0.0, -9.81, self._client)
+                self._bullet.configureDebugVisualizer(flag, 0)
+        self._bullet.setGravity(0.0, 0.0, -9.81)
         self._bullet.setPhysicsEngineParameter(
-            fixedTimeStep=STEP,
-            numSubSteps=0,
-            numSolverIterations=50,
-            deterministicOverlappingPairs=1,
-            physicsClientId=self._client,
+            fixedTimeStep=STEP, numSubSteps=0, numSolverIterations=50, deterministicOverlappingPairs=1
         )
 
     def load_robot(
@@ -50,16 +45,14 @@ class BulletEngine(PhysicsEngine):
 
     def add_plane(self, normal: Sequence[float], friction: float) -> int:
         """See `PhysicsEngine.add_plane`."""
-        shape = self._bullet.createCollisionShape(
-            self._bullet.GEOM_PLANE, planeNormal=normal, physicsClientId=self._client
-        )
+        shape = self._bullet.createCollisionShape(self._bullet.GEOM_PLANE, planeNormal=normal)
         return self._add(0.0, shape, NO_SHAPE, pose=([0.0] * 3, [0.0, 0.0, 0.0, 1.0]), friction=friction)
 
     def add_box(self, size: Sequence[float], pose: Pose, mass: float, friction: float, colour: Colour) -> int:
         """See `PhysicsEngine.add_box`."""
         half = [edge / 2.0 for edge in size]
         bullet = self._bullet
-        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
+        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half)
         return self._add(mass, shape, self._seen(half, colour), pose=pose, friction=friction)
 
     def add_tiles(self, size: Sequence[float], colours: Iterable[Colour]) -> list[int]:
@@ -67,36 +60,33 @@ class BulletEngine(PhysicsEngine):
         half = [edge / 2.0 for edge in size]
         listed = list(colours)
         shapes = {colour: self._seen(half, colour) for colour in dict.fromkeys(listed)}
-        return [
-            self._bullet.createMultiBody(0.0, NO_SHAPE, shapes[colour], physicsClientId=self._client)
-            for colour in listed
-        ]
+        return [self._bullet.createMultiBody(0.0, NO_SHAPE, shapes[colour]) for colour in listed]
 
     def pose(self, body: int) -> Pose:
         """See `PhysicsEngine.pose`."""
-        position, orientation = self._bullet.getBasePositionAndOrientation(body, self._client)
+        position, orientation = self._bullet.getBasePositionAndOrientation(body)
         return position, orientation
 
     def place(self, body: int, pose: Pose) -> None:
         """See `PhysicsEngine.place`."""
-        self._bullet.resetBasePositionAndOrientation(body, *pose, self._client)
+        self._bullet.resetBasePositionAndOrientation(body, *pose)
 
     def stop(self, body: int) -> None:
         """See `PhysicsEngine.stop`."""
-        self._bullet.resetBaseVelocity(body, [0.0] * 3, [0.0] * 3, self._client)
+        self._bullet.resetBaseVelocity(body, [0.0] * 3, [0.0] * 3)
 
     def set_friction(self, body: int, coefficient: float) -> None:
         """See `PhysicsEngine.set_friction`."""
-        self._bullet.changeDynamics(body, -1, lateralFriction=coefficient, physicsClientId=self._client)
+        self._bullet.changeDynamics(body, -1, lateralFriction=coefficient)
 
     def box_around(self, body: int) -> tuple[Vector, Vector]:
         """See `PhysicsEngine.box_around`."""
-        low, high = self._bullet.getAABB(body, -1, self._client)
+        low, high = self._bullet.getAABB(body, -1)
         return low, high
 
     def step(self) -> None:
         """See `PhysicsEngine.step`."""
-        self._bullet.stepSimulation(self._client)
+        self._bullet.stepSimulation()
 
     def clear_contacts(self) -> None:
         """See `PhysicsEngine.clear_contacts`.
@@ -104,26 +94,26 @@ class BulletEngine(PhysicsEngine):
         Bullet keeps the points and impulses of a contact for the next step, also when a body was put elsewhere and
         came back in between.
         """
-        self._bullet.performCollisionDetection(self._client)
+        self._bullet.performCollisionDetection()
 
     def save_state(self) -> int:
         """See `PhysicsEngine.save_state`."""
-        return self._bullet.saveState(self._client)
+        return self._bullet.saveState()
 
     def restore_state(self, state: int) -> None:
         """See `PhysicsEngine.restore_state`."""
-        self._bullet.restoreState(state, physicsClientId=self._client)
+        self._bullet.restoreState(state)
 
     def remove_state(self, state: int) -> None:
         """See `PhysicsEngine.remove_state`."""
-        self._bullet.removeState(state, self._client)
+        self._bullet.removeState(state)
 
     def show(self, target: Iterable[float]) -> None:
         """See `PhysicsEngine.show`."""
         if self._window:
             # distance [m], yaw and pitch [deg] of the camera at first
-            self._bullet.resetDebugVisualizerCamera(2.5, 50.0, -20.0, [float(value) for value in target], self._client)
-            self._bullet.configureDebugVisualizer(self._bullet.COV_ENABLE_RENDERING, 1, physicsClientId=self._client)
+            self._bullet.resetDebugVisualizerCamera(2.5, 50.0, -20.0, [float(value) for value in target])
+            self._bullet.configureDebugVisualizer(self._bullet.COV_ENABLE_RENDERING, 1)
 
     def render(self, view: CameraView) -> Picture:
         """See `PhysicsEngine.render`."""
@@ -144,7 +134,6 @@ class BulletEngine(PhysicsEngine):
             lightDiffuseCoeff=0.55,
             lightSpecularCoeff=0.15,
             renderer=bullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
         )
         _, _, colours, depth, segments = picture
         normalized = np.reshape(depth, (height, width))  # from 0 in the near plane to 1 in the far one
@@ -160,12 +149,10 @@ class BulletEngine(PhysicsEngine):
 
     def _seen(self, half: Sequence[float], colour: Colour) -> int:
         """Make the shape of a box by which it is seen."""
-        return self._bullet.createVisualShape(
-            self._bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=self._client
-        )
+        return self._bullet.createVisualShape(self._bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour)
 
     def _add(self, mass: float, shape: int, visual: int, pose: Pose, friction: float) -> int:
-        body = self._bullet.createMultiBody(mass, shape, visual, *pose, physicsClientId=self._client)
+        body = self._bullet.createMultiBody(mass, shape, visual, *pose)
         self._bullet.changeDynamics(
             body,
             -1,
@@ -175,6 +162,5 @@ class BulletEngine(PhysicsEngine):
             restitution=0.0,
             linearDamping=0.0,
             angularDamping=0.0,
-            physicsClientId=self._client,
         )
         return body

@@ -35,7 +35,6 @@ class BulletJoints(JointGroup):
     """
 
     def __init__(self, client: BulletClient, body: int, indices: Sequence[int]):
-        self._client = client.number
         self._set = client.bullet.setJointMotorControlArray
         self._torque_control = client.bullet.TORQUE_CONTROL
         self._velocity_control = client.bullet.VELOCITY_CONTROL
@@ -44,24 +43,11 @@ class BulletJoints(JointGroup):
 
     def apply_torques(self, torques: np.ndarray) -> None:
         """See `JointGroup.apply_torques`."""
-        self._set(
-            self._body,
-            self._indices,
-            self._torque_control,
-            forces=torques.tolist(),
-            physicsClientId=self._client,
-        )
+        self._set(self._body, self._indices, self._torque_control, forces=torques.tolist())
 
     def hold_speeds(self, speeds: np.ndarray, efforts: Sequence[float]) -> None:
         """See `JointGroup.hold_speeds`."""
-        self._set(
-            self._body,
-            self._indices,
-            self._velocity_control,
-            targetVelocities=speeds.tolist(),
-            forces=efforts,
-            physicsClientId=self._client,
-        )
+        self._set(self._body, self._indices, self._velocity_control, targetVelocities=speeds.tolist(), forces=efforts)
 
 
 class BulletRobot(RobotInEngine):
@@ -90,7 +76,6 @@ class BulletRobot(RobotInEngine):
     ):
         self._world = client
         self._bullet = client.bullet
-        self._client = client.number
         if len(joints) > 127:  # PyBullet measures the state of no more
             what = f"the robot has {len(joints)} moving joints, more than PyBullet can take"
             raise SimulationError(what, where=description.where, expected="at most 127")
@@ -105,7 +90,7 @@ class BulletRobot(RobotInEngine):
 
     def joint_states(self) -> SimulatedJoints:
         """See `RobotInEngine.joint_states`."""
-        states = self._bullet.getJointStates(self.number, self._indices, self._client)
+        states = self._bullet.getJointStates(self.number, self._indices)
         position, velocity, _, effort = zip(*states, strict=True)
         return SimulatedJoints(position, velocity, effort)
 
@@ -116,18 +101,12 @@ class BulletRobot(RobotInEngine):
     def place_joints(self, positions: Sequence[float] | np.ndarray) -> None:
         """See `RobotInEngine.place_joints`."""
         self._bullet.resetJointStatesMultiDof(
-            self.number,
-            self._indices,
-            [[float(value)] for value in positions],
-            [[0.0]] * len(self._indices),
-            physicsClientId=self._client,
+            self.number, self._indices, [[float(value)] for value in positions], [[0.0]] * len(self._indices)
         )
 
     def place_joint(self, joint: int, position: float, velocity: float) -> None:
         """See `RobotInEngine.place_joint`."""
-        self._bullet.resetJointState(
-            self.number, self._indices[joint], position, velocity, physicsClientId=self._client
-        )
+        self._bullet.resetJointState(self.number, self._indices[joint], position, velocity)
 
     def place_base(self, position: Sequence[float] | np.ndarray, orientation: Sequence[float] | np.ndarray) -> None:
         """See `RobotInEngine.place_base`."""
@@ -145,15 +124,9 @@ class BulletRobot(RobotInEngine):
         bounds = 0.25 * inertia / STEP  # damping takes at most a quarter of its speed from a joint in a step
         for index, value, bound in zip(self._indices, damping, bounds.tolist(), strict=True):
             if value:
-                self._bullet.changeDynamics(
-                    self.number, index, jointDamping=min(value, bound), physicsClientId=self._client
-                )
+                self._bullet.changeDynamics(self.number, index, jointDamping=min(value, bound))
         self._bullet.setJointMotorControlArray(
-            self.number,
-            self._indices,
-            self._bullet.VELOCITY_CONTROL,
-            forces=list(friction),
-            physicsClientId=self._client,
+            self.number, self._indices, self._bullet.VELOCITY_CONTROL, forces=list(friction)
         )
 
     def add_gear(self, joint: int, leader: int, ratio: float) -> None:
@@ -167,46 +140,42 @@ class BulletRobot(RobotInEngine):
             (0.0, 1.0, 0.0),
             (0.0, 0.0, 0.0),
             (0.0, 0.0, 0.0),
-            physicsClientId=self._client,
         )
-        self._bullet.changeConstraint(gear, gearRatio=-ratio, maxForce=1e6, physicsClientId=self._client)
+        self._bullet.changeConstraint(gear, gearRatio=-ratio, maxForce=1e6)
 
     def set_friction(self, link: str, coefficient: float) -> None:
         """See `RobotInEngine.set_friction`."""
-        self._bullet.changeDynamics(
-            self.number, self._numbers[self.owner[link]], lateralFriction=coefficient, physicsClientId=self._client
-        )
+        self._bullet.changeDynamics(self.number, self._numbers[self.owner[link]], lateralFriction=coefficient)
 
     def push(self, link: str, force: Sequence[float], torque: Sequence[float], position: Sequence[float]) -> None:
         """See `RobotInEngine.push`."""
         bullet = self._bullet
         index = self._numbers[self.owner[link]]
-        bullet.applyExternalForce(self.number, index, force, position, bullet.WORLD_FRAME, self._client)
-        bullet.applyExternalTorque(self.number, index, torque, bullet.WORLD_FRAME, self._client)
+        bullet.applyExternalForce(self.number, index, force, position, bullet.WORLD_FRAME)
+        bullet.applyExternalTorque(self.number, index, torque, bullet.WORLD_FRAME)
 
     def contacts(self) -> list[ContactPoint]:
         """See `RobotInEngine.contacts`."""
-        found = self._bullet.getContactPoints(self.number, physicsClientId=self._client)
+        found = self._bullet.getContactPoints(self.number)
         return [ContactPoint(self.links[point[3]], point[5], _force(point)) for point in found if point[9] > 0.0]
 
     def closest_points(self, body: int, reach: float, link: str | None = None) -> list[ClosestPoint]:
         """See `RobotInEngine.closest_points`."""
         only = () if link is None else (self._numbers[link],)
-        found = self._bullet.getClosestPoints(self.number, body, reach, *only, physicsClientId=self._client)
+        found = self._bullet.getClosestPoints(self.number, body, reach, *only)
         return [ClosestPoint(point[5], point[8]) for point in found]
 
     def box_around(self) -> tuple[np.ndarray, np.ndarray]:
         """See `RobotInEngine.box_around`."""
-        boxes = np.array([self._bullet.getAABB(self.number, index, self._client) for index in self._numbers.values()])
+        boxes = np.array([self._bullet.getAABB(self.number, index) for index in self._numbers.values()])
         return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
     def center_of_mass(self) -> np.ndarray:
         """See `RobotInEngine.center_of_mass`."""
         bullet = self._bullet
-        client = self._client
         links = list(range(len(self.links) - 1))
-        states = bullet.getLinkStates(self.number, links, computeForwardKinematics=1, physicsClientId=client)
-        places = [bullet.getBasePositionAndOrientation(self.number, client)[0], *(state[0] for state in states)]
+        states = bullet.getLinkStates(self.number, links, computeForwardKinematics=1)
+        places = [bullet.getBasePositionAndOrientation(self.number)[0], *(state[0] for state in states)]
         return np.average(places, axis=0, weights=self._masses())
 
     def mass(self) -> float:
@@ -215,7 +184,7 @@ class BulletRobot(RobotInEngine):
 
     def _masses(self) -> list[float]:
         """Read the masses of PyBullet's links, that of the base first [kg]."""
-        return [self._bullet.getDynamicsInfo(self.number, index, self._client)[0] for index in self._numbers.values()]
+        return [self._bullet.getDynamicsInfo(self.number, index)[0] for index in self._numbers.values()]
 
     def _load(self, text: str, path: Path, where: str, floats: bool) -> int:
         bullet = self._bullet
@@ -223,15 +192,15 @@ class BulletRobot(RobotInEngine):
         path.write_text(text, encoding="utf-8")
         try:
             with redirected((STDOUT,), STDERR), decimal_points():
-                return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags, physicsClientId=self._client)
+                return bullet.loadURDF(str(path), useFixedBase=not floats, flags=flags)
         except bullet.error as error:
             raise SimulationError(
                 f"PyBullet cannot load the robot: {error}", where=where, expected="a URDF that PyBullet can load"
             ) from error
 
     def _name_links(self, base: str, joints: Sequence[str]) -> None:
-        count = self._bullet.getNumJoints(self.number, self._client)
-        infos = [self._bullet.getJointInfo(self.number, index, self._client) for index in range(count)]
+        count = self._bullet.getNumJoints(self.number)
+        infos = [self._bullet.getJointInfo(self.number, index) for index in range(count)]
         by_name = {info[1].decode(): info[0] for info in infos}
         self.links = (*(info[12].decode() for info in infos), base)  # the base is the last: -1 finds it
         self._numbers = {link: index - 1 for index, link in enumerate((base, *self.links[:-1]))}
@@ -246,12 +215,11 @@ class BulletRobot(RobotInEngine):
             )
         coefficients = {owner[link]: value for link, value in friction.links.items()}
         change = self._bullet.changeDynamics
-        client = self._client
-        change(self.number, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+        change(self.number, -1, linearDamping=0.0, angularDamping=0.0)
         # free light links reach Bullet's own default of 100 rad/s
-        change(self.number, -1, maxJointVelocity=1000.0, physicsClientId=client)
+        change(self.number, -1, maxJointVelocity=1000.0)
         for link, index in self._numbers.items():  # calls of their own: some values redirect a call to the base
-            change(self.number, index, jointDamping=0.0, physicsClientId=client)
+            change(self.number, index, jointDamping=0.0)
             change(
                 self.number,
                 index,
@@ -259,7 +227,6 @@ class BulletRobot(RobotInEngine):
                 rollingFriction=0.0,
                 spinningFriction=0.0,
                 restitution=0.0,
-                physicsClientId=client,
             )
 
 

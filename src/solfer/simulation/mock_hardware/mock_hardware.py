@@ -107,10 +107,7 @@ class MockHardware:
 
     def run(self) -> None:
         """Cycle in real time until the middleware ends; the robot comes to rest before."""
-        while self._wiring.running():
-            self.cycle()
-            self.wait()
-        self.rest()
+        self._server.run(self.cycle)
 
     def rest(self, cycle: Callable[[], None] | None = None) -> None:
         """See `SimulationServer.rest`."""

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from solfer.config import FileRecord, Record
-from solfer.config.records.bounds import COORDINATE, SEED
+from solfer.config.records.bounds import COORDINATE, SEED, Name
 from solfer.config.records.conventions import OffsetOrientationRecord, OffsetPositionRecord
 from solfer.simulation.sensors.kinds.joints import JointNoiseRecord
 
@@ -20,7 +20,7 @@ class DelayRecord(Record):
 class EncoderRecord(Record):
     """The encoder of a joint: `joint position = direction * reading + zero`."""
 
-    name: str = Field(min_length=1, description="the hardware's name of the joint")
+    name: Name = Field(description="the hardware's name of the joint")
     direction: Literal[1, -1] = Field(description="1, or -1 where it counts against the model's joint")
     zero: float = Field(**COORDINATE, description="position of the model's joint at which it reads zero [rad, m]")
 

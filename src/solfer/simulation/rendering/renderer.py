@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from solfer.errors import SimulationError
+from solfer.errors import SimulationError, writing
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -102,15 +102,8 @@ class Renderer:
         Raises:
             SimulationError: The file cannot be written.
         """
-        try:
-            with open(path, "wb") as file:
-                self.write(q, file, boxes)
-        except OSError as error:
-            raise SimulationError(
-                f"the picture cannot be written: {error.strerror}",
-                where=str(path),
-                expected="a file that you may write to",
-            ) from error
+        with writing("the picture", path, SimulationError), open(path, "wb") as file:
+            self.write(q, file, boxes)
 
     def write(self, q: np.ndarray, file: BinaryIO, boxes: Sequence[Pose] = ()) -> None:
         """Write the picture at q, see `image`, as PNG into an open file."""

@@ -192,12 +192,16 @@ class SimulationServer:
         else:
             self.pace.wait(self.simulation.time)
 
-    def run(self) -> None:
-        """Cycle in real time until the middleware ends; the robot comes to rest before."""
+    def run(self, cycle: Callable[[], None] | None = None) -> None:
+        """Cycle in real time until the middleware ends; the robot comes to rest before.
+
+        Args:
+            cycle: Makes a cycle, instead of `cycle`.
+        """
         while self.middleware.running():
-            self.cycle()
+            (cycle or self.cycle)()
             self.wait()
-        self.rest()
+        self.rest(cycle)
 
     def rest(self, cycle: Callable[[], None] | None = None) -> None:
         """Let the robot come to rest at the end.

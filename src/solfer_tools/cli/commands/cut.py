@@ -7,7 +7,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from solfer.errors import SolferError
+from solfer.errors import writing
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,12 +36,6 @@ def run(options: argparse.Namespace) -> int:
     if options.output is None:
         sys.stdout.write(text)
         return 0
-    try:
+    with writing("the URDF", options.output):
         options.output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise SolferError(
-            f"the URDF cannot be written: {error.strerror}",
-            where=str(options.output),
-            expected="a file that you may write to",
-        ) from error
     return 0

@@ -6,13 +6,12 @@ docs/how-to/live_parameters.md, such as `stack.tasks.left.gain=8`; VALUE is YAML
 
 import argparse
 from pathlib import Path
-from typing import Any
+
+from solfer.cli.options import add_namespace
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
-    namespace: dict[str, Any] = {"metavar": "NAME", "help": "namespace of the RT layer (default: plugins under ROS)"}
-    parser.add_argument("--namespace", default="", **namespace)
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     listing = actions.add_parser("list", help="name, value, unit, range, default and description of each")
     listing.add_argument("running", nargs="?", metavar="PLUGIN", help="the plugin (default: all)")
@@ -27,9 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     save.add_argument("running", metavar="PLUGIN", help="the plugin")
     save.add_argument("file", type=Path, metavar="FILE", help="the file; where it exists only values change")
-    for action in actions.choices.values():
-        action.add_argument("--namespace", default=argparse.SUPPRESS, **namespace)  # before or after the action
-        action.set_defaults(parser=action)
+    add_namespace(parser, actions.choices.values(), "", "namespace of the RT layer (default: plugins under ROS)")
 
 
 def run(options: argparse.Namespace) -> int:

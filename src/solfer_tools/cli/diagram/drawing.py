@@ -4,7 +4,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from solfer.errors import ConfigError, MissingDependency, SolferError
+from solfer.errors import ConfigError, MissingDependency, SolferError, writing
 
 
 def draw(dot: str, path: Path) -> None:
@@ -25,12 +25,8 @@ def draw(dot: str, path: Path) -> None:
         endings = ", ".join(f".{each}" for each in formats)
         raise ConfigError(f"'{path}' is not a picture that can be drawn", expected=f"a file with the ending {endings}")
     content = dot.encode() if form == "dot" else _rendered(dot, form)
-    try:
+    with writing("the picture", path):
         path.write_bytes(content)
-    except OSError as error:
-        raise SolferError(
-            f"the picture cannot be written: {error.strerror}", where=str(path), expected="a file that you may write to"
-        ) from error
 
 
 def _rendered(dot: str, form: str) -> bytes:

@@ -67,7 +67,7 @@ def _chosen(options: argparse.Namespace) -> Recording:
     _warn(recording)
     start, end = span(recording)
     part = between(select(recording, options.columns, str(options.file)), options.begin, options.end, start=start)
-    if not any(len(channel.times) for channel in part.channels.values()):
+    if not part.filled:
         raise RecordingError(
             "no row is left",
             where=str(options.file),

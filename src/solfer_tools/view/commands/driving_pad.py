@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Callable
-from concurrent.futures import Future
 from functools import partial
 
 from viser import GuiApi, GuiButtonHandle, GuiEvent
 
 from solfer.errors import MiddlewareError
 from solfer.transport import Middleware, Writer
-from solfer.transport.messages import FieldsMessage
-from solfer.transport.topics import Topics
+from solfer_tools.navigation.course import twist
+from solfer_tools.scene.discovery import TopicRequests
 from solfer_tools.view.commands.requests import PageRequests
 
 CMD_VEL = "cmd_vel"
@@ -40,8 +39,7 @@ class DrivingPad:
         self._direction = (0.0, 0.0, 0.0)
         self._pressed = -math.inf
         self._drives = False
-        self._topics: Future[Topics] | None = None
-        self._next = -math.inf
+        self._topics = TopicRequests(middleware)
         self._module = gui.add_dropdown("base", ("",))
         self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
         directions = {  # x, y, yaw
@@ -57,18 +55,11 @@ class DrivingPad:
 
     def find_modules(self) -> None:
         """Look once a second which components drive the base."""
-        now = self._middleware.now()
-        if self._topics is None and now >= self._next:
-            self._topics = self._middleware.topics()
-            self._next = now + 1.0
-        if self._topics is None or not self._topics.done():
-            return
-        topics = self._topics
-        self._topics = None
         try:
-            received = topics.result().received
-        except MiddlewareError:  # it is asked again
+            topics = self._topics.answer()
+        except MiddlewareError:
             return
+        received = () if topics is None else topics.received
         modules = sorted(name.removesuffix(f"/{CMD_VEL}") for name in received if name.endswith(f"/{CMD_VEL}"))
         if modules and tuple(modules) != tuple(self._module.options):
             self._module.options = tuple(modules)
@@ -84,9 +75,7 @@ class DrivingPad:
         if module not in self._writers:
             topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
             self._writers[module] = self._middleware.declared_writer(topic, "geometry_msgs/Twist")
-        linear = {"x": x, "y": y, "z": 0.0}
-        angular = {"x": 0.0, "y": 0.0, "z": 2.0 * yaw}  # 2 rad/s at 1 m/s
-        self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
+        self._writers[module].write(twist(x, y, 2.0 * yaw))  # 2 rad/s at 1 m/s
         self._drives = pressed
 
     def release(self) -> None:

@@ -1,11 +1,23 @@
 """Live parameters of all parts that offer them."""
 
+import json
 import math
 from collections.abc import Iterable
 from concurrent.futures import Future
+from typing import Any
 
+from solfer.interfaces.declaration import Accepted
 from solfer.transport import Middleware
-from solfer.transport.parameters import GET_INTERFACE, GET_PARAMETERS, GetParameters, ParametersReply
+from solfer.transport.parameters import (
+    GET_INTERFACE,
+    GET_PARAMETERS,
+    SET_INTERFACE,
+    SET_PARAMETERS,
+    GetParameters,
+    ParametersReply,
+    SetParameters,
+)
+from solfer_tools.view.commands.requests import PageRequests
 
 ATTEMPTS = 10
 """How often a part is requested its parameters: it may report before it offers them."""
@@ -46,6 +58,12 @@ class KnownParameters:
         """Request a part's parameters again, since they have changed."""
         self._left[part] = ATTEMPTS
         self._next[part] = -math.inf
+
+    def change(self, requests: PageRequests, part: str, name: str, value: Any) -> None:
+        """Change a parameter of a part; other values than texts are written as JSON."""
+        text = value if isinstance(value, str) else json.dumps(value)
+        request = SetParameters((name,), (text,))
+        requests.call(f"{part}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, lambda _: self.forget(part))
 
     def _take(self, part: str) -> None:
         if self._pending[part].done():

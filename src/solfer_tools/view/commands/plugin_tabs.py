@@ -18,11 +18,10 @@ from viser import (
     GuiTextHandle,
 )
 
-from solfer.interfaces.declaration import Accepted
 from solfer.transport.health import Health
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
-from solfer.transport.parameters import SET_INTERFACE, SET_PARAMETERS, ParametersReply, SetParameters
+from solfer.transport.parameters import ParametersReply
 from solfer_tools.view.commands.control import PageControl
 from solfer_tools.view.commands.parameters import KnownParameters
 from solfer_tools.view.commands.requests import PageRequests
@@ -152,19 +151,14 @@ class _PluginTab:
         @control.on_update
         async def _(event: GuiEvent[Any]) -> None:
             if event.client is not None:
-                text = control.value if isinstance(control.value, str) else json.dumps(control.value)
                 key = (self._name, name, event.client_id)
-                self._requests.submit(key, partial(self._set, event.client_id, name, text))
+                self._requests.submit(key, partial(self._set, event.client_id, name, control.value))
 
         return control
 
-    def _set(self, client: int | None, name: str, text: str) -> None:
+    def _set(self, client: int | None, name: str, value: bool | float | str) -> None:
         if self._control is not None and self._control.may_command(client):
-            request = SetParameters((name,), (text,))
-            service = f"{self._name}/{SET_PARAMETERS}"
-            self._requests.call(
-                service, SET_INTERFACE, request, Accepted, lambda _: self._parameters.forget(self._name)
-            )
+            self._parameters.change(self._requests, self._name, name, value)
 
 
 def _number(text: str) -> float:

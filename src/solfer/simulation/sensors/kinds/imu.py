@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from solfer.config import Record
-from solfer.config.records.bounds import NOISE, Bounds
+from solfer.config.records.bounds import NOISE, Bounds, Name
 from solfer.config.records.conventions import OffsetOrientationRecord, OffsetPositionRecord
 from solfer.numerics.rotations import cross, quaternion_from_rotation, rotation_from_quaternion
 from solfer.simulation.physics import STEP
@@ -59,7 +59,7 @@ class AttitudeRecord(Record):
 class ImuRecord(Record):
     """An inertial measurement unit."""
 
-    link: str = Field(min_length=1, description="link with the sensor's frame")
+    link: Name = Field(description="link with the sensor's frame")
     offset_position: OffsetPositionRecord | None = Field(
         default=None, description="where it really sits on the link (default: at its origin)"
     )

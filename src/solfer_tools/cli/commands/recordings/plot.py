@@ -52,7 +52,7 @@ def _figures(recording: "Recording", options: argparse.Namespace) -> "list[tuple
     from solfer_tools.cli.recordings.actions import limits_of
     from solfer_tools.review import columns_page, plugin_page
 
-    if not any(len(channel.times) for channel in recording.channels.values()):
+    if not recording.filled:
         raise RecordingError("there are no rows", where=str(options.file), expected="a recording of a plugin that ran")
     if options.columns:
         return [("columns", columns_page(select(recording, options.columns, str(options.file))))]
