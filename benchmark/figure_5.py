@@ -98,9 +98,7 @@ class Layer:
 
     def _ask(self, *words: str) -> subprocess.CompletedProcess[str]:
         command = [self._clone / "run", "exec", self._clone / "nodes/solfer", "rt", *words]
-        return subprocess.run(
-            [*command, "--namespace", self._namespace], capture_output=True, text=True, check=False
-        )
+        return subprocess.run([*command, "--namespace", self._namespace], capture_output=True, text=True, check=False)
 
     def _wait(self) -> None:
         end = time.monotonic() + BEGIN

@@ -72,9 +72,10 @@ class Component:
         self.period = 1.0 / rate
         self.let_pass(self.period)
 
-    def let_pass(self, passed: float) -> None:
-        """Let time pass until the next cycle [s]; after a longer gap motions go on from where they are."""
+    def let_pass(self, passed: float, lost: float = 0.0) -> None:
+        """Let time pass until the next cycle, some of it `lost` [s]; after a gap motions go on from where they are."""
         self.passed = passed
+        self.time_lost = lost
         self.time_step = min(passed, max(self.period, 0.05))
 
     def init(self) -> None:

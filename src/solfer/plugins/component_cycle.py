@@ -55,13 +55,6 @@ class ComponentCycle:
         self._component.start_log(logger)
         self.logger = logger if type(self._component).log is not Component.log else None
 
-    def advance(self, now: float) -> float:
-        """Let time pass for the component until `now` [s]; return how much has passed [s]."""
-        component = self._component
-        component.let_pass(passed := self.robot_time.advance(now))
-        component.time_lost = self.robot_time.lost
-        return passed
-
     def jump(self) -> None:
         """Move the component's references with a base whose estimate has jumped."""
         if self.jumps is not None and (move := self.jumps.find(self._component.passed)):

@@ -203,7 +203,10 @@ class Plugin:
             work.dynamics.update()  # the kinematics, too
         elif component.kinematics:
             self.robot.update()
-        component.pace = self.overload.advance(work.advance(now))
+        robot_time = work.robot_time
+        passed = robot_time.advance(now)
+        component.let_pass(passed, robot_time.lost)
+        component.pace = self.overload.advance(passed)
         following = self.outputs.following
         if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
             if not self.peers.warning():

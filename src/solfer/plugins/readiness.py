@@ -106,7 +106,12 @@ class Readiness:
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
             ClaimRefused: Another plugin commands a joint of this one.
         """
-        verdict = self._decide_by_feedbacks(now, running)
+        # a plugin that goes on, which is nearly every cycle
+        goes_on = running and self.feedbacks.complete and now >= self._earliest
+        if goes_on and self._middleware.rewinds == self._rewinds:
+            verdict = WORK
+        else:
+            verdict = self._decide_by_feedbacks(now, running)
         claim = self._claim
         if claim is None:
             return verdict

@@ -45,7 +45,18 @@ class RobotTime:
     def advance(self, now: float) -> float:
         """Return how much time has passed for the robot since the last call [s], which is now by the clock [s]."""
         by_clock = self._periods.count(now) * self._period
-        progress = self._progress(by_clock)
+        before = self._stamp
+        stamp = before if self._feedback is None else self._feedback.stamp
+        if -JUMP < stamp - before <= 0.0:  # nothing new, or what has been overtaken
+            self._still += by_clock
+            progress = 0.0
+        else:
+            self._stamp = stamp
+            self._still = 0.0
+            progress = stamp - before
+            if not before or abs(progress) >= JUMP:  # a clock that was set has moved on as it should
+                self._ahead = 0.0
+                progress = by_clock
         self._ahead += by_clock - progress
         self.lost = 0.0
         if self._stamp == 0.0 or self._still > 0.5:  # a stamp that stays for so long [s] is of no clock
@@ -68,17 +79,3 @@ class RobotTime:
         if follows or self._follows:
             self._ahead = self._looked = 0.0
         self._follows = follows
-
-    def _progress(self, by_clock: float) -> float:
-        """Return by how much the newest stamp has moved on [s]; a clock that was set has moved on as it should."""
-        before = self._stamp
-        stamp = before if self._feedback is None else self._feedback.stamp
-        if -JUMP < stamp - before <= 0.0:  # nothing new, or what has been overtaken
-            self._still += by_clock
-            return 0.0
-        self._stamp = stamp
-        self._still = 0.0
-        if before and abs(stamp - before) < JUMP:
-            return stamp - before
-        self._ahead = 0.0
-        return by_clock
