@@ -15,6 +15,7 @@ from solfer.plugins.life.plugin_set import NOTHING, PluginSet
 from solfer.plugins.life.switchboard import Switchboard
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.timing.cycle_timing import STAGES
+from solfer.plugins.timing.overload import REST_RATIO
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.processor import Interruptions
 from solfer.telemetry.black_box import BlackBox
@@ -39,6 +40,10 @@ UNFORGIVEN = LoopCount.UNFORGIVEN
 TIME = LoopCount.TIME
 
 
+LONGEST_CYCLE = 1.0 / (1.0 - REST_RATIO)
+"""Periods that a cycle may last: a loop of longer ones leaves out so many that motions rest, see `Overload`."""
+
+
 @dataclass(frozen=True)
 class ExecutorRules:
     """Limits of the executor for its plugins.
@@ -46,7 +51,7 @@ class ExecutorRules:
     Attributes:
         blend: Shortest time in which commands blend in from the measured state at a start [s].
         budget: Fraction of the period that a component may use.
-        overruns: Unforgiven overruns, of the loop or of a component's budget, at which it is stopped.
+        overruns: Unforgiven cycles beyond `LONGEST_CYCLE`, or beyond a component's budget, at which it is stopped.
         grace: First cycles, of the loop and of each start of a plugin, in which overruns do not count.
     """
 
@@ -130,7 +135,8 @@ class Executor:
         self._set.interrupted = self._interrupted
         self._beside_cycles = max(1, round(0.1 * self.rate))  # from one call of `beside` to the next
         self._period = round(1e9 / self.rate)
-        self._late = LeakyCounter(rules.overruns)
+        self._longest = round(LONGEST_CYCLE * self._period)
+        self._long = LeakyCounter(rules.overruns)
         self._black_box = telemetry.black_box
         self._set.changed = self._note
         self._set.initialize()
@@ -270,25 +276,26 @@ class Executor:
         return 0 if self._interruptions is None else self._interruptions.in_cycle()
 
     def _check_overrun(self, delay: int, lasted: int) -> None:
-        """Count a cycle that began `delay` after its deadline and lasted so long [ns]; too many late ones abort all.
+        """Count a cycle that began `delay` after its deadline and lasted so long [ns]; too many long ones abort all.
 
         Neither one that was kept from running counts, nor how late the next one is for that: that is an overload.
         """
         counts = self.statistics.counts
-        late = self._late
         taken = lasted if self._was_interrupted else delay + lasted
         self._was_interrupted = taken > self._period >= taken - self._interrupted()
         if self._was_interrupted or self._set.cycles <= self._rules.grace:
             return
-        often = late.add(taken > self._period)
-        counts[OVERRUNS], counts[UNFORGIVEN] = late.total, late.count
+        counts[OVERRUNS] += taken > self._period
+        is_long = lasted > self._longest and lasted - self._interrupted() > self._longest
+        often = self._long.add(is_long)
+        counts[UNFORGIVEN] = self._long.count
         if not often:
             return
-        late.reset()
+        self._long.reset()
         slowest = max(range(len(self.plugins)), key=lambda index: sum(self._set.times[index]))
         reason = (
-            f"{SAFE_STOP}: {self._rules.overruns} cycles too long, the newest {1e-6 * taken:.3f} ms of "
-            f"{1e-6 * self._period:.3f} ms; the slowest is '{self.plugins[slowest].name}' with "
+            f"{SAFE_STOP}: {self._rules.overruns} cycles of more than {LONGEST_CYCLE:g} periods, the newest "
+            f"{1e-6 * lasted:.3f} ms of {1e-6 * self._period:.3f} ms; the slowest is '{self.plugins[slowest].name}' with "
             f"{1e-6 * sum(self._set.times[slowest]):.3f} ms"
         )
         logger.error("%s", reason)

@@ -205,7 +205,7 @@ def test_too_many_overruns_stop_and_name_the_slowest(layer, world):
     plugin.component.kinematics = True
 
     def slow():
-        layer.spend(1.5 / plugin.rate)
+        layer.spend(2.6 / plugin.rate)
         run()
 
     plugin.robot.update = slow

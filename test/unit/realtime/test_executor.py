@@ -14,33 +14,49 @@ from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules, ExecutorTelemetry
 from solfer.telemetry.statistics import LoopCount, LoopTime
 
-LATE = round(1.5e9 * PERIOD)  # [ns]
+LONG = 2.6 * PERIOD
+"""A cycle for which there may be a safe stop [s]."""
 
 
 def patient_for_three(several, folder, interruptions=None):
-    """Make an executor that stops at the third overrun, on a clock that stands still."""
+    """Make an executor that stops at the third cycle that is too long, on a clock that goes on in components alone."""
     return Executor(
         several.plugins,
         MemoryMiddleware(several.bus, "xbot"),
         EmergencyStopLatch(folder),
-        rules=ExecutorRules(blend=0.0, overruns=3, grace=0),
-        telemetry=ExecutorTelemetry(nanoseconds=lambda: 0, interruptions=interruptions),
+        rules=ExecutorRules(blend=0.0, budget=100.0, overruns=3, grace=0),
+        telemetry=ExecutorTelemetry(nanoseconds=lambda: several.worked, interruptions=interruptions),
     )
 
 
-def test_a_safe_stop_forgives_overruns(tmp_path):
-    """After a safe stop the next start has its full allowance again; otherwise one late cycle would end it."""
+def test_a_safe_stop_forgives_long_cycles(tmp_path):
+    """After a safe stop the next start has its full allowance again; otherwise one long cycle would end it."""
     several = Several(names=("one", "two"))
     executor = patient_for_three(several, tmp_path)
+    several.plugins[0].component.lasts = LONG
     for stops in (1, 2):
         executor.switchboard.commit(executor.switchboard.plan(["one", "two"]))
         for _ in range(2):
-            executor.cycle(LATE)
+            executor.cycle()
         assert [managed.state for managed in executor.plugins] == [PluginState.RUNNING] * 2
-        executor.cycle(LATE)
+        executor.cycle()
         assert [(managed.state, managed.aborts) for managed in executor.plugins] == [(PluginState.ABORTED, stops)] * 2
-        assert executor.plugins[0].reason.startswith("safe stop: 3 cycles too long, the newest 7.500 ms of 5.000 ms")
+        reason = executor.plugins[0].reason
+        assert reason.startswith("safe stop: 3 cycles of more than 2.5 periods, the newest 13.000 ms of 5.000 ms")
     assert executor.statistics.counts[LoopCount.OVERRUNS] == 6
+    executor.close()
+
+
+def test_cycles_that_a_standing_robot_bears_are_no_safe_stop(tmp_path):
+    """They are overruns, for which motions slow down; every second cycle may be longer still."""
+    several = Several(names=("one", "two"))
+    executor = patient_for_three(several, tmp_path)
+    executor.switchboard.commit(executor.switchboard.plan(["one", "two"]))
+    for cycle in range(40):
+        several.plugins[0].component.lasts = LONG if cycle % 2 else 2.4 * PERIOD
+        executor.cycle(round(0.5e9 * PERIOD))
+    assert [managed.state for managed in executor.plugins] == [PluginState.RUNNING] * 2
+    assert executor.statistics.counts[LoopCount.OVERRUNS] == 40
     executor.close()
 
 
@@ -57,23 +73,26 @@ class Interrupted:
         return self.time
 
 
-@pytest.mark.parametrize("interrupted", [0, LATE])
-def test_a_cycle_that_was_kept_from_running_is_no_overrun(tmp_path, interrupted):
+@pytest.mark.parametrize("is_kept", [False, True])
+def test_a_cycle_that_was_kept_from_running_is_no_overrun(tmp_path, is_kept):
     """Neither is the next one, which begins late for that."""
-    several, interruptions = Several(names=("one", "two")), Interrupted()
+    several = Several(names=("one", "two"))
+    interruptions = Interrupted()
     executor = patient_for_three(several, tmp_path, interruptions)
     executor.switchboard.commit(executor.switchboard.plan(["one", "two"]))
+    component = several.plugins[0].component
+    interruptions.time = round(1e9 * LONG) if is_kept else 0
     for _ in range(10):
-        interruptions.time = interrupted
-        executor.cycle(LATE)
-        interruptions.time = 0
-        executor.cycle(LATE)
-    state = PluginState.RUNNING if interrupted else PluginState.ABORTED
-    assert [managed.state for managed in executor.plugins] == [state] * 2
+        component.lasts = LONG
+        executor.cycle()
+        component.lasts = 0.0
+        executor.cycle(round(1e9 * LONG) if is_kept else 0)
+    assert executor.statistics.counts[LoopCount.OVERRUNS] == (0 if is_kept else 10)
+    interruptions.time = 0
+    component.lasts = LONG
     for _ in range(4):
-        executor.cycle(LATE)
+        executor.cycle()
     assert [managed.state for managed in executor.plugins] == [PluginState.ABORTED] * 2
-    executor.close()
 
 
 class TwoPlugins:
@@ -226,12 +245,13 @@ def test_work_beside_is_done_ten_times_a_second(tmp_path):
 
 
 def test_grace_forgives_the_first_cycles(tmp_path):
-    layer = TwoPlugins(tmp_path, grace=4, overruns=2)
+    layer = TwoPlugins(tmp_path, grace=4, overruns=2, budget=100.0)
     layer.start()
+    layer.several.plugins[0].component.lasts = LONG
     for count in (0, 0, 0, 0, 1):
-        layer.executor.cycle(LATE)
+        layer.executor.cycle()
         assert layer.executor.statistics.counts[LoopCount.OVERRUNS] == count
     assert layer.states() == [PluginState.RUNNING] * 2
-    layer.executor.cycle(LATE)
+    layer.executor.cycle()
     assert layer.states() == [PluginState.ABORTED] * 2
     layer.executor.close()
