@@ -22,10 +22,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import CodeType, FrameType
 
-import numpy as np
-import pinocchio as pin
 import yaml
 from form import Figures, parser_of
+from plugin import unit
 
 from solfer.realtime.executor import Executor
 from solfer.supervision import supervise
@@ -105,7 +104,7 @@ class Layer:
         while time.monotonic() < end:
             if any(process.poll() is not None for process in self._processes):
                 raise SystemExit("a process has ended")
-            states = self._ask("state").stdout.splitlines()
+            _, *states = self._ask("state").stdout.splitlines() or [""]
             if states and all("RUNNING" in line for line in states):
                 time.sleep(3.0)  # commands have blended in
                 return
@@ -178,25 +177,9 @@ def running(clone: Path, rate: float) -> Iterator[Layer]:
             layer.close()
 
 
-def unit() -> float:
-    """Measure one `pin.computeAllTerms` of CENTAURO [us], the median of 20."""
-    path = REPOSITORY / "config/robots/centauro/centauro.urdf"
-    model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-    data = model.createData()
-    position = pin.neutral(model)
-    velocity = np.zeros(model.nv)
-    taken = []
-    for _ in range(20):
-        begin = time.perf_counter()
-        for _ in range(200):
-            pin.computeAllTerms(model, data, position, velocity)
-        taken.append((time.perf_counter() - begin) / 200.0)
-    return 1e6 * float(np.median(taken))
-
-
 def measure(clone: Path, rate: float, seconds: float, figures: Figures) -> None:
     """Print the figures of one clone at one rate."""
-    size = unit()
+    size = unit(2000)
     with running(clone, rate) as layer:
         for motion in ("standing", "driving"):
             driver = layer.drive(seconds + 15.0) if motion == "driving" else None
@@ -275,7 +258,9 @@ def count_calls(lists: bool, figures: Figures) -> int:
     calls = sum(found.values()) / cycles
     kept = float(KEPT.read_text())
     figures.row("calls of Python functions in a cycle", calls=calls, kept=kept)
-    if calls > GROWTH * kept:
+    if sys.version_info[:2] != (3, 11):
+        print("other versions of Python count otherwise than 3.11, whose number is kept", file=sys.stderr)
+    elif calls > GROWTH * kept:
         print(f"{calls:.0f} calls in a cycle, expected: {kept:.0f} (at most 2 % more) in {KEPT}", file=sys.stderr)
         return 1
     return 0
