@@ -108,8 +108,8 @@ class GroundForces(Component):
         interface = "geometry_msgs/WrenchStamped"
         return (
             *(
-                TopicOut(each, interface, StampedWrench, collect=functools.partial(self._due_wrench, contact))
-                for each, contact in zip(self._pushed.names, self._pushed.contacts, strict=True)
+                TopicOut(name, interface, StampedWrench, collect=functools.partial(self._due_wrench, index))
+                for index, name in enumerate(self._pushed.names)
             ),
             TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_report),
         )
@@ -128,8 +128,11 @@ class GroundForces(Component):
         if self.touch is not None:
             self._touching[:] = self.touch.touching
 
-    def _due_wrench(self, contact: Contact) -> StampedWrench | None:
-        return None if self._cycles % self._wrench_cycles else wrench_on_link(contact, self.model)
+    def _due_wrench(self, index: int) -> StampedWrench | None:
+        """Return the wrench of a contact if it is due: of each in a cycle of its own, so that none carries them all."""
+        if (self._cycles + index) % self._wrench_cycles:
+            return None
+        return wrench_on_link(self._pushed.contacts[index], self.model)
 
     def _due_report(self) -> Statuses | None:
         return self.checks.report(self.name) if self._cycles % self._report_cycles == 0 else None
@@ -258,8 +261,8 @@ class GroundForces(Component):
 def wrench_on_link(contact: Contact, robot: Robot) -> StampedWrench:
     """Make the message of a contact's wrench: in the axes of its link, about the link's origin, as a sensor there."""
     rotation = robot.kinematics.rotation(contact.link)
-    arm = contact.value - robot.kinematics.position(contact.link)
-    force = contact.wrench[:3]
-    torque = contact.wrench[3:] + np.cross(arm, contact.wrench[:3])
-    wrench = ForceAndTorque(*(Vector(*(vector @ rotation).tolist()) for vector in (force, torque)))
-    return StampedWrench(Header(frame_id=contact.link), wrench)
+    x, y, z = (contact.value - robot.kinematics.position(contact.link)).tolist()
+    fx, fy, fz, tx, ty, tz = contact.wrench.tolist()
+    torque = (tx + y * fz - z * fy, ty + z * fx - x * fz, tz + x * fy - y * fx)
+    force, torque = (np.array(((fx, fy, fz), torque)) @ rotation).tolist()
+    return StampedWrench(Header(frame_id=contact.link), ForceAndTorque(Vector(*force), Vector(*torque)))
