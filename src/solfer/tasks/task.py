@@ -16,7 +16,7 @@ GAIN, VELOCITY, WEIGHT, DAMPING, CORRECTION, COLUMNS = range(6)
 def _numbers(
     column: int, what: str, least: float = -np.inf, above: float = -np.inf, largest: float = np.finfo(float).max
 ) -> property:
-    """Return the property of a Task that is a column of its numbers, one a row; they are checked when it is assigned."""
+    """Return the property of a Task that is a column of its numbers, which are checked when assigned."""
 
     def read(task: "Task") -> np.ndarray:
         return task.numbers[:, column]

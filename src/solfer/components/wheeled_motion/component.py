@@ -34,8 +34,7 @@ from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
 from solfer.interfaces.support import BASE_PORT, VERTICES_PORT, LiftContacts, LiftReply
 from solfer.interfaces.task_references import GetReference, ReferenceReply
-from solfer.numerics.planar_move import PlanarMove
-from solfer.numerics.planar_move import about_z
+from solfer.numerics.planar_move import PlanarMove, about_z
 from solfer.robot import Robot
 from solfer.tasks.stack import Stack
 
