@@ -28,14 +28,8 @@ from solfer.transport.plugin_state import FAILED_STATES, SAFE_STOP, PluginState
 logger = logging.getLogger(__name__)
 
 # to look a member up in its enumeration would cost time in each cycle
-CYCLE = LoopTime.CYCLE
-OVERHEAD = LoopTime.OVERHEAD
-LATENESS = LoopTime.LATENESS
-CYCLES = LoopCount.CYCLES
-SKIPPED = LoopCount.SKIPPED
-OVERRUNS = LoopCount.OVERRUNS
-UNFORGIVEN = LoopCount.UNFORGIVEN
-TIME = LoopCount.TIME
+CYCLE, OVERHEAD, LATENESS = LoopTime
+CYCLES, SKIPPED, OVERRUNS, UNFORGIVEN, TIME = LoopCount
 
 
 @dataclass(frozen=True)

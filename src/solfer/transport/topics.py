@@ -39,20 +39,20 @@ class Topics:
 
     def missing_publisher(self, topic: str, message: str) -> Missing | None:
         """Check that a topic is published with this type of message; None: it is."""
-        return _missing(self.published, topic, message, nobody=f"no publisher on {topic}", other=f"{topic} carries")
+        return _missing(self.published, topic, message, none=f"no publisher on {topic}", other=f"{topic} carries")
 
     def missing_subscriber(self, topic: str, message: str) -> Missing | None:
         """Check that a topic is subscribed with this type of message; None: it is."""
         other = f"a subscriber of {topic} expects"
-        return _missing(self.received, topic, message, nobody=f"no subscriber on {topic}", other=other)
+        return _missing(self.received, topic, message, none=f"no subscriber on {topic}", other=other)
 
 
-def _missing(topics: Mapping[str, str], topic: str, message: str, nobody: str, other: str) -> Missing | None:
-    """Return what is wrong with a topic: `nobody` is on it, or it has `other` messages."""
+def _missing(topics: Mapping[str, str], topic: str, message: str, none: str, other: str) -> Missing | None:
+    """Return what is wrong with a topic: `none` has it, or `other` messages."""
     present = next((kind for name, kind in topics.items() if name.lstrip("/") == topic.lstrip("/")), None)
     if present in ("", message):
         return None
-    what = nobody if present is None else f"{other} {present}, not {message}"
+    what = none if present is None else f"{other} {present}, not {message}"
     return Missing(what, _alike(topic, message, topics))
 
 

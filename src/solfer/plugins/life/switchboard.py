@@ -125,17 +125,13 @@ class Switchboard:
                 )
         if switch.start:
             self._admit()
-            claims = [(plugin.name, plugin.plugin.outputs.claims, "") for plugin in self._after(switch)]
+            claims = [  # of those that are active after the switch, or not at rest yet
+                (plugin.name, plugin.plugin.outputs.claims, "")
+                for plugin in self._plugins.values()
+                if plugin in switch.start or not (plugin.at_rest or plugin in switch.stop)
+            ]
             for conflict in find_conflicts(claims, "one of them stopped in the same switch"):
                 raise conflict
-
-    def _after(self, switch: Switch) -> list[ManagedPlugin]:
-        """Return the plugins that are active after a switch, or not at rest yet."""
-        return [
-            plugin
-            for plugin in self._plugins.values()
-            if plugin in switch.start or not (plugin.at_rest or plugin in switch.stop)
-        ]
 
 
 def _explain(plugin: ManagedPlugin, _: NoFields) -> Answer:

@@ -62,7 +62,9 @@ class MockHardware:
         measurement = steps_of(self.delay, record.where("delay", "measurement"))
         command = steps_of(record.delay.command, record.where("delay", "command"))
         truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
-        self._wiring = Wiring(middleware, encoders, owners, measurement=measurement, command=command, truth=truth)
+        self._wiring = Wiring(  # type: ignore[abstract]
+            middleware, encoders, owners, measurement=measurement, command=command, truth=truth
+        )
         self._server = SimulationServer(simulation, self._wiring, factor=factor, name="hardware", followers=followers)
 
     @classmethod
