@@ -9,9 +9,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from support.recording.kept import write_kept
 
 from solfer.supervision import descendants
-from solfer.telemetry.recordings import write_kept
 
 FOLDER = Path(__file__).parent
 LIMIT = 870.0

@@ -4,8 +4,7 @@ import re
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from solfer.config import CheckReport, Notice
-from solfer.errors import SolferError
+from solfer.config import CheckReport
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,14 @@ class Finding:
 
 def findings_of(report: CheckReport) -> list[Finding]:
     """Return all errors, then all warnings, then all else of a report, each ordered by file and line."""
-    return [*map(_of_error, report.errors), *map(_of_notice, (*report.warnings, *report.information))]
+    errors = (
+        Finding("error", str(each), *_place(each.where), each.what, each.expected, each.names) for each in report.errors
+    )
+    notices = (
+        Finding(each.severity, str(each), *_place(str(each.mark)), each.what)
+        for each in (*report.warnings, *report.information)
+    )
+    return [*errors, *notices]
 
 
 def summary(file: str, report: CheckReport) -> str:
@@ -52,14 +58,6 @@ def summary(file: str, report: CheckReport) -> str:
         _counted(len(report.warnings), "warning"),
     ]
     return f"{file}: {', '.join(counts)}"
-
-
-def _of_error(error: SolferError) -> Finding:
-    return Finding("error", str(error), *_place(error.where), error.what, error.expected, error.names)
-
-
-def _of_notice(notice: Notice) -> Finding:
-    return Finding(notice.severity, str(notice), *_place(str(notice.mark)), notice.what)
 
 
 def _place(where: str) -> tuple[str, int | None, int | None, str]:

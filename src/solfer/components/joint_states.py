@@ -275,22 +275,20 @@ class JointStates(Component):
             NotFinite: A value is NaN or infinite.
             ComponentError: A value is beyond the robot's limits, or the request contradicts itself.
         """
-        speed = self._speed(request.speed)
+        if not np.isfinite(request.speed) or request.speed < 0.0:
+            raise ComponentError(
+                f"speed {request.speed:g} rad/s", expected="a positive number, or 0 for the configured speed"
+            )
         goal, wheel_goal = self._goals.targets_of(request, self._goal, self._speeds.goal)
         moved = goal != self._goal
         goal[moved] -= whole_revolutions(goal - self._position, self._turns)[moved]
         if self._goals.moves_joints(request):
             self._follower.leave("a request of the service has taken over")
-            self._plan(goal, np.minimum(speed, self._limit))
+            self._plan(goal, np.minimum(request.speed or self.tags.speed, self._limit))
         self._goal[:] = goal
         self._speeds.goal[:] = wheel_goal
         spin = np.abs(wheel_goal - self._speeds.velocity).max(initial=0.0) / self.tags.wheel_acceleration
         return Reply(duration=float(max(self._ramp.left, spin)))
-
-    def _speed(self, speed: float) -> float:
-        if not np.isfinite(speed) or speed < 0.0:
-            raise ComponentError(f"speed {speed:g} rad/s", expected="a positive number, or 0 for the configured speed")
-        return speed or self.tags.speed
 
     def _take(self, trajectory: JointTrajectory, goal: FollowGoal | None = None) -> None:
         self._follower.begin(trajectory, self.clock(), goal)

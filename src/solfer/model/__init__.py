@@ -3,8 +3,7 @@
 Names are imported when they are first used, so that reading or cutting a URDF does not load Pinocchio.
 """
 
-from importlib import import_module
-from typing import Any
+from solfer.lazy import lazy
 
 _HOMES = {
     "Actuators": "actuators",
@@ -25,7 +24,4 @@ _HOMES = {
 __all__ = sorted(_HOMES)
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__ = lazy(__name__, _HOMES)

@@ -1,10 +1,29 @@
-"""A rotation about z and a shift: how references move with a base whose estimate has jumped."""
+"""Rotations about z, and a shift: how references move with a base whose estimate has jumped."""
 
 import math
 
 import numpy as np
 
 from solfer.numerics.rotations import quaternion_product
+
+
+def turned(heading: float, x: float, y: float) -> tuple[float, float]:
+    """Return a vector that is seen from a heading [rad] in the axes of the world."""
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+def seen_from(heading: float, x: float, y: float) -> tuple[float, float]:
+    """Return a vector of the world as seen from a heading [rad]."""
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def about_z(angle: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a rotation about z [rad]."""
+    return 0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0)
 
 
 class PlanarMove:
@@ -30,7 +49,7 @@ class PlanarMove:
         self._after = np.array(after, dtype=float)
         self._cos = math.cos(yaw)
         self._sin = math.sin(yaw)
-        self._quaternion = 0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)
+        self._quaternion = about_z(yaw)
 
     @property
     def distance(self) -> float:

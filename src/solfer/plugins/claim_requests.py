@@ -48,8 +48,8 @@ class ClaimRequests:
         plugin: str,
         pipes: Sequence[JointCommandPipe],
         middleware: Middleware,
-        follows: tuple[str, ...] = (),
-        position: Callable[[], np.ndarray] | None = None,
+        follows: tuple[str, ...],
+        position: Callable[[], np.ndarray] | None,
     ):
         pairs = [(pipe.controller, field) for pipe in pipes for field, _ in pipe.fields]
         joints = tuple(dict.fromkeys(name for pipe in pipes for name in pipe.sent.names))

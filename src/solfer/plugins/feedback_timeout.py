@@ -41,12 +41,7 @@ class FeedbackState(enum.Enum):
 
 
 # module globals: the lookup in the control cycle is several times as fast as on the class
-WAITING = FeedbackState.WAITING
-LIVE = FeedbackState.LIVE
-SILENT = FeedbackState.SILENT
-FROZEN = FeedbackState.FROZEN
-DISPUTED = FeedbackState.DISPUTED
-REPLACED = FeedbackState.REPLACED
+WAITING, LIVE, SILENT, FROZEN, DISPUTED, REPLACED = FeedbackState
 
 TIMED_OUT = (SILENT, FROZEN, DISPUTED)
 

@@ -8,7 +8,6 @@ from time import monotonic_ns
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.interfaces.declaration import Service
 from solfer.plugins.life.budget import BudgetRules, LeakyCounter
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.plugin_set import NOTHING, PluginSet
@@ -23,21 +22,15 @@ from solfer.telemetry.kernel import count_durations
 from solfer.telemetry.statistics import EXECUTOR, LoopCount, LoopTime, RuntimeStatistics
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
-from solfer.transport.lower_level import Answer, answered
+from solfer.transport.lower_level import answered_service
 from solfer.transport.middleware import TRIGGER, NoFields
 from solfer.transport.plugin_state import FAILED_STATES, SAFE_STOP, PluginState
 
 logger = logging.getLogger(__name__)
 
 # to look a member up in its enumeration would cost time in each cycle
-CYCLE = LoopTime.CYCLE
-OVERHEAD = LoopTime.OVERHEAD
-LATENESS = LoopTime.LATENESS
-CYCLES = LoopCount.CYCLES
-SKIPPED = LoopCount.SKIPPED
-OVERRUNS = LoopCount.OVERRUNS
-UNFORGIVEN = LoopCount.UNFORGIVEN
-TIME = LoopCount.TIME
+CYCLE, OVERHEAD, LATENESS = LoopTime
+CYCLES, SKIPPED, OVERRUNS, UNFORGIVEN, TIME = LoopCount
 
 
 LONGEST_CYCLE = 1.0 / (1.0 - REST_RATIO)
@@ -214,10 +207,8 @@ class Executor:
         self._middleware.serve(
             EXECUTOR,
             [
-                Service(
-                    "estop", TRIGGER, NoFields, reply=Answer, handler=answered(lambda _: self.estop.trip("by service"))
-                ),
-                Service("estop_clear", TRIGGER, NoFields, reply=Answer, handler=answered(lambda _: self.clear())),
+                answered_service("estop", TRIGGER, NoFields, work=lambda _: self.estop.trip("by service")),
+                answered_service("estop_clear", TRIGGER, NoFields, work=lambda _: self.clear()),
             ],
             submit,
         )

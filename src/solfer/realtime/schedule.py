@@ -100,7 +100,8 @@ def apply(request: ScheduleRequest) -> Schedule:
     if request.priority:
         schedule.attempt(
             f"FIFO {request.priority}",
-            lambda: _fifo(request.priority),
+            # later threads and child processes shall not inherit it
+            lambda: os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(request.priority)),
             lambda: os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0)),
         )
     return schedule
@@ -120,11 +121,6 @@ def _keep_to(cpus: Collection[int], there: Collection[int]) -> None:
 
 def _listed(numbers: Iterable[int]) -> str:
     return ", ".join(map(str, numbers))
-
-
-def _fifo(priority: int) -> None:
-    # later threads and child processes shall not inherit it
-    os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
 
 
 def _freeze() -> None:

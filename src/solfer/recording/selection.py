@@ -34,25 +34,17 @@ def select(recording: Recording, patterns: Sequence[str], where: str = "") -> Re
             (channel.name, place)
             for channel in recording.channels.values()
             for place, column in enumerate(channel.columns)
-            if any(fnmatch.fnmatchcase(name, pattern) for name in _names(channel, column))
+            if any(fnmatch.fnmatchcase(name, pattern) for name in (channel.name, column, f"{channel.name}/{column}"))
         ]
         if not hits:
-            raise UnknownName("column", pattern, _known(recording), where=where)
+            columns = dict.fromkeys(column for channel in recording.channels.values() for column in channel.columns)
+            raise UnknownName("column", pattern, [*recording.channels, *columns], where=where)
         for name, place in hits:
             chosen.setdefault(name, set()).add(place)
     channels = {
         name: _narrowed(channel, sorted(chosen[name])) for name, channel in recording.channels.items() if name in chosen
     }
     return dataclasses.replace(recording, channels=channels)
-
-
-def _names(channel: Channel, column: str) -> tuple[str, ...]:
-    return channel.name, column, f"{channel.name}/{column}"
-
-
-def _known(recording: Recording) -> list[str]:
-    columns = dict.fromkeys(column for channel in recording.channels.values() for column in channel.columns)
-    return [*recording.channels, *columns]
 
 
 def _narrowed(channel: Channel, places: list[int]) -> Channel:

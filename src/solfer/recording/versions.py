@@ -24,12 +24,10 @@ def versions() -> dict[str, str]:
 def _own() -> str:
     """Return solfer's version, of its package.xml or as pip installed it; empty: it is not known."""
     with suppress(SolferError, OSError, ElementTree.ParseError):
-        return ElementTree.parse(_manifest()).getroot().findtext("version", "")
+        manifest = Path(__file__).resolve().parents[3] / "package.xml"
+        if not manifest.is_file():
+            manifest = located("package://solfer/package.xml", "")
+        return ElementTree.parse(manifest).getroot().findtext("version", "")
     with suppress(metadata.PackageNotFoundError):
         return metadata.version("solfer")
     return ""
-
-
-def _manifest() -> Path:
-    beside = Path(__file__).resolve().parents[3] / "package.xml"
-    return beside if beside.is_file() else located("package://solfer/package.xml", "")

@@ -7,7 +7,6 @@ import numpy as np
 
 from solfer.config.tasks.references import (
     CircleReferenceRecord,
-    LineReferenceRecord,
     ReferenceRecord,
     SineReferenceRecord,
     WaypointReferenceRecord,
@@ -52,7 +51,16 @@ def build_reference(record: ReferenceRecord, quantity: str, joints: Sequence[str
     if record.circle is not None:
         return _circle(record.circle, size, rates)
     if record.line is not None:
-        return _line(record.line, size, rates, absolute=record.absolute)
+        line = record.line
+        return LineReference(
+            size,
+            rates,
+            np.array(line.to),
+            speed=line.speed,
+            duration=line.duration,
+            back=line.back,
+            absolute=record.absolute,
+        )
     if record.sine is not None:
         return _sine(record.sine, size, rates, joints=joints)
     columns = {
@@ -110,18 +118,6 @@ def _circle(record: CircleReferenceRecord, size: int, rates: int) -> Swing:
         second = np.cross(normal, first)
     return Swing(
         size, rates, record.radius * first, sine=record.radius * second, period=record.period, turns=record.turns
-    )
-
-
-def _line(record: LineReferenceRecord, size: int, rates: int, absolute: bool) -> LineReference:
-    return LineReference(
-        size,
-        rates,
-        np.array(record.to),
-        speed=record.speed,
-        duration=record.duration,
-        back=record.back,
-        absolute=absolute,
     )
 
 

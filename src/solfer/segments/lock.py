@@ -37,7 +37,7 @@ class Lock:
                 "the file is not a lock of solfer", where=str(_lock_file(path)), expected="remove the file"
             )
         if not _try(self._file):
-            owner = _owner(self._file)
+            owner = os.pread(self._file, PID_SIZE, 0).decode(errors="replace") or "of an unknown number"
             os.close(self._file)
             raise MiddlewareError(
                 f"process {owner} writes here already, process {os.getpid()} may not",
@@ -114,10 +114,6 @@ def _try(file: int) -> bool:
             if attempt < attempts - 1:
                 time.sleep(0.01)  # a process that only checks whether a lock is held has it for some microseconds
     return False
-
-
-def _owner(file: int) -> str:
-    return os.pread(file, PID_SIZE, 0).decode(errors="replace") or "of an unknown number"
 
 
 def _forget() -> None:

@@ -12,7 +12,7 @@ from solfer.errors import UnknownName
 from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
 from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
-from solfer.model.srdf.semantics import Group, Semantics
+from solfer.model.srdf.semantics import Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
 from solfer.model.urdf.unfit import check_masses, warn_of_unfit
@@ -120,18 +120,22 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         kinematics.drive(actuators, rotors=False)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
     start = _start(record, states)
+    joints = Postures(states, start, kinematics).positions_of()
     lower_level = build_lower_level(
         kinematics,
         record.controllers,
         {name: group.joints for name, group in groups.items()},
         gains=gains,
         record=record.lower_level,
-        posture=_posture(kinematics, states, start),
+        posture=np.concatenate([np.zeros(kinematics.size - len(joints)), joints]),  # a floating base at zero
         actuators=actuators,
     )
     lower_level.robot = record.name
     _allow_gains(record, lower_level)
-    links = {name: _links(group, description) for name, group in groups.items()}
+    links = {  # those that the joints of a group carry
+        name: tuple(description.joints[joint].child for joint in group.joints if joint in description.joints)
+        for name, group in groups.items()
+    }
     return Bundle(
         description,
         kinematics,
@@ -178,12 +182,6 @@ def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> s
     return record.start.state
 
 
-def _posture(kinematics: Kinematics, states: Mapping[str, Mapping[str, float]], start: str | None) -> np.ndarray:
-    """Look up the positions of all DoFs in the state `start`, a floating base at zero."""
-    joints = Postures(states, start, kinematics).positions_of()
-    return np.concatenate([np.zeros(kinematics.size - len(joints)), joints])
-
-
 def _friction(record: FrictionRecord, groups: Mapping[str, tuple[str, ...]]) -> Friction:
     """Compute the friction of single links from that of groups."""
     links: dict[str, float] = {}
@@ -192,8 +190,3 @@ def _friction(record: FrictionRecord, groups: Mapping[str, tuple[str, ...]]) -> 
             raise UnknownName("group", name, groups, where=record.where("groups", name))
         links |= dict.fromkeys(groups[name], value)
     return Friction(record.default, links, record.ground)
-
-
-def _links(group: Group, description: Description) -> tuple[str, ...]:
-    """List the links that the joints of a group carry."""
-    return tuple(description.joints[joint].child for joint in group.joints if joint in description.joints)

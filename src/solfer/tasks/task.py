@@ -13,6 +13,32 @@ GAIN, VELOCITY, WEIGHT, DAMPING, CORRECTION, COLUMNS = range(6)
 """Columns of the numbers of a row, as `solfer.tasks.kernel` reads them, and how many there are."""
 
 
+def _numbers(
+    column: int, what: str, least: float = -np.inf, above: float = -np.inf, largest: float = np.finfo(float).max
+) -> property:
+    """Return the property of a Task that is a column of its numbers, which are checked when assigned."""
+
+    def read(task: "Task") -> np.ndarray:
+        return task.numbers[:, column]
+
+    def assign(task: "Task", values: ArrayLike) -> None:
+        values = as_numbers(values, what, task.where)
+        if values.shape not in ((), (task.rows,)):
+            raise SizeMismatch(
+                f"a {what} of shape {values.shape} for {task.rows} rows",
+                where=task.where,
+                expected="one number, or one a row",
+            )
+        if not (np.abs(values) <= largest).all():
+            raise NotFinite(f"a {what} of {values.tolist()}", where=task.where)
+        if (values < least).any() or (values <= above).any():
+            expected = "positive numbers" if least < above else "numbers that are not negative"
+            raise TaskError(f"a {what} of {values.tolist()}", where=task.where, expected=expected)
+        task.numbers[:, column] = values
+
+    return property(read, assign)
+
+
 class Task:
     """A point that follows a reference: its desired rate is K e + v, with |K e| at most `correction` in each row.
 
@@ -48,6 +74,21 @@ class Task:
         NotFinite: A value is NaN or infinite.
         UnknownName: The robot has no such DoF.
     """
+
+    gain = _numbers(GAIN, "gain", least=0.0)
+    """Gain K [1/s], shape (rows,)."""
+
+    velocity = _numbers(VELOCITY, "velocity")
+    """Feed-forward velocity v, shape (rows,)."""
+
+    weight = _numbers(WEIGHT, "weight", above=0.0)
+    """Weight, shape (rows,)."""
+
+    damping = _numbers(DAMPING, "damping", above=0.0)
+    """Damping, shape (rows,)."""
+
+    correction = _numbers(CORRECTION, "correction", above=0.0, largest=np.inf)
+    """Largest rate by which an error is corrected, shape (rows,)."""
 
     def __init__(  # noqa: PLR0913 for users: numbers of its rows, by their names
         self,
@@ -91,51 +132,6 @@ class Task:
         """Number of rows that count."""
         return len(self.selected)
 
-    @property
-    def gain(self) -> np.ndarray:
-        """Gain K [1/s], shape (rows,)."""
-        return self.numbers[:, GAIN]
-
-    @gain.setter
-    def gain(self, values: ArrayLike) -> None:
-        self._set(GAIN, "gain", values, least=0.0)
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """Feed-forward velocity v, shape (rows,)."""
-        return self.numbers[:, VELOCITY]
-
-    @velocity.setter
-    def velocity(self, values: ArrayLike) -> None:
-        self._set(VELOCITY, "velocity", values)
-
-    @property
-    def weight(self) -> np.ndarray:
-        """Weight, shape (rows,)."""
-        return self.numbers[:, WEIGHT]
-
-    @weight.setter
-    def weight(self, values: ArrayLike) -> None:
-        self._set(WEIGHT, "weight", values, above=0.0)
-
-    @property
-    def damping(self) -> np.ndarray:
-        """Damping, shape (rows,)."""
-        return self.numbers[:, DAMPING]
-
-    @damping.setter
-    def damping(self, values: ArrayLike) -> None:
-        self._set(DAMPING, "damping", values, above=0.0)
-
-    @property
-    def correction(self) -> np.ndarray:
-        """Largest rate by which an error is corrected, shape (rows,)."""
-        return self.numbers[:, CORRECTION]
-
-    @correction.setter
-    def correction(self, values: ArrayLike) -> None:
-        self._set(CORRECTION, "correction", values, above=0.0, largest=np.inf)
-
     def hold(self) -> None:
         """Make the point's value as of its last update the reference.
 
@@ -148,30 +144,6 @@ class Task:
 
     def __repr__(self) -> str:
         return f"Task('{self.name}': {self.point}, {self.rows} rows)"
-
-    def _set(
-        self,
-        column: int,
-        what: str,
-        values: ArrayLike,
-        least: float = -np.inf,
-        above: float = -np.inf,
-        *,
-        largest: float = np.finfo(float).max,
-    ) -> None:
-        values = as_numbers(values, what, self.where)
-        if values.shape not in ((), (self.rows,)):
-            raise SizeMismatch(
-                f"a {what} of shape {values.shape} for {self.rows} rows",
-                where=self.where,
-                expected="one number, or one a row",
-            )
-        if not (np.abs(values) <= largest).all():
-            raise NotFinite(f"a {what} of {values.tolist()}", where=self.where)
-        if (values < least).any() or (values <= above).any():
-            expected = "positive numbers" if least < above else "numbers that are not negative"
-            raise TaskError(f"a {what} of {values.tolist()}", where=self.where, expected=expected)
-        self.numbers[:, column] = values
 
 
 def as_numbers(values: object, what: str, where: str) -> np.ndarray:

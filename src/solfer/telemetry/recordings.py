@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -17,7 +16,7 @@ from solfer.errors import MiddlewareError, RecordingError, UnknownName
 from solfer.segments.files import PREFIX
 from solfer.segments.lock import locked
 from solfer.segments.namespace import SHARED_MEMORY, Namespace, names
-from solfer.telemetry.drain import RecordDrain, writer_of
+from solfer.telemetry.drain import RecordDrain
 from solfer.telemetry.rows import RECORDING
 
 logger = logging.getLogger(__name__)
@@ -104,23 +103,6 @@ def keep(folder: Path, node: str) -> None:
         shutil.copyfile(folder / RECORDING, target / RECORDING)
     except OSError as error:
         logger.warning("the last cycles are not kept in %s: %s", target, error.strerror)
-
-
-def write_kept(folder: Path, target: Path) -> list[Path]:
-    """Make a file, `<name>.mcap`, of each recording that was kept in a folder, and return the files.
-
-    Raises:
-        RecordingError: A file cannot be written.
-    """
-    files = []
-    for place in sorted(path.parent for path in folder.rglob(RECORDING)):
-        drain = RecordDrain(place)
-        target.mkdir(parents=True, exist_ok=True)
-        files.append(target / f"{place.name}.mcap")
-        with closing(writer_of(files[-1], [drain])) as writer:
-            drain.fill()
-            writer.finish(drain.lost)
-    return files
 
 
 class FileRecorder:

@@ -19,9 +19,7 @@ class MessageStatus(enum.IntEnum):
 
 
 # module globals: the lookup in the control cycle is five times as fast as on the class
-NONE = MessageStatus.NONE
-OLD = MessageStatus.OLD
-NEW = MessageStatus.NEW
+NONE, OLD, NEW = MessageStatus
 
 
 PUBLISHER_TIMEOUT = 1.0

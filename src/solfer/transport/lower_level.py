@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from solfer.interfaces.declaration import Service
+
 CLAIM_INTERFACE = "solfer/ClaimJoints"
 """Interface of `lower_level/claim`."""
 
@@ -113,11 +115,11 @@ class ClaimAnswer:
     later: bool = False
 
 
-def answered(work: Callable[[Any], None]) -> Callable[[Any], Answer]:
-    """Return a handler that does `work` with a request and answers with success."""
+def answered_service(name: str, interface: str, request: type, work: Callable[[Any], None], **options: Any) -> Service:
+    """Declare a service that does `work` with a request and answers with success; `options` are further attributes."""
 
     def handler(request: Any) -> Answer:
         work(request)
         return Answer()
 
-    return handler
+    return Service(name, interface, request, reply=Answer, handler=handler, **options)

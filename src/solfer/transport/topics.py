@@ -39,27 +39,21 @@ class Topics:
 
     def missing_publisher(self, topic: str, message: str) -> Missing | None:
         """Check that a topic is published with this type of message; None: it is."""
-        present = _on(self.published, topic)
-        if present is None:
-            return Missing(f"no publisher on {topic}", _alike(topic, message, self.published))
-        if present in ("", message):
-            return None
-        return Missing(f"{topic} carries {present}, not {message}", _alike(topic, message, self.published))
+        return _missing(self.published, topic, message, none=f"no publisher on {topic}", other=f"{topic} carries")
 
     def missing_subscriber(self, topic: str, message: str) -> Missing | None:
         """Check that a topic is subscribed with this type of message; None: it is."""
-        present = _on(self.received, topic)
-        if present is None:
-            return Missing(f"no subscriber on {topic}", _alike(topic, message, self.received))
-        if present in ("", message):
-            return None
-        return Missing(
-            f"a subscriber of {topic} expects {present}, not {message}", _alike(topic, message, self.received)
-        )
+        other = f"a subscriber of {topic} expects"
+        return _missing(self.received, topic, message, none=f"no subscriber on {topic}", other=other)
 
 
-def _on(topics: Mapping[str, str], topic: str) -> str | None:
-    return next((message for name, message in topics.items() if name.lstrip("/") == topic.lstrip("/")), None)
+def _missing(topics: Mapping[str, str], topic: str, message: str, none: str, other: str) -> Missing | None:
+    """Return what is wrong with a topic: `none` has it, or `other` messages."""
+    present = next((kind for name, kind in topics.items() if name.lstrip("/") == topic.lstrip("/")), None)
+    if present in ("", message):
+        return None
+    what = none if present is None else f"{other} {present}, not {message}"
+    return Missing(what, _alike(topic, message, topics))
 
 
 def _alike(topic: str, message: str, topics: Mapping[str, str]) -> tuple[str, ...]:

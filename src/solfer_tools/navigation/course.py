@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from solfer.numerics.planar_move import turned
 from solfer.transport import BodyMessage, Middleware, Reader, Writer
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.messages import FieldsMessage
@@ -143,13 +144,13 @@ class MeasuredPose:
         x0, y0, heading0 = self._before
         self._before = x, y, heading
         yaw = self.heading - heading0
-        dx, dy = rotated(x - x0, y - y0, yaw)
+        dx, dy = turned(yaw, x - x0, y - y0)
         self._move_to(self.x + dx, self.y + dy, heading + yaw)
 
     def _correct(self, x: float, y: float, heading: float, located: tuple[float, float, float]) -> None:
         """Approach the pose in the map, or take it where it is too far away for noise."""
         x0, y0, yaw = located
-        dx, dy = rotated(x, y, yaw)
+        dx, dy = turned(yaw, x, y)
         dx += x0 - self.x
         dy += y0 - self.y
         left = math.remainder(heading + yaw - self.heading, math.tau)
@@ -172,13 +173,6 @@ def heading_of(quaternion: np.ndarray) -> float:
 def twist(x: float, y: float, rate: float) -> FieldsMessage:
     """Make the message of velocities x and y [m/s] and a rate of the heading [rad/s]."""
     return FieldsMessage({"linear": {"x": x, "y": y, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": rate}})
-
-
-def rotated(x: float, y: float, angle: float) -> tuple[float, float]:
-    """Return a vector after a rotation by an angle [rad]."""
-    cos = math.cos(angle)
-    sin = math.sin(angle)
-    return cos * x - sin * y, sin * x + cos * y
 
 
 class FollowedPace:

@@ -8,10 +8,10 @@ import numpy as np
 
 from solfer.errors import SolferError
 from solfer.interfaces.support import BASE_PORT, LEAD, VERTICES_PORT
-from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.planar_move import PlanarMove, turned
 from solfer.transport import Middleware, Writer
 from solfer.transport.messages import FieldsMessage, PointsMessage, VectorMessage
-from solfer_tools.navigation.course import MeasuredPose, rotated
+from solfer_tools.navigation.course import MeasuredPose
 from solfer_tools.navigation.reference_course import BegunReference
 from solfer_tools.scenarios import Player
 
@@ -77,7 +77,7 @@ class ScenarioVelocities(ScenarioMotion):
         """See `ScenarioMotion.publish`."""
         player = self._player
         x, y, z, rate = (pace * player.base_velocity).tolist()
-        along, across = rotated(x, y, self._heading)
+        along, across = turned(self._heading, x, y)
         vertices = tuple((pace * player.vertex_velocity).ravel().tolist())
         self._support.write(FieldsMessage({"position": (), "velocity": vertices}))
         camber = tuple(player.camber.tolist())
@@ -169,7 +169,7 @@ class ScenarioPositions(ScenarioMotion):
         begin = self._begin[BASE_PORT]
         player = self._player
         x, y, z, yaw = (self._base + LEAD * pace * player.base_velocity).tolist()
-        place = begin[:3] + (*rotated(x, y, self._heading), z)
+        place = begin[:3] + (*turned(self._heading, x, y), z)
         half = 0.5 * (self._heading + yaw)
         self._base_writer.write(VectorMessage("world", np.array((*place, 0.0, 0.0, math.sin(half), math.cos(half)))))
         vertices = self._begin[VERTICES_PORT] + self._vertices + LEAD * pace * player.vertex_velocity

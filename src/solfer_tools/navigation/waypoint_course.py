@@ -1,7 +1,8 @@
 """Waypoints on `cmd_vel`."""
 
+from solfer.numerics.planar_move import seen_from
 from solfer.transport import Middleware
-from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose, rotated, twist
+from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose, twist
 from solfer_tools.navigation.waypoints import WaypointFollower
 
 
@@ -50,7 +51,7 @@ class WaypointCourse(Course):
         moves = follower.step(place, period, pace)
         self._rested = 0.0 if moves else self._rested + period
         x, y, rate = follower.velocity
-        self._twist.write(twist(*rotated(x, y, -pose.heading), rate))
+        self._twist.write(twist(*seen_from(pose.heading, x, y), rate))
         if moves:
             return True
         if self._rested >= self._settles and pose.still >= 0.3:

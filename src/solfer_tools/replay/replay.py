@@ -12,7 +12,6 @@ from solfer.numerics.rotations import whole_revolutions
 from solfer.pipes.joint.pipes import JointCommandPipe
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.plugin import Plugin
-from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
 from solfer.robot.description.shipped import RobotFiles
 from solfer.telemetry.plugin_log import PluginLog
@@ -79,7 +78,8 @@ class Replay:
             self.middleware.time = float(time)
             self._cycle(row)
             log.take(float(time))
-            self._keep(row, sources, values)
+            for source, numbers in zip(sources, values, strict=True):
+                numbers[row] = source.array.reshape(-1)
             yield row
         for source, numbers in zip(sources, values, strict=True):
             known = source.channel
@@ -152,10 +152,6 @@ class Replay:
         if recorded is not None and set(channel.columns) <= set(recorded.columns):
             differences = numbers - self.rows.values(recorded, channel.columns)
             numbers -= whole_revolutions(np.nan_to_num(differences), turns)
-
-    def _keep(self, row: int, sources: list[LogSource], values: list[np.ndarray]) -> None:
-        for source, numbers in zip(sources, values, strict=True):
-            numbers[row] = source.array.reshape(-1)
 
 
 def make(configuration: Configuration, generator: type[Generator], files: RobotFiles, rows: RecordedRows) -> Replay:

@@ -31,14 +31,10 @@ def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
         _joint(left, right, verdict, comparison=comparison, row=place[verdict.joint], names=names)
     for axes in grid[-1]:
         axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT_SIZE)
-    figure.suptitle(_title(comparison, names), fontsize=FONT_SIZE + 3)
-    return figure
-
-
-def _title(comparison: Comparison, names: tuple[str, str]) -> str:
     count = len(comparison.different)
-    found = f"{count} joint{'s differ' if count != 1 else ' differs'}" if count else "no joint differs"
-    return f"{names[1]} against {names[0]}: {found}"
+    differ = f"{count} joint{'s differ' if count != 1 else ' differs'}" if count else "no joint differs"
+    figure.suptitle(f"{names[1]} against {names[0]}: {differ}", fontsize=FONT_SIZE + 3)
+    return figure
 
 
 def _joint(

@@ -50,7 +50,9 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
     figure = new_figure(15.0, 0.9 + sum(used))
     groups = grouped(event for event in recording.events if event.plugin in ("", plugin))
     often = [group.counted(start) for group in groups if group.count > 1]
-    figure.suptitle("\n".join((_title(plugin, tracks, moving), *often)), fontsize=FONT_SIZE + 4)
+    still = len(tracks) - len(moving)
+    rest = f"; {still} of {len(tracks)} joints are at rest and left out" if still else ""
+    figure.suptitle("\n".join((f"{plugin}{rest}", *often)), fontsize=FONT_SIZE + 4)
     parts = [part for part in used if part]
     if not parts:
         return figure
@@ -62,12 +64,6 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
     if extras:
         _draw_extras(next(slots), extras, start, groups=groups, plugin=plugin)
     return figure
-
-
-def _title(plugin: str, tracks: list[Track], moving: list[Track]) -> str:
-    still = len(tracks) - len(moving)
-    rest = f"; {still} of {len(tracks)} joints are at rest and left out" if still else ""
-    return f"{plugin}{rest}"
 
 
 def _joints(place: "SubFigure", tracks: list[Track], limits: Limits, start: float) -> None:

@@ -220,9 +220,11 @@ class StudyFolder:
             if self.is_done(run) or (last and not self._is_dead(folder / f"{CLAIM_PREFIX}{last}")):
                 return None
             file = folder / f"{CLAIM_PREFIX}{last + 1}"
+            process = os.getpid()
+            own = Identity(machine=_machine(), process=process, started=_started(process), time=time.time())
             with suppress(FileExistsError):  # another worker was faster
                 with file.open("x") as opened:
-                    opened.write(_identity().model_dump_json())
+                    opened.write(own.model_dump_json())
                 return Claim(file)
         return None
 
@@ -435,11 +437,6 @@ def _write_parquet(file: Path, head: list[str], rows: list[dict[str, Any]]) -> P
 def _cell(value: Any) -> Any:
     """Return a value for a table: maps and lists as JSON."""
     return json.dumps(value) if isinstance(value, (Mapping, list, tuple)) else value
-
-
-def _identity() -> Identity:
-    process = os.getpid()
-    return Identity(machine=_machine(), process=process, started=_started(process), time=time.time())
 
 
 def _machine() -> str:

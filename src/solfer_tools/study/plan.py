@@ -117,7 +117,8 @@ class Study:
         over = None
         for name, value in variations.items():
             path = self._path(name)
-            written = self._value(name, value)
+            # with the place where it stands in the file
+            written = _node_of(value, self._variations[name].place() or self._node.mark)
             if path[0] == CONFIGURATION_KEY:
                 over = _with(over or YamlNode({}, written.mark), path[1:], written)
             else:
@@ -214,10 +215,6 @@ class Study:
 
     def _path(self, name: str) -> tuple[str, ...]:
         return tuple((self._variations[name].path or name).split("/"))
-
-    def _value(self, name: str, value: Any) -> YamlNode:
-        """Return a value with the place where it stands in the file."""
-        return _node_of(value, self._variations[name].place() or self._node.mark)
 
     def _check(self) -> None:
         problems = Problems()

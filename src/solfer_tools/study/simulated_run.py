@@ -241,7 +241,8 @@ class SimulatedRun:
         """Wait until all plugins run, for the time of the record at least, and begin the motion."""
         begin = self.bus.time
         self._run_until(begin + self.record.settle)
-        while not self.failure and (waiting := self._waiting()):
+        plugins = self.plugins.values()
+        while not self.failure and (waiting := next((plugin for plugin in plugins if not plugin.running), None)):
             if self.bus.time - begin > 10.0 + self.record.settle:  # the plugins take some time to start
                 self.failure = f"{waiting.name} {waiting.health()[1]}"
             self._run_until(self.bus.time + MOTION_PERIOD)
@@ -253,9 +254,6 @@ class SimulatedRun:
         if course is not None:
             self._navigation = Navigation(mover, course, mover.name, rate=1.0 / MOTION_PERIOD)
             self.bus.every(MOTION_PERIOD, self._navigate)
-
-    def _waiting(self) -> Plugin | None:
-        return next((plugin for plugin in self.plugins.values() if not plugin.running), None)
 
     def _course(self, mover: MemoryMiddleware) -> Course | None:
         """Make what moves the robot from a node; None: nothing does, or a function."""
@@ -341,13 +339,10 @@ class _TruthLog:
         now = simulation.state.now
         rotation = now.rotation(self._link)
         self._base[:3] = now.position(self._link)
-        self._base[3] = self._unwrapped(math.atan2(rotation[1, 0], rotation[0, 0]))
+        # the heading without its revolutions, as it is nearest to the one before
+        heading = math.atan2(rotation[1, 0], rotation[0, 0])
+        self._base[3] = heading + math.tau * round((float(self._base[3]) - heading) / math.tau)
         self._base[4] = math.acos(min(1.0, max(-1.0, float(rotation[2, 2]))))
-
-    def _unwrapped(self, heading: float) -> float:
-        """Return a heading without its revolutions, as it is nearest to the one before [rad]."""
-        before = float(self._base[3])
-        return heading + math.tau * round((before - heading) / math.tau)
 
 
 def configurations_of(record: StudyRecord, changes: YamlNode | None) -> list[Configuration]:

@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.delay import ROLLING_TIMEOUT, ClockDelay
-from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from, turned
+from solfer.components.wheeled_motion.references import KeptVelocities, References
 from solfer.components.wheeled_motion.support.weight import SHIFT_ACCELERATION, SHIFT_SPEED, WeightShift
+from solfer.numerics.planar_move import seen_from, turned
 
 PERIOD = 0.005  # [s]
 

@@ -12,7 +12,7 @@ from solfer.plugins.generation.config_service import answer_at_once
 from solfer.plugins.tuning import Tuning
 from solfer.srv import ClaimJointsRequest, GetParametersRequest, SetParametersRequest
 from solfer.transport import Inbox
-from solfer.transport.lower_level import CLAIM_INTERFACE, Answer, ClaimAnswer, ClaimRequest, answered
+from solfer.transport.lower_level import CLAIM_INTERFACE, ClaimAnswer, ClaimRequest, answered_service
 from solfer.transport.middleware import TRIGGER, NoFields
 
 
@@ -42,7 +42,7 @@ def test_a_request_is_answered_in_the_next_cycle(offered):
         cycles.append(answer.done())
         return answer
 
-    rest = Service("rest", TRIGGER, NoFields, Answer, answered(asked.append), timeout=0.1)
+    rest = answered_service("rest", TRIGGER, NoFields, work=asked.append, timeout=0.1)
     node = SimpleNamespace(name="/legs", clock=None, running=lambda: True)
     RosMiddleware(node).serve("legs", [rest], submit)
     assert offered["legs/rest"](TriggerRequest()).success
@@ -67,7 +67,7 @@ def test_a_request_that_is_overtaken_is_tried_again(offered, overtaken, success)
         if len(tried) <= overtaken:
             raise Overtaken("another one was first")
 
-    rest = Service("rest", TRIGGER, NoFields, Answer, answered(carry_out), timeout=0.1)
+    rest = answered_service("rest", TRIGGER, NoFields, work=carry_out, timeout=0.1)
     node = SimpleNamespace(name="/legs", clock=None, running=lambda: True)
     RosMiddleware(node).serve("legs", [rest], answer_at_once)
     assert offered["legs/rest"](TriggerRequest()).success is success

@@ -6,13 +6,14 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+from support.recording.kept import write_kept
 
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
 from solfer.segments.lock import Lock
 from solfer.segments.namespace import Namespace
 from solfer.telemetry.recorder import Recorder
-from solfer.telemetry.recordings import CRASH_AGE, YOUNG_AGE, keep, recordings, sweep, write_kept
+from solfer.telemetry.recordings import CRASH_AGE, YOUNG_AGE, keep, recordings, sweep
 from solfer.telemetry.rows import RECORDING
 
 

@@ -24,7 +24,9 @@ def trip(namespace: Namespace, reason: str) -> None:
     layer = layer_of(namespace.folder)
     while stop.answered < begin:
         if layer is None or not layer.owned():
-            raise _not_obeyed(namespace)
+            error = no_layer(namespace)
+            what = f"no plugin obeys: {error.what}"
+            raise MiddlewareError(what, where=error.where, expected=error.expected, names=error.names)
         if time.monotonic_ns() > begin + 1e9 * LATCH_TIMEOUT:
             raise MiddlewareError(
                 f"no plugin obeys yet: process {layer.pid} has not read the emergency stop for {LATCH_TIMEOUT:g} s",
@@ -39,9 +41,3 @@ def trip(namespace: Namespace, reason: str) -> None:
             expected=f"a new start: end process {stop.answer_pid}, the robot holds when it is gone",
         )
     print(f"process {stop.answer_pid} obeys: {stop.answer_text}")
-
-
-def _not_obeyed(namespace: Namespace) -> MiddlewareError:
-    error = no_layer(namespace)
-    what = f"no plugin obeys: {error.what}"
-    return MiddlewareError(what, where=error.where, expected=error.expected, names=error.names)

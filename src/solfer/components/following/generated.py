@@ -5,6 +5,7 @@ from typing import cast
 
 import numpy as np
 
+from solfer.components.following.filtered import FeedForward
 from solfer.components.following.quantity import PoseNumbers
 from solfer.components.following.tags import MotionRecord
 from solfer.config.tasks.references import ReferenceRecord
@@ -41,11 +42,9 @@ class GeneratedPosture:
         self._record = cast(ReferenceRecord, record.reference)
         self._generator = build_reference(self._record, "posture", self._names)
         self._limits = limits[dofs]
-        self._velocity = task.velocity
-        self._own_velocity = task.velocity.copy()
-        self._rows = task.selected
+        self._feed_forward = FeedForward(task)
         self._rates = np.zeros(len(dofs))
-        self._fed = np.zeros(task.rows)
+        self._feed_forward.connect(self._rates, is_used=True)
         self._time = 0.0
         self._require_speeds()
 
@@ -54,7 +53,8 @@ class GeneratedPosture:
         self._time = 0.0
         self._generator.start(self._reference.value)
         self._require_speeds()
-        self._velocity[:] = self._own_velocity
+        self._rates[:] = 0.0
+        self._feed_forward.write(1.0)
 
     def update(self, step: float, pace: float) -> None:
         """Write reference and velocity of a cycle.
@@ -65,9 +65,7 @@ class GeneratedPosture:
         """
         self._time += step * pace
         self._generator.at(self._time, self._reference.value, self._rates)
-        np.take(self._rates, self._rows, out=self._fed, mode="clip")
-        np.multiply(self._fed, pace, out=self._fed)
-        np.add(self._fed, self._own_velocity, out=self._velocity)
+        self._feed_forward.write(pace)
 
     def _require_speeds(self) -> None:
         fastest = np.abs(self._generator.velocities()).max(axis=0)

@@ -82,7 +82,7 @@ class ReferenceInterface:
                 *parts,
                 begin=self._begin,
                 outcome=self._outcome,
-                report=self._report,
+                report=lambda: self._reached(ReachFeedback),
                 cancel=self._cancel,
             ),
         )
@@ -170,9 +170,6 @@ class ReferenceInterface:
             reasons = [f"{target.name} {target.reason}" for target in self._reaching if target.is_unreachable]
             return Outcome(self._reached(ReachResult), False, ". ".join(reasons))
         return None
-
-    def _report(self) -> ReachFeedback:
-        return self._reached(ReachFeedback)
 
     def _reached(self, kind: type[ReachFeedback]) -> ReachFeedback:
         distances, angles = zip(*(target.remaining() for target in self._reaching), strict=True)

@@ -219,8 +219,8 @@ class ReferenceSet:
         """
         self._filter.period = step * pace
         for target in self.list:
-            if target.port.fresh:
-                self._read(target)
+            if target.port.fresh and (wrong := target.read_port()):
+                self._throttle.warning(target.name, "%s: %s: %s is ignored", self._component, target.where, wrong)
             target.refer()
             if pace:
                 target.generate(step * pace)
@@ -263,11 +263,6 @@ class ReferenceSet:
                 target.follow()
             elif target.is_unreachable:
                 target.hold()
-
-    def _read(self, target: TaskReference) -> None:
-        wrong = target.read_port()
-        if wrong:
-            self._throttle.warning(target.name, "%s: %s: %s is ignored", self._component, target.where, wrong)
 
 
 def take_numbers(

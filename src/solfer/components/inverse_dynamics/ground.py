@@ -1,7 +1,7 @@
 """The contacts that carry a robot: what they hold, and the forces that the ground can have there."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -174,10 +174,6 @@ def _cone(name: str, contact: Contact, tags: InverseDynamicsTags) -> np.ndarray:
             )
         length, width = tags.sole or (0.0, 0.0)
         sides += [(local[3], width), (local[4], length), (local[5], tags.torsion)]
-    rows = [sign * side - ratio * normal for side, ratio in _present(sides) for sign in (1.0, -1.0)]
+    # a contact need not have a force along each side
+    rows = [sign * side - ratio * normal for side, ratio in sides if side.any() for sign in (1.0, -1.0)]
     return np.array(rows).reshape(-1, local.shape[1])
-
-
-def _present(sides: Sequence[tuple[np.ndarray, float]]) -> list[tuple[np.ndarray, float]]:
-    """Return the sides along which a contact has a force at all."""
-    return [(side, ratio) for side, ratio in sides if side.any()]

@@ -9,7 +9,7 @@ from solfer.components.following.reference_set import ReferenceSet
 from solfer.components.inverse_kinematics.deflection import Deflection
 from solfer.components.inverse_kinematics.obstacles import obstacles
 from solfer.components.inverse_kinematics.soft_level import SoftLevel
-from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseKinematicsTags
+from solfer.components.inverse_kinematics.tags import InverseKinematicsTags
 from solfer.components.live_tunings import live_tunings
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import Action, LiveParameter, Service, TopicIn, TopicOut
@@ -80,7 +80,12 @@ class InverseKinematics(Component):
         self._bounds = self._stack.bounds(self.period)
         self._integrator = ReferenceIntegrator(inner, self.period, self._bounds, lead)
         self.references.connect(self.period)
-        self._deflection = None if tags.deflection is None else self._make_deflection(tags.deflection)
+        self._deflection: Deflection | None = None
+        if tags.deflection is not None:
+            base = 0 if self.model.kinematics.base is None else 6
+            self._deflection = Deflection(
+                self.model.size, base, tags.deflection.time_constant, most=tags.deflection.most
+            )
         self._levels = tuple(
             SoftLevel(level, [target for target in self.references.list if target.task in level], self._length)
             for level in self._stack.levels
@@ -106,7 +111,13 @@ class InverseKinematics(Component):
             keys = ("gain", "weight", "damping", "correction")
             found += self.references.task_parameters(self._stack, keys, self._take_number)
             limits = ("stack", "limits")
-            found.append(LiveParameter((*limits, "speed_scale"), self._stack.scale_speeds, _speed_scale))
+            found.append(
+                LiveParameter(
+                    (*limits, "speed_scale"),
+                    self._stack.scale_speeds,
+                    lambda each: each.stack_record().limits.speed_scale,
+                )
+            )
             if tags.stack.limits.collisions is not None:
                 found.append(LiveParameter((*limits, "collisions", "distance"), self._stack.keep_apart, _distance))
         else:
@@ -200,10 +211,6 @@ class InverseKinematics(Component):
             self._inner.state.position[:] = self.model.state.position
         self._inner.update()
 
-    def _make_deflection(self, record: DeflectionRecord) -> Deflection:
-        base = 0 if self.model.kinematics.base is None else 6
-        return Deflection(self.model.size, base, record.time_constant, most=record.most)
-
     def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
         """Write the numbers of a task; levels have the damping while tasks are far from their references."""
         if key == "damping":
@@ -247,10 +254,6 @@ class InverseKinematics(Component):
         inner.update()
         if self._has_torques:
             inner.dynamics.update()
-
-
-def _speed_scale(tags: InverseKinematicsTags) -> float:
-    return tags.stack_record().limits.speed_scale
 
 
 def _distance(tags: InverseKinematicsTags) -> float:

@@ -4,9 +4,9 @@ import numpy as np
 
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
-from solfer.components.wheeled_motion.references import seen_from
 from solfer.components.wheeled_motion.wheels import DrivenWheels
 from solfer.errors import ComponentError, UnknownName
+from solfer.numerics.planar_move import seen_from
 from solfer.robot import Robot
 
 

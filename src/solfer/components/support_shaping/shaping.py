@@ -6,8 +6,9 @@ from solfer.components.support_shaping.balance import BalanceMeasure
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.report import MarginsReport
 from solfer.components.support_shaping.tags import SupportShapingTags
-from solfer.components.wheeled_motion.references import KeptVelocities, References, turned
+from solfer.components.wheeled_motion.references import KeptVelocities, References
 from solfer.components.wheeled_motion.wheels import DrivenWheels
+from solfer.numerics.planar_move import turned
 from solfer.robot import Robot
 
 

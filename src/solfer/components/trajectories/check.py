@@ -1,6 +1,6 @@
 """Checks a trajectory whole, before any joint moves."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -205,23 +205,17 @@ class TrajectoryCheck:
         lower = np.minimum(self._lower[places], start)
         upper = np.maximum(self._upper[places], start)
         slack = self._SLACK
-        self._require(places, lowest, lambda value, index: value >= lower[index] - slack, what="position", unit="rad")
-        self._require(places, highest, lambda value, index: value <= upper[index] + slack, what="position", unit="rad")
-        limits = self._speed[places] * (1.0 + slack)
-        self._require(places, fastest, lambda value, index: value <= limits[index], what="speed", unit="rad/s")
-
-    def _require(
-        self, places: np.ndarray, values: np.ndarray, within: Callable[[float, int], bool], what: str, unit: str
-    ) -> None:
-        for index, value in enumerate(values):
-            if not within(value, index):
+        for what, values, within in (
+            ("position {:.6g} rad", lowest, lowest >= lower - slack),
+            ("position {:.6g} rad", highest, highest <= upper + slack),
+            ("speed {:.6g} rad/s", fastest, fastest <= self._speed[places] * (1.0 + slack)),
+        ):
+            for index in np.flatnonzero(~within):
                 place = places[index]
-                allowed = (
-                    f"{self._lower[place]:.6g} to {self._upper[place]:.6g} {unit}"
-                    if what == "position"
-                    else f"at most {self._speed[place]:.6g} {unit}"
-                )
                 raise ComponentError(
-                    f"{what} {value:.6g} {unit} of a trajectory is beyond the limits of joint '{self._joints[place]}'",
-                    expected=allowed,
+                    f"{what.format(values[index])} of a trajectory is beyond the limits of joint "
+                    f"'{self._joints[place]}'",
+                    expected=f"at most {self._speed[place]:.6g} rad/s"
+                    if values is fastest
+                    else f"{self._lower[place]:.6g} to {self._upper[place]:.6g} rad",
                 )

@@ -15,7 +15,7 @@ from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.delay import ClockDelay
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
-from solfer.components.wheeled_motion.references import References, about_z
+from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import Lifting, MotionGuard, SupportPolygon, WeightShift
 from solfer.components.wheeled_motion.tags import (
@@ -34,7 +34,7 @@ from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
 from solfer.interfaces.support import BASE_PORT, VERTICES_PORT, LiftContacts, LiftReply
 from solfer.interfaces.task_references import GetReference, ReferenceReply
-from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.planar_move import PlanarMove, about_z
 from solfer.robot import Robot
 from solfer.tasks.stack import Stack
 

@@ -1,12 +1,10 @@
 """What is desired of base and vertices: velocities, and where these have led to."""
 
-import math
-
 import numpy as np
 
 from solfer.components.wheeled_motion.kernel import HEADING, LIMIT_RATIO, PACE, WAITS
 from solfer.components.wheeled_motion.pace.kernel import step
-from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.planar_move import PlanarMove, about_z
 from solfer.numerics.rotations import quaternion_product
 
 
@@ -137,22 +135,3 @@ class KeptVelocities:
         references.velocity[:] = self.base
         references.angular[2] = self.yaw_rate
         references.vertex_velocity[:] = self.vertices
-
-
-def turned(heading: float, x: float, y: float) -> tuple[float, float]:
-    """Return a vector that is seen from a heading [rad] in the axes of the world."""
-    cos = math.cos(heading)
-    sin = math.sin(heading)
-    return cos * x - sin * y, sin * x + cos * y
-
-
-def seen_from(heading: float, x: float, y: float) -> tuple[float, float]:
-    """Return a vector of the world as seen from a heading [rad]."""
-    cos = math.cos(heading)
-    sin = math.sin(heading)
-    return cos * x + sin * y, cos * y - sin * x
-
-
-def about_z(angle: float) -> tuple[float, float, float, float]:
-    """Return the quaternion of a rotation about z [rad]."""
-    return 0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0)

@@ -51,7 +51,8 @@ def pruned(tree: YamlNode, module: str, robot: str, middleware: str) -> YamlNode
     for path in paths:
         _copy(tree, kept, path)
     modules: Any = kept.nearest(("modules",)).value
-    modules[module] = _without(modules[module], "secondary_file")
+    node = modules[module]
+    modules[module] = replace(node, value={key: child for key, child in node.items() if key != "secondary_file"})
     return anchored(kept)
 
 
@@ -97,10 +98,6 @@ def _pipes(tree: YamlNode, section: str, direction: str, chosen: YamlNode) -> It
         pipe = () if name == "all" else (name,)
         yield direction, *pipe
         yield section, direction, *pipe
-
-
-def _without(node: YamlNode, name: str) -> YamlNode:
-    return replace(node, value={key: child for key, child in node.items() if key != name})
 
 
 def _copy(tree: YamlNode, kept: YamlNode, path: tuple[Key, ...]) -> None:

@@ -100,7 +100,10 @@ class Reading:
         head = self._robot_head()
         module = self._module(class_name)
         node = self._robot_node(self._tree.get("modules", self._name, "robot"))
-        robot = self._robot(node, head.name if head else self._written_name()) if node else None
+        robot = None
+        if node is not None:
+            name = head.name if head else self._written_name()
+            robot = parse(node, RobotRecord, self._problems, name=name, configuration=str(node.head.path[-1]))
         middleware = main.middleware if main else self._middleware()
         feedbacks = self._feedbacks(node, middleware) if node else ()
         controllers = self._controllers(self._tree.get("modules", self._name, "controller"), middleware)
@@ -163,9 +166,6 @@ class Reading:
             self._problems.unknown(chosen.mark, "robot configuration", chosen.value, known)
             return None
         return known[chosen.value]
-
-    def _robot(self, node: YamlNode, name: str) -> RobotRecord | None:
-        return parse(node, RobotRecord, self._problems, name=name, configuration=str(node.head.path[-1]))
 
     def _feedbacks(self, robot: YamlNode, middleware: str) -> tuple[FeedbackRecord, ...]:
         chosen = robot.get("feedback")

@@ -47,7 +47,7 @@ class LiveField:
     @classmethod
     def of(cls, field: FieldInfo) -> "LiveField":
         """Read a field of a record."""
-        bounds = dict(_bounds(field.annotation, field.metadata))
+        bounds = dict(bounds_of(field.annotation, field.metadata))
         description = field.description or ""
         units = re.findall(r"\[([^\]]+)\]", description)
         minimum, maximum = (
@@ -227,13 +227,13 @@ def _kinds(annotation: Any) -> Iterator[str]:
         yield scalars[annotation]
 
 
-def _bounds(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Iterator[tuple[str, Any]]:
+def bounds_of(annotation: Any, metadata: typing.Iterable[Any] = ()) -> Iterator[tuple[str, Any]]:
     """Yield the bounds of a number, or of those of a list."""
     if typing.get_origin(annotation) is typing.Annotated:
         metadata = (*metadata, *annotation.__metadata__)
     for part in metadata:
         if isinstance(part, FieldInfo):
-            yield from _bounds(None, part.metadata)
+            yield from bounds_of(None, part.metadata)
         yield from ((name, getattr(part, name)) for name in ("ge", "gt", "le", "lt") if hasattr(part, name))
     for inner in typing.get_args(annotation):
-        yield from _bounds(inner)
+        yield from bounds_of(inner)

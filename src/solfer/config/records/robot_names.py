@@ -4,8 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from pydantic.fields import FieldInfo
-
 from solfer.config.records.record import Record
 
 
@@ -27,7 +25,8 @@ def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:
     """
     for field, info in type(record).model_fields.items():
         value = record.__dict__[field]
-        kind = _kind(info)  # not by attribute: obsolete ones would warn
+        kind = next((mark.kind for mark in info.metadata if isinstance(mark, NameOf)), "")
+        # not by attribute: obsolete ones would warn
         if field not in record.model_fields_set:
             continue
         for item in value if isinstance(value, tuple) else (value,):
@@ -35,7 +34,3 @@ def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:
                 yield from names_in(item)
             elif kind and isinstance(item, str):
                 yield record, info.alias or field, kind, item
-
-
-def _kind(info: FieldInfo) -> str:
-    return next((mark.kind for mark in info.metadata if isinstance(mark, NameOf)), "")

@@ -49,9 +49,9 @@ def note_errors(
     node: YamlNode,
     record: type[BaseModel],
     problems: Problems,
-    also: Iterable[str] = (),
+    also: Iterable[str],
     *,
-    beside: YamlNode | None = None,
+    beside: YamlNode | None,
 ) -> None:
     """Note each error of pydantic in the value of `node` in `problems`.
 
@@ -133,7 +133,8 @@ def _note_at(
         expected = " or ".join(dict.fromkeys(_expected(each) for each in items))
         allowed = [name for each in items for name in _allowed(each)]
         names = nearest(str(place.value), allowed) if isinstance(place.value, str) else ()
-        problems.add(place.mark, f"expected {expected}, got {_got(place)}", names=names)
+        got = f"a list of {len(place.value)}" if isinstance(place.value, tuple) else place.kind
+        problems.add(place.mark, f"expected {expected}, got {got}", names=names)
 
 
 def _expected(item: ErrorDetails) -> str:
@@ -149,10 +150,6 @@ def _allowed(item: ErrorDetails) -> list[str]:
     if item["type"] not in ("literal_error", "enum"):
         return []
     return [word for word in item["ctx"]["expected"].split("'") if word.strip(", ") not in ("", "or")]
-
-
-def _got(node: YamlNode) -> str:
-    return f"a list of {len(node.value)}" if isinstance(node.value, tuple) else node.kind
 
 
 def _in_file(node: YamlNode, location: tuple[Key, ...], kind: str) -> tuple[Key, ...]:

@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 
 from solfer.config.kinds.table import KINDS
 from solfer.config.records.calibration import CalibrationRecord
-from solfer.config.records.live import is_live
+from solfer.config.records.live import bounds_of, is_live
 from solfer.config.records.middlewares import SECTIONS
 from solfer.config.records.modules import MainRecord, ModuleRecord, RobotHead, RobotRecord, SharedRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, KindRecords
@@ -123,9 +123,8 @@ def _values_beside(annotation: Any) -> str:
 
 def _bounds(metadata: Iterable[Any]) -> str:
     """Write the bounds of a number, as in ', 1 to 4000'."""
-    names = ("ge", "gt", "le", "lt")
-    bounds = {name: getattr(part, name) for part in metadata for name in names if hasattr(part, name)}
-    text = {name: str(value) if isinstance(value, int) else f"{value:g}" for name, value in bounds.items()}
+    bounds = bounds_of(None, metadata)
+    text = {name: str(value) if isinstance(value, int) else f"{value:g}" for name, value in bounds}
     low = text.get("ge") or ("gt" in text and f"above {text['gt']}")
     high = text.get("le") or ("lt" in text and f"below {text['lt']}")
     if low and high:

@@ -57,20 +57,19 @@ def opened(path: str | os.PathLike, where: str = "", later: tuple[Key, ...] | No
     return YamlFile(file, compose(read_text(file, where), file, problems, later=later), problems)
 
 
-def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = (), where: str = "") -> YamlNode:
+def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = ()) -> YamlNode:
     """Read the Node at key path `root` of a YAML file.
 
     Args:
         path: The file, also one that was read before.
         problems: Receives the mistakes that do not keep the file from being read.
         root: Keys that lead to the desired part.
-        where: Place that named the file, for the error when it cannot be opened.
 
     Raises:
         ConfigError: The file is missing, cannot be read, is not YAML, or has nothing at `root`.
     """
     problems.reading(os.fspath(path))
-    file = opened(path, where)
+    file = opened(path)
     problems.absorb(file.problems)
     node = file.node
     for depth, key in enumerate(root):

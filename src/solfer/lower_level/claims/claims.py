@@ -116,7 +116,10 @@ class Claims:
         if number is None:
             return LeaseEnded(owner, had, claimed)
         del self._ages[number]
-        self._leave(node_of(owner))
+        node = node_of(owner)
+        self._nodes[node] -= 1
+        if not self._nodes[node]:
+            del self._nodes[node]
         for controller, owners in self._owners.items():
             mine = owners == number
             if mine.any():
@@ -192,12 +195,6 @@ class Claims:
             for mode in item.modes:
                 self._owners[item.controller][MODES[mode], item.indices] = mine
         self._ages[mine] = 0.0
-
-    def _leave(self, node: str) -> None:
-        """Count one owner of a node less."""
-        self._nodes[node] -= 1
-        if not self._nodes[node]:
-            del self._nodes[node]
 
     def _refuse(self, owner: str, mine: int, item: ClaimedJoints) -> None:
         rows = [MODES[mode] for mode in item.modes]

@@ -32,7 +32,10 @@ def requested(controllers: Mapping[str, LowerLevelController], request: ClaimReq
         if joint not in known:
             raise UnknownName("joint", joint, known, expected=f"joints of {', '.join(fields)}")
     chosen = set(request.joints or known)
-    return [ClaimedJoints(name, _places(controllers[name], chosen), modes) for name, modes in fields.items()]
+    return [
+        ClaimedJoints(name, np.flatnonzero([joint in chosen for joint in controllers[name].joints]), modes)
+        for name, modes in fields.items()
+    ]
 
 
 def measured(request: ClaimRequest) -> dict[str, float]:
@@ -72,7 +75,3 @@ def _fields(controllers: Mapping[str, LowerLevelController], request: ClaimReque
             )
         fields[name] = (*fields.get(name, ()), mode)
     return fields
-
-
-def _places(controller: LowerLevelController, chosen: set[str]) -> np.ndarray:
-    return np.array([index for index, joint in enumerate(controller.joints) if joint in chosen], dtype=np.intp)

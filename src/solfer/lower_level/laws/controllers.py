@@ -123,6 +123,7 @@ class ImpedanceController(LowerLevelController):
         applied_effort: Feed-forward torque that is applied [Nm].
         stiffness: Stiffness of the springs [Nm/rad].
         damping: Damping relative to `velocity` [Nms/rad].
+        default_gains: Stiffness and damping without a command, shape (len(joints),) each [Nm/rad, Nms/rad].
 
     Raises:
         SizeMismatch: The gains are not one for each joint.
@@ -142,13 +143,13 @@ class ImpedanceController(LowerLevelController):
     ):
         super().__init__(name, limits, timeout)
         size = len(self.joints)
-        self._default = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
-        self.stiffness, self.damping = (gain.copy() for gain in self._default.values())
+        self.default_gains = self._gains(stiffness=stiffness, damping=damping)
+        self.stiffness, self.damping = (gain.copy() for gain in self.default_gains.values())
         self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
         self._revolutions = np.where(np.isinf(limits.upper), math.tau, 0.0)
         self.feed_forward = True
         self._feed_forward_ratio = 1.0
-        self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
+        self._ramps = {field: GainRamp(getattr(self, field)) for field in self.default_gains}
         self._leftover = GainRamp(self.effort)
         self._catch_up = CatchUp(limits.velocity)
 
@@ -159,10 +160,9 @@ class ImpedanceController(LowerLevelController):
             SizeMismatch: The gains are not one for each joint.
             NotFinite: A gain is not a finite number that is zero or positive.
         """
-        loaded = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
-        self._default = loaded
+        self.default_gains = self._gains(stiffness=stiffness, damping=damping)
         for field, ramp in self._ramps.items():
-            ramp.begin(loaded[field], RAMP_DURATION)
+            ramp.begin(self.default_gains[field], RAMP_DURATION)
 
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
         """See `LowerLevelController.apply`; a commanded gain comes into force by a ramp."""
@@ -186,7 +186,7 @@ class ImpedanceController(LowerLevelController):
         if field == "effort":
             self._leftover.begin(np.zeros(len(joints)), RAMP_DURATION, joints)
         else:
-            self._ramps[field].begin(self._default[field][joints], RAMP_DURATION, joints)
+            self._ramps[field].begin(self.default_gains[field][joints], RAMP_DURATION, joints)
 
     def hold(self, position: np.ndarray, free: Mapping[str, np.ndarray]) -> list[str]:
         """See `LowerLevelController.hold`: default gains, and targets with which their springs pull as before.
@@ -196,7 +196,7 @@ class ImpedanceController(LowerLevelController):
         to the default within RAMP_DURATION. A position on which default gains are at work is still approached.
         """
         super().hold(position, free)
-        usual = self._default["stiffness"]
+        usual = self.default_gains["stiffness"]
         changed = free["stiffness"][self.stiffness[free["stiffness"]] != usual[free["stiffness"]]]
         kept = np.intersect1d(changed, free["position"])
         pull = self.stiffness[kept] * (self.target[kept] - position[kept])
@@ -208,14 +208,9 @@ class ImpedanceController(LowerLevelController):
         self._catch_up.start(self.position, kept)
         for field, ramp in self._ramps.items():
             at_once = np.intersect1d(kept, free[field])
-            ramp.begin(self._default[field][at_once], 0.0, at_once)
+            ramp.begin(self.default_gains[field][at_once], 0.0, at_once)
             self.restore(field, np.setdiff1d(free[field], kept))
         return [self.joints[index] for index in free["position"] if usual[index] == 0.0]
-
-    @property
-    def default_gains(self) -> Mapping[str, np.ndarray]:
-        """Stiffness and damping without a command, shape (len(joints),) each [Nm/rad, Nms/rad]."""
-        return self._default
 
     def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
         """See `LowerLevelController.away`."""
@@ -253,7 +248,7 @@ class ImpedanceController(LowerLevelController):
         self.effort[:] = self.applied_effort[:] = 0.0
         self._leftover.stop()
         for field, ramp in self._ramps.items():
-            ramp.begin(self._default[field], 0.0)
+            ramp.begin(self.default_gains[field], 0.0)
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass: the springs' targets move on towards the accepted position."""
@@ -280,12 +275,13 @@ class ImpedanceController(LowerLevelController):
         np.maximum(change, np.negative(step, out=step), out=change)
         np.add(self.target, change, out=self.target)
 
-    def _gain(self, kind: str, values: ArrayLike) -> np.ndarray:
-        gain = np.array(values, dtype=float)
+    def _gains(self, **given: ArrayLike) -> dict[str, np.ndarray]:
+        gains = {kind: np.array(values, dtype=float) for kind, values in given.items()}
         where = f"controller '{self.name}'"
-        if gain.shape != (len(self.joints),):
-            raise SizeMismatch(f"{gain.size} values of {kind} for {len(self.joints)} joints", where=where)
-        for joint, value in zip(self.joints, gain, strict=True):
-            if not (np.isfinite(value) and value >= 0.0):
-                raise NotFinite(f"{kind} {value:g} of joint '{joint}'", where=where, expected="zero or more")
-        return gain
+        for kind, gain in gains.items():
+            if gain.shape != (len(self.joints),):
+                raise SizeMismatch(f"{gain.size} values of {kind} for {len(self.joints)} joints", where=where)
+            for joint, value in zip(self.joints, gain, strict=True):
+                if not (np.isfinite(value) and value >= 0.0):
+                    raise NotFinite(f"{kind} {value:g} of joint '{joint}'", where=where, expected="zero or more")
+        return gains

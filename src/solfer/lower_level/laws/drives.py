@@ -41,9 +41,9 @@ class Drives:
         self,
         kinematics: Kinematics,
         controllers: Sequence[LowerLevelController],
-        passive: Collection[str] = (),
-        actuators: Actuators | None = None,
-        posture: np.ndarray | None = None,
+        passive: Collection[str],
+        actuators: Actuators | None,
+        posture: np.ndarray | None,
     ):
         _check_joints(kinematics, controllers, passive)
         impedances = [item for item in controllers if isinstance(item, ImpedanceController)]

@@ -62,10 +62,7 @@ class HeartbeatMonitor:
         self._age += dt
         if self._newest is not None and not self.lost and self._age > self._cycles * self._process.period:
             self.lost = True
-            self.losses = self.losses + 1
-            self._hold()
-
-    def _hold(self) -> None:
-        reason = f"no heartbeat of the commanding process for {1e3 * self._age:.0f} ms"
-        if owners := self._lower_level.release_all(reason):
-            logger.error("%s: the robot holds; its joints were commanded by %s", reason, ", ".join(owners))
+            self.losses += 1
+            reason = f"no heartbeat of the commanding process for {1e3 * self._age:.0f} ms"
+            if owners := self._lower_level.release_all(reason):
+                logger.error("%s: the robot holds; its joints were commanded by %s", reason, ", ".join(owners))

@@ -14,12 +14,11 @@ from solfer.transport.lower_level import (
     LOAD_GAINS,
     RELEASE,
     SWITCH_FEED_FORWARD,
-    Answer,
     ClaimAnswer,
     ClaimRequest,
     FileRequest,
     ReleaseRequest,
-    answered,
+    answered_service,
 )
 from solfer.transport.middleware import (
     CONTROLLER_GAINS,
@@ -73,35 +72,20 @@ def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
 
     return (
         Service("claim", CLAIM_INTERFACE, ClaimRequest, reply=ClaimAnswer, handler=claim),
-        Service(
-            "release",
-            RELEASE,
-            ReleaseRequest,
-            reply=Answer,
-            handler=answered(lambda request: lower_level.release(request.owner)),
-        ),
+        answered_service("release", RELEASE, ReleaseRequest, work=lambda request: lower_level.release(request.owner)),
         Service("list_controllers", "solfer/ListControllers", NoFields, reply=ControllerList, handler=controllers),
-        Service(
-            "switch",
-            SWITCH,
-            SwitchRequest,
-            reply=Answer,
-            handler=answered(lambda request: lower_level.switch(request.start, request.stop)),
+        answered_service(
+            "switch", SWITCH, SwitchRequest, work=lambda request: lower_level.switch(request.start, request.stop)
         ),
-        Service(
+        answered_service(
             "emergency_stop",
             "std_srvs/Trigger",
             NoFields,
-            reply=Answer,
-            handler=answered(lambda _: lower_level.emergency_stop("asked for by service")),
+            work=lambda _: lower_level.emergency_stop("asked for by service"),
             urgent=True,
         ),
-        Service(
-            "reset_emergency_stop",
-            "std_srvs/Trigger",
-            NoFields,
-            reply=Answer,
-            handler=answered(lambda _: lower_level.reset_emergency_stop()),
+        answered_service(
+            "reset_emergency_stop", "std_srvs/Trigger", NoFields, work=lambda _: lower_level.reset_emergency_stop()
         ),
     )
 
@@ -139,13 +123,8 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
     return (
         *services,
         Service("get_gains", CONTROLLER_GAINS, NoFields, reply=ControllerGains, handler=reported),
-        Service("set_ff_torque", SWITCH_FEED_FORWARD, Flag, reply=Answer, handler=answered(set_ff_torque)),
-        Service(
-            "load_gains",
-            LOAD_GAINS,
-            FileRequest,
-            reply=Answer,
-            handler=answered(lambda gains: controller.load_gains(*gains)),
-            prepare=gains,
+        answered_service("set_ff_torque", SWITCH_FEED_FORWARD, Flag, work=set_ff_torque),
+        answered_service(
+            "load_gains", LOAD_GAINS, FileRequest, work=lambda gains: controller.load_gains(*gains), prepare=gains
         ),
     )

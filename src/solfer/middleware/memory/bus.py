@@ -167,7 +167,11 @@ class Bus:
         """
         topic = self._topics.get(name.lstrip("/"))
         if topic is None:
-            topic = self._topics[name.lstrip("/")] = self._make_topic(name, message_type)
+            faults = self.faults.of_topic(name)
+            topic = (
+                Topic(name, message_type) if faults is None else FaultyTopic(name, message_type, self, faults=faults)
+            )
+            self._topics[name.lstrip("/")] = topic
         if topic.type != message_type:
             raise MiddlewareError(f"topic '{name}' carries {topic.type}", expected=message_type)
         return topic
@@ -297,10 +301,6 @@ class Bus:
             delivery = heapq.heappop(deliveries)
             self.time = max(self.time, min(delivery.due, end))
             delivery.arrive(self.time)
-
-    def _make_topic(self, name: str, message_type: str) -> Topic:
-        faults = self.faults.of_topic(name)
-        return Topic(name, message_type) if faults is None else FaultyTopic(name, message_type, self, faults=faults)
 
     def _disturbed(self, work: Callable[[], None], period: float) -> Callable[[], None]:
         """Return the `work` of a loop of which cycles are left out, drawn for each loop by itself."""

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-import genpy
 import rosgraph
 import rospy
 
@@ -72,7 +71,8 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
     end = time.monotonic() + timeout
     failure = ""
     while wait_for(functools.partial(provider, resolved), end - time.monotonic(), running):
-        reply = _call_in_thread(rospy.ServiceProxy(resolved, ros_class), ros_class._request_class(**values))
+        proxy = rospy.ServiceProxy(resolved, ros_class)
+        reply = in_thread(functools.partial(proxy, ros_class._request_class(**values)))  # rospy's call has no timeout
         if not wait_for(reply.done, end - time.monotonic(), running):
             failure = "does not answer"
             break
@@ -99,11 +99,6 @@ def _alike(resolved: str) -> list[str]:
     except (rosgraph.MasterException, OSError):
         return []
     return [name for name, _ in services if name.endswith(ending)]
-
-
-def _call_in_thread(proxy: rospy.ServiceProxy, request: genpy.Message) -> "Future[Any]":
-    """Call in a thread and return the reply to come: rospy's own call has no timeout."""
-    return in_thread(functools.partial(proxy, request))
 
 
 def in_thread(work: Callable[[], Any]) -> "Future[Any]":

@@ -54,7 +54,9 @@ class Diagnostics:
         if level == last_level and now - last_time < 0.9 * self.PERIOD:
             return
         self._last[name] = (now, level)
-        pairs = [KeyValue(key, _text(value)) for key, value in values.items()]
+        pairs = [
+            KeyValue(key, f"{value:.6g}" if isinstance(value, float) else str(value)) for key, value in values.items()
+        ]
         status = DiagnosticStatus(level, f"{self._node}: {name}", summary, self._node, pairs)
         message = DiagnosticArray(status=[status])
         message.header.stamp = rospy.Time.now()
@@ -80,7 +82,3 @@ class Diagnostics:
         self._publisher.unregister()
         if self._subscriber is not None:
             self._subscriber.unregister()
-
-
-def _text(value: float | str) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

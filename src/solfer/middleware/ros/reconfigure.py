@@ -166,7 +166,7 @@ class ReconfigureServer:
     def _set(self, request: Any) -> ReconfigureResponse:
         if isinstance(request, Reconfigure._request_class):
             self._change(decode_config(request.config))
-        return ReconfigureResponse(self._config())
+        return ReconfigureResponse(_message(self._values()))
 
     def _change(self, changes: dict[str, Any]) -> None:
         """Change what differs from the values that count; all of it, or nothing."""
@@ -180,9 +180,6 @@ class ReconfigureServer:
     def _values(self) -> dict[str, Any]:
         found = self._getting.answer(GetParametersRequest())
         return {name: self._rows[name].read(text) for name, text in zip(found.names, found.values, strict=True)}
-
-    def _config(self) -> Config:
-        return _message(self._values())
 
     def _publish(self) -> None:
         with self._lock, suppress(*FAILURES):  # the node ends

@@ -81,7 +81,11 @@ class RosService:
         else:
             rate = REQUESTS
         busy = _Instead(f"too many requests: its turn does not come within {RATE_TIMEOUT:g} s")
-        bound_requests(self._server.protocol, service.largest, rate, instead=self._too_large, busy=busy)
+
+        def too_large(size: int) -> _Instead:
+            return _Instead(f"a request of {size} bytes (expected: {service.largest} bytes at most)")
+
+        bound_requests(self._server.protocol, service.largest, rate, instead=too_large, busy=busy)
 
     def close(self) -> None:
         """Unregister."""
@@ -97,9 +101,6 @@ class RosService:
                 f"the {what} {declared.__name__} of service {name} has fields {', '.join(sorted(fields))}",
                 expected=f"those of {self._service.interface}: {', '.join(sorted(expected))}",
             )
-
-    def _too_large(self, size: int) -> "_Instead":
-        return _Instead(f"a request of {size} bytes (expected: {self._service.largest} bytes at most)")
 
     def answer(self, request: Any) -> Any:
         """Carry out a request of the ROS class, and return the response."""

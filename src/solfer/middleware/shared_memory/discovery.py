@@ -59,8 +59,8 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
     for topic in namespace.present(PIPES):
         if topic.endswith("/command") or topic in known:
             continue
-        for message in _living(namespace, PIPES, SENDER_KIND, topic=topic).values():
-            found[topic] = PublishedTopic(topic, message)
+        for content in _contents(namespace, PIPES, SENDER_KIND, topic=topic).values():
+            found[topic] = PublishedTopic(topic, content["message"])
     return list(found.values())
 
 
@@ -120,11 +120,6 @@ def services(namespace: Namespace, known: Container[str] = ()) -> list[Available
                 AvailableService(name, interface, _dataclass("Request", request), reply=_dataclass("Reply", reply))
             )
     return found
-
-
-def _living(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, str]:
-    """Read the message of each segment of a topic with a living owner, by its name."""
-    return {name: content["message"] for name, content in _contents(namespace, folder, kind, topic=topic).items()}
 
 
 def _contents(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, dict[str, Any]]:

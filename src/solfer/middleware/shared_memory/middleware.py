@@ -162,13 +162,9 @@ class XbotMiddleware(Middleware):
         except MiddlewareError as error:
             raise error.at(where) from None
         if segment is None or not segment.owned():
-            present = [each for each in self.namespace.present(PROVIDED) if self._is_provided(each)]
+            present = [each for each in self.namespace.present(PROVIDED) if locked(self.namespace.path(PROVIDED, each))]
             raise UnknownName("parameter", name, (*self._parameters, *present), where=where)
         return json.loads(segment.layout)
-
-    def _is_provided(self, name: str) -> bool:
-        """Return whether a living node provides a parameter."""
-        return locked(self.namespace.path(PROVIDED, name))
 
     def provide(self, name: str, value: Any) -> None:
         """Set a parameter of the namespace, which lasts as long as this node.
@@ -207,10 +203,11 @@ class XbotMiddleware(Middleware):
         Raises:
             MiddlewareError: Another node of this name writes there, or the topic carries another message.
         """
+        # each component of a node has a writer of its own
+        writers = [each.topic.lstrip("/") for each in self._endpoints if isinstance(each, XbotWriter)]
+        number = writers.count(topic.lstrip("/"))
         return self._keep(
-            XbotWriter(
-                self.namespace, topic, message, sender=self.name, now=self._clock.now, number=self._number(topic)
-            )
+            XbotWriter(self.namespace, topic, message, sender=self.name, now=self._clock.now, number=number)
         )
 
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
@@ -270,11 +267,6 @@ class XbotMiddleware(Middleware):
         self._endpoints.clear()
         self._simulated.close()
         self._worker.shutdown(wait=False)
-
-    def _number(self, topic: str) -> int:
-        """Count this node's writers on a topic: each component of a node has its own."""
-        writers = (each.topic for each in self._endpoints if isinstance(each, XbotWriter))
-        return sum(each.lstrip("/") == topic.lstrip("/") for each in writers)
 
     def _keep(self, endpoint: Any, received: str = "") -> Any:
         """Keep an endpoint to close, and register it as a subscriber of the message `received`."""

@@ -97,11 +97,9 @@ def _warn(left_out: Sequence[SolferError], where: str) -> None:
     if not left_out:
         return
     listed = 8
-    items = [f"{fault.where.removeprefix(where + ': ')}: {_short(fault)}" for fault in left_out[:listed]]
+    items = [  # with the nearest names, but without a list of all names
+        f"{fault.where.removeprefix(where + ': ')}: {fault.line if fault.names else fault.what}"
+        for fault in left_out[:listed]
+    ]
     more = f"; and {len(left_out) - listed} more" if len(left_out) > listed else ""
     logger.warning("%s: left out: %s%s", where, "; ".join(items), more)
-
-
-def _short(fault: SolferError) -> str:
-    """Describe a fault with the nearest names, but without a list of all names."""
-    return fault.line if fault.names else fault.what

@@ -41,7 +41,10 @@ def cut(description: Description, link: str, keep: str) -> str:
     _remove(robot, description, kept)
     _free_followers(robot)
     if keep == "upper":
-        _empty(robot, root)
+        # without mass and shapes
+        element = next(element for element in robot.findall("link") if element.get("name") == root)
+        element.clear()
+        element.set("name", root)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode") + "\n"
 
@@ -74,10 +77,3 @@ def _free_followers(robot: ElementTree.Element) -> None:
         for mimic in joint.findall("mimic"):
             if mimic.get("joint") not in joints:
                 joint.remove(mimic)
-
-
-def _empty(robot: ElementTree.Element, link: str) -> None:
-    """Remove mass and shapes of a link."""
-    element = next(element for element in robot.findall("link") if element.get("name") == link)
-    element.clear()
-    element.set("name", link)

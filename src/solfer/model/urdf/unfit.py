@@ -4,7 +4,7 @@ import logging
 from collections.abc import Iterator
 
 from solfer.errors import ModelError
-from solfer.model.urdf.description import Description, JointInfo
+from solfer.model.urdf.description import Description
 
 logger = logging.getLogger(__name__)
 
@@ -22,7 +22,9 @@ def unfit_parts(description: Description, floating: bool) -> Iterator[tuple[str,
     unfit = {
         "effort limit 0, so that nothing holds them": [joint for joint in own if joint.effort == 0.0],
         "velocity limit 0, so that nothing may move them": [joint for joint in own if joint.velocity == 0.0],
-        "equal lower and upper limits, so that they are locked": [joint for joint in own if _locked(joint)],
+        "equal lower and upper limits, so that they are locked": [
+            joint for joint in own if joint.lower is not None and joint.lower == joint.upper
+        ],
     }
     for what, joints in unfit.items():
         if joints:
@@ -70,7 +72,3 @@ def _massless(description: Description, floating: bool) -> list[str]:
         own = owner[name] = name if joint.moving else owner[joint.parent]
         masses[own] = masses.get(own, 0.0) + (link.mass or 0.0)
     return [name for name, mass in masses.items() if mass <= 0.0 and (floating or name != base)]
-
-
-def _locked(joint: JointInfo) -> bool:
-    return joint.lower is not None and joint.lower == joint.upper

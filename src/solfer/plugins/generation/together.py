@@ -84,7 +84,9 @@ class SharedGenerator:
         """
         plugins: list[Plugin | None] = []
         for each, generator, outside in zip(self._listed, self._generators, self._outside, strict=True):
-            outlet = SpaceMember(each.name, self.spaces[each.group], outside) if each.group in self.spaces else outside
+            outlet = outside
+            if each.group in self.spaces:
+                outlet = SpaceMember(each.name, self.spaces[each.group], outside)  # type: ignore[abstract]
             generation = generator(self._known(each.configuration), outlet, self.sharing)
             plugins.append(generation.attempt(whole))
             self._note(error.at(each.where) for error in generation.faults)

@@ -10,7 +10,7 @@ from solfer.interfaces.declaration import Service
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.outputs.outputs import Claim
 from solfer.transport import Middleware
-from solfer.transport.lower_level import Answer, answered
+from solfer.transport.lower_level import Answer, answered_service
 from solfer.transport.middleware import SWITCH, SWITCH_ONE, TRIGGER, Flag, NoFields, Submit, SwitchRequest
 from solfer.transport.plugin_state import STARTABLE, PluginState
 
@@ -73,12 +73,11 @@ class Switchboard:
             owner,
             [
                 *(self._switch_one(f"{name}_switch", plugin) for name, plugin in self._plugins.items()),
-                Service(
+                answered_service(
                     "switch",
                     SWITCH,
                     SwitchRequest,
-                    reply=Answer,
-                    handler=answered(self.commit),
+                    work=self.commit,
                     prepare=lambda request: self.plan(request.start, request.stop),
                 ),
                 Service("get_plugin_list", TRIGGER, NoFields, reply=Answer, handler=self._list),
@@ -91,7 +90,7 @@ class Switchboard:
                 [
                     self._switch_one("switch", plugin),
                     Service("state", TRIGGER, NoFields, reply=Answer, handler=partial(_explain, plugin)),
-                    Service("abort", TRIGGER, NoFields, reply=Answer, handler=answered(partial(_abort, plugin))),
+                    answered_service("abort", TRIGGER, NoFields, work=partial(_abort, plugin)),
                 ],
                 submit,
             )
@@ -100,7 +99,7 @@ class Switchboard:
         def prepare(request: Flag) -> Switch:
             return self.plan(start=[plugin.name]) if request.data else self.plan(stop=[plugin.name])
 
-        return Service(name, SWITCH_ONE, Flag, reply=Answer, handler=answered(self.commit), prepare=prepare)
+        return answered_service(name, SWITCH_ONE, Flag, work=self.commit, prepare=prepare)
 
     def _list(self, _: NoFields) -> Answer:
         return Answer(message="\n".join(f"{name}: {plugin.explanation}" for name, plugin in self._plugins.items()))
@@ -126,17 +125,13 @@ class Switchboard:
                 )
         if switch.start:
             self._admit()
-            claims = [(plugin.name, plugin.plugin.outputs.claims, "") for plugin in self._after(switch)]
+            claims = [  # of those that are active after the switch, or not at rest yet
+                (plugin.name, plugin.plugin.outputs.claims, "")
+                for plugin in self._plugins.values()
+                if plugin in switch.start or not (plugin.at_rest or plugin in switch.stop)
+            ]
             for conflict in find_conflicts(claims, "one of them stopped in the same switch"):
                 raise conflict
-
-    def _after(self, switch: Switch) -> list[ManagedPlugin]:
-        """Return the plugins that are active after a switch, or not at rest yet."""
-        return [
-            plugin
-            for plugin in self._plugins.values()
-            if plugin in switch.start or not (plugin.at_rest or plugin in switch.stop)
-        ]
 
 
 def _explain(plugin: ManagedPlugin, _: NoFields) -> Answer:

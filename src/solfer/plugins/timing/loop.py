@@ -187,7 +187,8 @@ class PluginLoop:
         plugins = self.plugins
         delay = skipped / plugins.rate
         if delay >= 0.02:  # [s] shorter ones, frequent on a shared machine, are only counted
-            self._late.warning("late", "%s is %.0f ms late", self._names(), 1e3 * delay)
+            names = ", ".join(managed.name for managed in plugins.plugins)
+            self._late.warning("late", "%s is %.0f ms late", names, 1e3 * delay)
         begin = monotonic_ns()
         plugins.cycle()
         now = self._middleware.now()
@@ -225,9 +226,6 @@ class PluginLoop:
         self._reports.append((process, HealthReport(level, summary, {"process": os.getpid(), **statistics.summary()})))
         for managed in self.plugins.plugins:
             self._reports.extend(managed.plugin.pipe_reports())
-
-    def _names(self) -> str:
-        return ", ".join(managed.name for managed in self.plugins.plugins)
 
     def _note(self, index: int, managed: ManagedPlugin) -> None:
         """Log a plugin that fails while others go on, or that stops since it requires one of these."""

@@ -127,7 +127,8 @@ def _lump(parts: list[tuple[LinkInfo, Transform]]) -> tuple[float, np.ndarray, n
     for (link, place), centre in zip(bodies, coms, strict=True):
         rotation = place.rotation @ rotation_from_rpy(link.inertia_rpy)
         away = centre - com
-        inertia += rotation @ _tensor(link.inertia) @ rotation.T
+        ixx, ixy, ixz, iyy, iyz, izz = link.inertia
+        inertia += rotation @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ rotation.T
         inertia += link.mass * (away @ away * np.eye(3) - np.outer(away, away))
     return mass, com, inertia
 
@@ -140,11 +141,6 @@ def _inertial(mass: float, com: np.ndarray, inertia: np.ndarray) -> Element:
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     SubElement(element, "inertia", {name: repr(float(inertia[at])) for name, at in zip(names, upper, strict=True)})
     return element
-
-
-def _tensor(inertia: tuple[float, ...]) -> np.ndarray:
-    ixx, ixy, ixz, iyy, iyz, izz = inertia
-    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
 def _shape(shape: Element, place: Transform) -> Element:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from solfer.config import read
 from solfer.errors import SimulationError
@@ -62,9 +62,10 @@ class MockHardware:
         measurement = steps_of(self.delay, record.where("delay", "measurement"))
         command = steps_of(record.delay.command, record.where("delay", "command"))
         truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
-        self._wiring = Wiring(middleware, encoders, owners, measurement=measurement, command=command, truth=truth)
-        outside = cast(Middleware, self._wiring)
-        self._server = SimulationServer(simulation, outside, factor=factor, name="hardware", followers=followers)
+        self._wiring = Wiring(  # type: ignore[abstract]
+            middleware, encoders, owners, measurement=measurement, command=command, truth=truth
+        )
+        self._server = SimulationServer(simulation, self._wiring, factor=factor, name="hardware", followers=followers)
 
     @classmethod
     def from_file(

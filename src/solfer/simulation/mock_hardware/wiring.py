@@ -14,10 +14,11 @@ from solfer.transport.endpoints import NullWriter, Queue, Writer
 from solfer.transport.lower_level import CLAIM_INTERFACE
 from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message, copied
 from solfer.transport.middleware import CONTROLLER_GAINS, JOINT_NAMES, Middleware, Submit
+from solfer.transport.passing_on import PassingMiddleware
 
 
-class Wiring:
-    """Replaces the Middleware of a SimulationServer; what it does not change is passed on to the outside as it is.
+class Wiring(PassingMiddleware):
+    """The Middleware of a SimulationServer, between it and the outside.
 
     Args:
         outside: The way to the plugins.
@@ -41,7 +42,7 @@ class Wiring:
         *,
         truth: Container[str],
     ):
-        self._outside = outside
+        super().__init__(outside)
         self._encoders = encoders
         self._controllers = set(controllers)
         self._measurement = measurement
@@ -49,9 +50,6 @@ class Wiring:
         self._truth = truth
         self._writers: list[_LateWriter] = []
         self.cycle = 0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._outside, name)
 
     def advance(self) -> None:
         """Deliver the measurements that are due, and go on to the next cycle."""

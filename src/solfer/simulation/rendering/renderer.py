@@ -76,7 +76,9 @@ class Renderer:
         samples = 2  # rays along each side of a pixel
         width, height = (samples * side for side in self._size)
         yaw, pitch = self._angles
-        centre, size = self._extent()
+        low, high = self._body.extent()
+        centre = ((low + high) / 2.0).tolist()
+        size = float((high - low).max())
         self._move_floor(centre)
         margin = 1.6  # what is seen, over the extent of the robot
         field_of_view = 40.0  # vertical [deg]
@@ -114,11 +116,6 @@ class Renderer:
     def close(self) -> None:
         """Release the world. May be called twice."""
         self._engine.close()
-
-    def _extent(self) -> tuple[list[float], float]:
-        """Compute the centre of the robot [m] and its largest extent [m]."""
-        low, high = self._body.extent()
-        return ((low + high) / 2.0).tolist(), float((high - low).max())
 
     def _make_floor(self) -> list[int]:
         """Add tiles below the plane of the ground, which are visual only; return their bodies."""

@@ -35,6 +35,9 @@ class Body:
         joints: Names of the joints.
         links: Names of the links that the engine has; the base is the last.
         owner: For each link of the description, the link of the engine that it became part of.
+        floating: Whether the base moves.
+        position, orientation: Pose of the base link's origin in the world, shape (3,) [m] and (4,), (x, y, z, w); live.
+        linear, angular: Velocity of its origin [m/s] and angular velocity [rad/s] in world axes, shape (3,) each; live.
         base_link: Link that `position`, `orientation`, `linear` and `angular` belong to.
 
     Raises:
@@ -62,7 +65,12 @@ class Body:
         self._motors = BodyMotors(self.robot, len(self.joints), kinematics, motors=motors)
         self._followers = Followers(self.joints, description.mimics)
         self._set_gears()
-        self._base = FloatingBase(self.robot, kinematics.base)
+        self._base = base = FloatingBase(self.robot, kinematics.base)
+        self.floating = base.floats
+        self.position = base.position
+        self.orientation = base.orientation
+        self.linear = base.linear
+        self.angular = base.angular
         self.place(np.zeros(len(self.joints)))
 
     def place(
@@ -74,31 +82,6 @@ class Body:
         """Put the robot somewhere at rest: joint positions [rad], pose of the base link's origin in the world."""
         self.robot.place_joints(joints)
         self._base.place(position, orientation)
-
-    @property
-    def floating(self) -> bool:
-        """Whether the base moves."""
-        return self._base.floats
-
-    @property
-    def position(self) -> np.ndarray:
-        """Position of the base link's origin in the world, shape (3,) [m]; live."""
-        return self._base.position
-
-    @property
-    def orientation(self) -> np.ndarray:
-        """Orientation of the base link, shape (4,), (x, y, z, w); live."""
-        return self._base.orientation
-
-    @property
-    def linear(self) -> np.ndarray:
-        """Velocity of its origin in world axes, shape (3,) [m/s]; live."""
-        return self._base.linear
-
-    @property
-    def angular(self) -> np.ndarray:
-        """Angular velocity of the base link in world axes, shape (3,) [rad/s]; live."""
-        return self._base.angular
 
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
         """Compute the corners of a box in world axes around all shapes, shape (3,) each [m]."""

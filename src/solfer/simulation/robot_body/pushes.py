@@ -45,8 +45,9 @@ class Pushes:
             raise SimulationError(f"link '{link}' is fixed to the world", expected="a link that moves")
         for what, numbers, unit in (("force", force, "N"), ("torque", torque, "Nm")):
             if len(numbers) != 3 or not all(abs(number) <= 1e4 for number in numbers):  # true for NaN as well
+                shown = ", ".join(f"{number:g}" for number in numbers[:4])
                 raise SimulationError(
-                    f"the {what} of a push on '{link}' is {_shown(numbers)}",
+                    f"the {what} of a push on '{link}' is {shown}",
                     expected=f"three numbers from -10000 to 10000 [{unit}]",
                 )
         if not 0.0 < duration <= 60.0:
@@ -67,7 +68,3 @@ class Pushes:
     def clear(self) -> None:
         """Forget all pushes."""
         self._acting.clear()
-
-
-def _shown(numbers: Vector) -> str:
-    return ", ".join(f"{number:g}" for number in numbers[:4])

@@ -9,7 +9,7 @@ from solfer.errors import SimulationError
 from solfer.interfaces.declaration import Service
 from solfer.simulation.robot_body.placement import StartPlacement
 from solfer.simulation.simulation import Simulation
-from solfer.transport.lower_level import Answer, answered
+from solfer.transport.lower_level import Answer, answered_service
 from solfer.transport.middleware import Flag
 
 OWNER = "simulator"
@@ -111,15 +111,9 @@ def simulator_services(server: SteppedSimulation) -> tuple[Service, ...]:
         simulation.set_friction(request.surface, request.coefficient)
 
     return (
-        Service("reset", "solfer/ResetSimulation", ResetRequest, reply=Answer, handler=answered(reset)),
-        Service(
-            "pause",
-            "std_srvs/SetBool",
-            Flag,
-            reply=Answer,
-            handler=answered(lambda request: server.pause(request.data)),
-        ),
-        Service("step", "solfer/StepSimulation", StepRequest, reply=Answer, handler=answered(step)),
-        Service("push", "solfer/PushLink", PushRequest, reply=Answer, handler=answered(push)),
-        Service("set_friction", "solfer/SetFriction", FrictionRequest, reply=Answer, handler=answered(set_friction)),
+        answered_service("reset", "solfer/ResetSimulation", ResetRequest, work=reset),
+        answered_service("pause", "std_srvs/SetBool", Flag, work=lambda request: server.pause(request.data)),
+        answered_service("step", "solfer/StepSimulation", StepRequest, work=step),
+        answered_service("push", "solfer/PushLink", PushRequest, work=push),
+        answered_service("set_friction", "solfer/SetFriction", FrictionRequest, work=set_friction),
     )

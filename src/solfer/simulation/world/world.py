@@ -60,7 +60,8 @@ class World:
         self._movable: list[tuple[int, Pose]] = []
         if ground_friction is not None:
             given = record.ground.friction
-            self._bodies[GROUND_NAME] = [self._plane(ground_friction if given is None else given)]
+            normal = [-math.sin(self._slope), 0.0, math.cos(self._slope)]
+            self._bodies[GROUND_NAME] = [engine.add_plane(normal, ground_friction if given is None else given)]
         for name, stairs in record.stairs.items():
             self._bodies[name] = [self._box(step) for step in steps_of(stairs)]
         for name, box in record.boxes.items():
@@ -131,10 +132,6 @@ class World:
                 found.append(body)
                 tops.append(top)
         return found, max(tops, default=0.0)
-
-    def _plane(self, friction: float) -> int:
-        normal = [-math.sin(self._slope), 0.0, math.cos(self._slope)]
-        return self._engine.add_plane(normal, friction)
 
     def _box(self, box: BoxRecord) -> int:
         pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))

@@ -79,16 +79,12 @@ class ActionServer:
             return
         outcome = self._action.outcome()
         if outcome is not None:
-            self._finish(outcome)
+            state = GoalStatus.SUCCEEDED if outcome.success else GoalStatus.ABORTED
+            self._end(self.active, state, outcome.text, result=outcome.result)
         elif now >= self._next_feedback:
             self._next_feedback = now + 1.0 / self._action.rate
             entry = StatusEntry(self.active, GoalStatus.ACTIVE)
             self._topics.publish_feedback(entry, self._action.report())
-
-    def _finish(self, outcome: Outcome) -> None:
-        state = GoalStatus.SUCCEEDED if outcome.success else GoalStatus.ABORTED
-        if self.active is not None:
-            self._end(self.active, state, outcome.text, result=outcome.result)
 
     def _take(self, message: Any, refusal: str) -> None:
         """Take over a goal, or reject it."""

@@ -34,7 +34,8 @@ class Ownership:
 
     def __init__(self, component: ModuleType):
         self._component = _home(component)
-        self._libraries = {f"{Path(path)}/" for path in (*sysconfig.get_paths().values(), *_installed()) if path}
+        installed = [path for path in sys.path if path.rstrip("/").endswith(("site-packages", "dist-packages"))]
+        self._libraries = {f"{Path(path)}/" for path in (*sysconfig.get_paths().values(), *installed) if path}
         # rooms that stand around a plugin here, and not where it works
         rooms = (*(SOLFER / room for room in ("cli", "middleware", "simulation")), Path(__file__).parents[2])
         self._stand_ins = tuple(f"{room}/" for room in rooms)
@@ -66,8 +67,3 @@ def _home(module: ModuleType) -> str:
     if top in (None, module, sys.modules["solfer"]) or getattr(top, "__file__", None) is None:
         return str(module.__file__)
     return f"{Path(str(top.__file__)).parent}/"
-
-
-def _installed() -> list[str]:
-    """Return the folders of the path that hold what was installed."""
-    return [path for path in sys.path if path.rstrip("/").endswith(("site-packages", "dist-packages"))]

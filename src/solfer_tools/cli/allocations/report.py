@@ -24,7 +24,11 @@ def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
     found = False
     for configuration in _chosen(options, report):
         with importable_beside(options.file):
-            meter = _measured(options, configuration)
+            meter = (
+                on_simulation(configuration, given_robot(options))
+                if options.recording is None
+                else on_recording(options.recording, configuration.name, Path(options.file), system=options.system)
+            )
         costs = [cost for cost in meter.lines if cost.times or _keeps(cost, meter)]
         what = f"{options.recording}" if options.recording else "the simulated robot"
         print(f"{configuration.name}: {meter.traced} cycles on {what}, after {meter.warm + meter.kept} others")
@@ -35,12 +39,6 @@ def allocations(options: argparse.Namespace, report: CheckReport) -> bool:
             cost.blamed and (cost.times >= OFTEN * meter.traced or _keeps(cost, meter)) for cost in costs
         )
     return found
-
-
-def _measured(options: argparse.Namespace, configuration: Configuration) -> CycleMeter:
-    if options.recording is not None:
-        return on_recording(options.recording, configuration.name, Path(options.file), system=options.system)
-    return on_simulation(configuration, given_robot(options))
 
 
 def _chosen(options: argparse.Namespace, report: CheckReport) -> Iterator[Configuration]:

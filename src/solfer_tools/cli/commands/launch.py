@@ -14,7 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from solfer.cli.options import Number, rate_number
-from solfer.errors import ConfigError, MissingDependency, SolferError, SolferErrors, UnknownName, raise_all
+from solfer.errors import ConfigError, MissingDependency, SolferError, UnknownName, raise_all, singles
 
 SWITCHES = ("control", "gui", "lockstep", "rviz", "view")
 """Arguments that are read without regard to case, as roslaunch does."""
@@ -191,10 +191,8 @@ def _of_the_robot(given: Mapping[str, str], launch: str) -> list[SolferError]:
     for one in dict.fromkeys(checks[name] for name in given if name in checks):
         try:
             one()
-        except SolferErrors as error:
-            errors += error.errors
         except SolferError as error:
-            errors.append(error)
+            errors += singles([error])
     if (file := given.get("record", "")) and not Path(file).absolute().parent.is_dir():
         what = f"there is no folder '{Path(file).parent}'"
         errors.append(SolferError(what, where=f"{launch}, record", expected="a file in a folder that is there"))

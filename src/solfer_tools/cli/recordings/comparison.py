@@ -31,13 +31,10 @@ def _differences(result: Comparison) -> Iterator[str]:
         yield "no joint differs"
         return
     first = result.different[0]
-    yield f"differs first: {first.joint}{_time(first)}: {first.text}"
+    since = "" if np.isnan(first.since) else f" at {first.since:.3f} s"
+    yield f"differs first: {first.joint}{since}: {first.text}"
     head = ("joint", "since [s]", "largest [rad, m]", "how")
     yield from aligned([head, *(_row(each) for each in result.different)], "  ")
-
-
-def _time(verdict: JointVerdict) -> str:
-    return "" if np.isnan(verdict.since) else f" at {verdict.since:.3f} s"
 
 
 def _row(verdict: JointVerdict) -> tuple[str, ...]:

@@ -67,7 +67,7 @@ def opened(
         print(f"warning: {sentence}", file=sys.stderr)
     rows = RecordedRows(recording, plugin or _plugin(recording, name), str(file))
     with tempfile.TemporaryDirectory() as folder:
-        main = configuration or _attached(rows, Path(folder))
+        main = configuration or _written(rows, "configuration.yaml", Path(folder), expected="-c FILE")
         loaded = changed(load(main, name, system=system))
         with importable_beside(str(main)):
             yield make(loaded, generator_of(loaded), _files(loaded, rows, Path(folder)), rows=rows)
@@ -91,7 +91,8 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
     for text in replay.unrepeated:
         yield f"not repeated: {text}"
     if found.alone:
-        yield f"in {found.alone} cycles only one of both ran, first in cycle {_alone(replay) + 1}"
+        cycle = int((replay.running != rows.running).argmax()) + 1
+        yield f"in {found.alone} cycles only one of both ran, first in cycle {cycle}"
     for name in found.unmatched:
         yield f"only {'replayed' if name in replay.commands else 'recorded'}: {name}"
     if not found.different:
@@ -138,19 +139,10 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
     save([("replay", replay_page(title, rows.times - rows.times[0], tracks))], path)
 
 
-def _alone(replay: Replay) -> int:
-    return int((replay.running != replay.rows.running).argmax())
-
-
 def _plugin(recording: Recording, name: str) -> str:
     """Return the recorded plugin of the name, or the only one that was recorded."""
     known = [each.removesuffix(f"/{LIFE}") for each in recording.channels if each.endswith(f"/{LIFE}")]
     return known[0] if name not in known and len(known) == 1 else name
-
-
-def _attached(rows: RecordedRows, folder: Path) -> Path:
-    """Return the recorded configuration as a file."""
-    return _written(rows, "configuration.yaml", folder, expected="-c FILE")
 
 
 def _files(configuration: Configuration, rows: RecordedRows, folder: Path) -> RobotFiles:

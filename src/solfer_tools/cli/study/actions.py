@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ def carry_out(options: argparse.Namespace) -> int:
     folder = StudyFolder.create(options.out, study, plan, record=options.record, force=options.force)
     work = search if study.record.search is not None else carry_out_all
     workers = options.workers or len(os.sched_getaffinity(0))
-    files = work(folder, options.engine, workers, _engine_options(options), _log)
+    files = work(folder, options.engine, workers, _engine_options(options), partial(print, file=sys.stderr, flush=True))
     for file in files:
         print(file)
     return 0 if all(not row["failed"] for row in folder.rows()) else 1
@@ -107,7 +108,3 @@ def _engine_options(options: argparse.Namespace) -> dict[str, Any]:
             raise SolferError(f"'{each}'", where="--slurm", expected="KEY=VALUE")
         found[key] = int(value) if value.isdigit() else value
     return found
-
-
-def _log(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

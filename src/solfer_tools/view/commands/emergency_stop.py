@@ -1,6 +1,7 @@
 """The button of the emergency stop, with one question before it stops."""
 
 from collections.abc import Callable
+from functools import partial
 
 from viser import GuiButtonHandle, GuiEvent, ViserServer
 
@@ -20,7 +21,7 @@ class EmergencyStopButton:
 
     def __init__(self, viser: ViserServer, requests: PageRequests, stop: Callable[[], None] | None = None):
         self._requests = requests
-        self._stop = stop or self._call
+        self._stop = stop or partial(requests.call, f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer)
         button = viser.gui.add_button("EMERGENCY STOP", color="red")
         button.on_click(self._confirm)
 
@@ -41,6 +42,3 @@ class EmergencyStopButton:
         @cancel.on_click
         async def _(_: object) -> None:
             modal.close()
-
-    def _call(self) -> None:
-        self._requests.call(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer)

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.wheeled_motion.references import KeptVelocities, References, seen_from
+from solfer.components.wheeled_motion.references import KeptVelocities, References
+from solfer.numerics.planar_move import seen_from
 
 
 class StraightAhead:

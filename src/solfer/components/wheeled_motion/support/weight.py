@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
-from solfer.components.wheeled_motion.references import References, seen_from, turned
+from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.wheels import DrivenWheels
-from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.planar_move import PlanarMove, seen_from, turned
 
 SHIFT_SPEED = 0.06
 """Largest speed of the base where it shifts the weight [m/s]."""

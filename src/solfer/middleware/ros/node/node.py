@@ -80,7 +80,7 @@ class RosNode:
         rospy.on_shutdown(self._on_shutdown)
         rospy.core.add_shutdown_hook(lambda reason: self._gone.set())
         try:
-            self._watch = MasterWatch(self._on_loss, known=self._is_known)
+            self._watch = MasterWatch(self._on_loss, known=lambda: knows(self.name, rospy.get_node_uri()))
             follows = self.name in followers()
             self.clock = StepClock(self.running) if follows else make_clock(self.running, publishes_time)
         except BaseException:
@@ -116,9 +116,6 @@ class RosNode:
                 f"node {self.name} ends: {self.loss}; start it again",
                 expected="a ROS master that stays, and knows the node",
             )
-
-    def _is_known(self) -> bool:
-        return knows(self.name, rospy.get_node_uri())
 
     def _on_loss(self) -> None:
         """End the node with an error, unless it has to end already."""
