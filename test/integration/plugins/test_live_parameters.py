@@ -214,6 +214,8 @@ def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
         plugin.tuning.log()
     lines = [record.message for record in caplog.records if " -> " in record.message]
     assert len(lines) == len(reply.names)
+
+
 @pytest.mark.parametrize(
     ("name", "gain", "most"),
     [("inverse_kinematics", "stack.tasks.left.gain", "10000"), ("inverse_dynamics", "stack.tasks.com.gain", "20")],

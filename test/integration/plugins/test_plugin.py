@@ -82,16 +82,6 @@ def test_stop_leaves_wheels_at_zero_and_joints_held(world):
     assert np.array_equal(world.simulation.lower_level.controllers["position_controller"].position, target)
 
 
-def test_mode_idle_receives_and_commands_nothing(world, tmp_path):
-    tags = {"class": "support.plugins.plugin:Saboteur", "mode": "idle"}
-    plugin = world.plugin("test", configuration(tmp_path, **tags))
-    world.run(1.0)
-    assert plugin.life is PluginState.RUNNING and plugin.robot.command.velocity.any()
-    assert plugin.outputs.commanding == ()
-    assert not world.simulation.lower_level.controllers["velocity_controller"].velocity.any()
-    assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
-
-
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan"])
 def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypatch, step):

@@ -14,7 +14,6 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
 from solfer.plugins import PluginState, Registry, Sharing, generate
 
-
 MOTION, WATCHED = {"joints": ("torso_yaw", "j_arm1_4"), "positions": (0.4, -0.6)}, "arm1_7"
 
 

@@ -24,7 +24,7 @@ from solfer_tools.view import Page, PageServer, Playback  # noqa: E402
 
 pytestmark = pytest.mark.slow
 
-SPAN, PERIOD = 4.0, 0.01
+SPAN, PERIOD = 3.0, 0.01
 """Of the recording, and of its rows [s]."""
 
 NEAR = 2e-4
@@ -72,7 +72,7 @@ class LinkPoses:
 
 
 def test_each_link_is_where_the_file_has_it(repository, tmp_path):
-    """At 20 instants, in any order, all links of the page, positions and orientations."""
+    """At 10 instants, in any order, all links of the page, positions and orientations."""
     file = tmp_path / "run.mcap"
     write(file, repository / "config/studies/robustness.yaml")
     recording = read(file)
@@ -88,7 +88,7 @@ def test_each_link_is_where_the_file_has_it(repository, tmp_path):
     with closing(PageServer(0)) as server:
         page = Page(server, robot.description, node, playback=playback)
         with opened_page(server.address) as client:
-            for time in np.random.default_rng(0).uniform(playback.begin, playback.end, 20):
+            for time in np.random.default_rng(0).uniform(playback.begin, playback.end, 10):
                 playback.seek(time)
                 for _ in range(3):
                     bus.run_until(bus.time + 0.05)
