@@ -10,8 +10,6 @@ from solfer.plugins import PluginState
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
 
-GOAL = "mammal_wide_high"
-
 
 def test_services_switch_call_and_abort_a_layer(shared, tmp_path):
     """The XBOT names and the plugin's own both work, and refusals state the plugin's state or the emergency stop."""
@@ -31,9 +29,11 @@ def test_services_switch_call_and_abort_a_layer(shared, tmp_path):
     assert ask("joint_states/state", "std_srvs/Trigger", NoFields()).message == "RUNNING"
     again = ask("joint_states/switch", "std_srvs/SetBool", Flag(True))
     assert not again.success and "cannot be started: RUNNING" in again.message
-    assert ask("joint_states/trajectory", "solfer/MoveJoints", MoveJoints(GOAL), Reply).success
+    assert ask("joint_states/trajectory", "solfer/MoveJoints", MoveJoints("mammal_wide_high"), Reply).success
+    assert not ask("xbotcore/estop_clear", "std_srvs/Trigger", NoFields()).success  # it runs
     assert ask("joint_states/abort", "std_srvs/Trigger", NoFields()).success
     assert layer["joint_states"].state is PluginState.ABORTED
     assert ask("xbotcore/estop", "std_srvs/Trigger", NoFields()).success
     refused = ask("joint_states/switch", "std_srvs/SetBool", Flag(True))
     assert not refused.success and "emergency stop" in refused.message
+    assert ask("xbotcore/estop_clear", "std_srvs/Trigger", NoFields()).success
