@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from support.processes import until
 
 from breaking.bounds import Verdict
 from breaking.figures import describe_robot, layer_file, plugin, unique
-from breaking.processes import REPOSITORY, until
+from breaking.processes import REPOSITORY
 from breaking.record import Samples
 from breaking.systems import RosSystem, System, XbotSystem
 

@@ -5,29 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 WAIT = 60.0
 """Bound of every wait, on a machine that has much else to do [s]."""
-
-LOOK = 0.002
-"""Time between two checks of a condition [s]."""
-
-
-def until(condition: Callable[[], object], what: str | Callable[[], str], bound: float = WAIT) -> None:
-    """Wait for a condition.
-
-    Raises:
-        AssertionError: It does not hold within `bound` [s]; names `what` was missing.
-    """
-    end = time.monotonic() + bound
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError(f"not within {bound:g} s: {what if isinstance(what, str) else what()}")
-        time.sleep(LOOK)
 
 
 def named(text: str) -> list[int]:

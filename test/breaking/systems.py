@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from support.processes import LOOK, until
 
-from breaking.processes import LOOK, WAIT, Processes, until
+from breaking.processes import WAIT, Processes
 from breaking.record import Record
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from support.processes import until
 
 from breaking.bounds import AFTER, Expected, Verdict, check_motion, check_return
-from breaking.processes import WAIT, until
+from breaking.processes import WAIT
 from breaking.systems import MOVED, TRY, WHEELS, System, lower
 
 SURE = 0.22

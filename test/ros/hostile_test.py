@@ -19,7 +19,6 @@ BATCH, PAUSE = 20, 0.01  # [s]
 HUGE = (np.nan, np.inf, -np.inf, 1e308, -1e308, 1e18)
 FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 EFFORT = 5000.0  # [Nm]; motors have at most 304, but springs of 80 kNm/rad take the blows of a robot that falls
-OVERSHOOT = 0.3  # that springs and gravity may add to a joint's limit [rad]
 
 
 def random_command(rng: np.random.Generator, joints: list[str]) -> JointCommand:

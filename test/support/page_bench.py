@@ -76,8 +76,8 @@ class PageBench:
                 self.references.write(message_of("solfer/TaskReferences", own))
             self.state = self.scene.update() or self.scene.update()
             self.page.update(self.state)
-            for client in self.clients:
-                client.receive(0.03)
+            for client, wait in zip(self.clients, (0.03, 0.003), strict=False):  # the other's is there by then
+                client.receive(wait)
 
     def until(self, condition, cycles=60):
         """Let cycles pass until a condition holds."""

@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from breaking.processes import REPOSITORY, WAIT, named, until
+from breaking.processes import REPOSITORY, WAIT, named
+from support.processes import until
 
 CHAOS = (sys.executable, str(REPOSITORY / "benchmark" / "chaos.py"))
 SEED = "8"

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 import yaml
-from support.faults.faults_plugin import AT_ONCE
-from support.integration.fault_layer import LARGEST_STEP, PLUGIN, FaultLayer, moving
+from support.integration.fault_layer import AT_ONCE, LARGEST_STEP, PLUGIN, FaultLayer, moving
 from support.plugins.plugin import configuration
 
 from solfer.components.joint_states import JointStates
@@ -144,16 +143,16 @@ def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
         assert layer.cycles_until_rest(moment) <= AT_ONCE and layer.largest_step(moment) <= LARGEST_STEP
 
 
-@pytest.mark.daily(1)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("step", "fault"),
     [
         ("update", Mute),
         ("update", KeyboardInterrupt),
-        ("stop", SystemExit),
         ("close", SystemExit),
         ("handler", SystemExit),
         ("prepare", Mute),
+        ("stop", SystemExit),
     ],
 )
 def test_a_plugin_alone_ends_and_names_its_component(world, tmp_path, monkeypatch, step, fault):

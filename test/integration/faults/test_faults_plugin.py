@@ -4,8 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from support.faults.faults_plugin import AT_ONCE
-from support.integration.fault_layer import LARGEST_STEP, PLUGIN, RATE, SAG, FaultLayer, moving
+from support.integration.fault_layer import AT_ONCE, LARGEST_STEP, PLUGIN, RATE, SAG, FaultLayer, moving
 
 from solfer.errors import MiddlewareError
 from solfer.plugins import PluginState

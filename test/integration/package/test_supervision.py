@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from breaking.processes import REPOSITORY, named, until
+from breaking.processes import REPOSITORY, named
+from support.processes import until
 
 ENDLESS = REPOSITORY / "test" / "support" / "suite" / "endless_test.py"
 

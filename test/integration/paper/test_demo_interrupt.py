@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from breaking.processes import REPOSITORY, WAIT, named, until
+from breaking.processes import REPOSITORY, WAIT, named
+from support.processes import until
 
 from solfer.recording.reader import read
 

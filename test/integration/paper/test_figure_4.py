@@ -89,13 +89,3 @@ def test_what_was_asked_before_is_forgotten(world, plugins, away, duration):
     )
     assert (np.abs(speeds) / limits).max() < 0.25
     assert speeds[-1][wheels] == pytest.approx([1.0, -1.0, 1.0, -1.0], abs=0.05)
-
-
-@ON_BOTH
-def test_nothing_is_sent_before_both_parts_publish(world):
-    world.plugin("upper_body")
-    whole = world.plugin("whole_body")
-    before = world.simulation.q.copy()
-    world.run(0.5)
-    assert whole.life is PluginState.STARTING
-    assert np.abs(world.simulation.q - before).max() < 0.01

@@ -78,20 +78,3 @@ def test_a_plugin_goes_on_after_a_reset(world, driven):
     assert np.abs(speeds(world) - 1.0).max() < 0.1
     driven.stop()
     driven.close()
-
-
-@pytest.mark.soak
-def test_a_plugin_begins_after_a_reset_only(world, driven):
-    world.ask("lower_level/emergency_stop")
-    driven.stop()
-    driven.close()
-    claim = {"owner": "joint_lower", "controllers": ("position_controller",)}
-    reply = world.ask("lower_level/claim", **claim)
-    assert not reply.success and "emergency stop" in reply.message
-    world.ask("lower_level/reset_emergency_stop")
-    plugin = world.plugin("joint_lower")
-    world.run(0.5)
-    assert plugin.life is PluginState.RUNNING
-    assert world.ask("joint_lower/trajectory", joints=WHEELS, velocities=(1.0,) * 4).success
-    world.run(1.0)
-    assert np.abs(speeds(world) - 1.0).max() < 0.1

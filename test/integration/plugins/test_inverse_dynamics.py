@@ -55,7 +55,7 @@ def test_centauro_squats_within_friction_and_torques():
         plugin, before = world.plugin("squat"), world.simulation.torque.copy()
         world.run(0.01)
         watch = SquatWatch(world.bus, plugin, world.simulation)
-        world.run(5.0)
+        world.run(3.5)
         watch.check(GRIP, 0.1)
         assert set(world.simulation.contacts()) == set(WHEELS)
         assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding
@@ -74,7 +74,7 @@ def test_other_robots_squat_by_their_files_alone(name, amplitude, tmp_path):
     with opened(name, tmp_path, amplitude) as robot:
         robot.run(0.5)
         watch = SquatWatch(robot.bus, robot.plugin, robot.simulation)
-        robot.run(4.5)
+        robot.run(3.2)
         watch.check(FRICTION, 2.0 * amplitude)
         assert robot.plugin.life is PluginState.RUNNING and not robot.plugin.component.is_holding
         assert len(robot.simulation.contacts()) == len(LEGGED[name].feet)
@@ -102,7 +102,7 @@ def test_it_squats_where_odometry_says_that_it_is():
             errors.append(pinocchio.centerOfMass(model, data, world.simulation.q) - com.reference.value)
 
         world.bus.every(0.005, look)
-        world.run(4.5)
+        world.run(3.2)
         assert np.sqrt(np.mean(np.sum(np.square(errors), axis=1))) < 0.01
         joints = [index for index, name in enumerate(world.simulation.kinematics.dofs) if "wheel" not in name][6:]
         world.simulation.pushes.add("pelvis", (85.0, 50.0, 0.0), (0.0, 0.0, 0.0), 0.3)
@@ -201,6 +201,7 @@ def stretch(world):
     world.squatting.component.references.interface.set_reference(SetReference("com", (0.0, 0.0, 0.3), relative=True))
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("fault", "text"),
     [
@@ -221,7 +222,7 @@ def test_a_fault_is_named_and_the_robot_held(fault, text, caplog):
         world.bus.every(0.005, lambda: torques.append(world.simulation.torque.copy()))
         world.bus.every(0.005, lambda: heights.append(world.simulation.q[2]))
         fault(world)
-        world.run(3.0)
+        world.run(2.0)
         assert text in caplog.text
         assert world.squatting.life is PluginState.RUNNING and min(heights) > heights[0] - 0.15
         if fault is not stretch:  # there the stops of joints take more than their drives
@@ -270,7 +271,7 @@ def test_an_arm_needs_no_contact(name, tmp_path):
     with opened(name, tmp_path, 0.0) as robot:
         robot.run(0.5)
         circle = Circle(robot.bus, robot.plugin)
-        robot.run(5.0)
+        robot.run(3.0)
         circle.check()
         assert robot.plugin.life is PluginState.RUNNING and not robot.plugin.component.is_holding
 
@@ -346,7 +347,7 @@ def test_an_arm_on_a_cart_draws_a_circle(tmp_path, monkeypatch):
     with opened("cart", tmp_path, 0.0) as scene:
         scene.run(0.5)
         circle = Circle(scene.bus, scene.plugin)
-        scene.run(5.0)
+        scene.run(3.0)
         assert scene.plugin.life is PluginState.RUNNING and not scene.plugin.component.is_holding
         circle.check()
 
@@ -372,7 +373,7 @@ def test_hands_in_the_air_hold_nothing(tmp_path):
         assert plugin.component.ground.names == ("left_arm", "right_arm")
         assert not plugin.component.ground.fractions.any()
         circle = Circle(world.bus, plugin)
-        world.run(5.0)
+        world.run(3.0)
         circle.check()
         assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding
 
@@ -384,7 +385,7 @@ def test_all_contacts_of_the_whole_robot_may_be_tracked(tmp_path):
         plugin = world.plugin("whole", file, target="solfer.components.inverse_dynamics:InverseDynamics")
         world.run(0.01)
         watch = SquatWatch(world.bus, plugin, world.simulation)
-        world.run(5.0)
+        world.run(3.5)
         watch.check(GRIP, 0.1)
         ground = plugin.component.ground
         legs = {f"{side}_leg" for side in ("front_left", "front_right", "rear_left", "rear_right")}

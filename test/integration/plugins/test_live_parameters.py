@@ -167,12 +167,28 @@ def other(value, maximum):
     return json.dumps(changed), beyond
 
 
+def check_setters(component):
+    """Check that each live tag has a setter, but for the error of a task that says nothing, and springs of no pipe."""
+    tags = component.tags
+    paths = [each.path for each in component.live_parameters()]
+    tasks = tags.stack.tasks if getattr(tags, "stack", None) else {}
+    without = {("stack", "tasks", task, "gain") for task, record in tasks.items() if record.is_motion}
+    for index, group in enumerate(getattr(tags, "gains", ())):
+        without |= {("gains", index, gain) for gain in ("stiffness", "damping") if getattr(group, gain) is None}
+    live = [path for path, _ in live_fields(tags) if path not in without]
+    for path in paths:
+        assert any(path[: len(found)] == found for found in live), path
+    for found in live:
+        assert any(path[: len(found)] == found for path in paths), found
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
     """Within its range it is taken over and logged, beyond it is refused, and no joint exceeds its speed."""
     plugin = running(world, name)
     watch, wrong = SpeedWatch(world, plugin), []
     component = plugin.component
+    check_setters(component)
     reply = world.ask(f"{name}/get_parameters")
     assert reply.names
     for parameter, value, maximum in zip(reply.names, reply.values, reply.maximums, strict=True):
@@ -200,24 +216,6 @@ def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
     assert len(lines) == len(reply.names)
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_each_live_tag_has_a_setter_and_conversely(world, name):
-    """But for the error of a task that says nothing, and for springs that no pipe carries."""
-    target, _, _ = CASES[name]
-    plugin = world.plugin(name, target=target or None)
-    tags = plugin.component.tags
-    paths = [each.path for each in plugin.component.live_parameters()]
-    tasks = tags.stack.tasks if getattr(tags, "stack", None) else {}
-    without = {("stack", "tasks", task, "gain") for task, record in tasks.items() if record.is_motion}
-    for index, group in enumerate(getattr(tags, "gains", ())):
-        without |= {("gains", index, gain) for gain in ("stiffness", "damping") if getattr(group, gain) is None}
-    live = [path for path, _ in live_fields(tags) if path not in without]
-    for path in paths:
-        assert any(path[: len(found)] == found for found in live), path
-    for found in live:
-        assert any(path[: len(found)] == found for path in paths), found
-
-
 @pytest.mark.parametrize(
     ("name", "gain", "most"),
     [("inverse_kinematics", "stack.tasks.left.gain", "10000"), ("inverse_dynamics", "stack.tasks.com.gain", "20")],
@@ -238,13 +236,13 @@ def test_a_gain_from_nothing_to_its_maximum_makes_no_joint_leap(world, monkeypat
 
 
 def test_a_velocity_gain_beyond_the_rate_is_refused(world):
-    plugin = running(world, "inverse_dynamics")
+    plugin = world.plugin("inverse_dynamics")
     before = plugin.component.tags
     reply = put(world, "inverse_dynamics", **{"stack.tasks.com.gain": "500"})
     assert not reply.success and "a velocity gain of 2000 /s" in reply.message and plugin.component.tags is before
 
 
 def test_a_plugin_that_is_gone_is_named(world):
-    running(world, "joint_states")
+    world.plugin("joint_states")
     with pytest.raises(LookupError, match="joint_stats"):
         world.bus.call("joint_stats/set_parameters")

@@ -82,16 +82,6 @@ def test_stop_leaves_wheels_at_zero_and_joints_held(world):
     assert np.array_equal(world.simulation.lower_level.controllers["position_controller"].position, target)
 
 
-def test_mode_idle_receives_and_commands_nothing(world, tmp_path):
-    tags = {"class": "support.plugins.plugin:Saboteur", "mode": "idle"}
-    plugin = world.plugin("test", configuration(tmp_path, **tags))
-    world.run(1.0)
-    assert plugin.life is PluginState.RUNNING and plugin.robot.command.velocity.any()
-    assert plugin.outputs.commanding == ()
-    assert not world.simulation.lower_level.controllers["velocity_controller"].velocity.any()
-    assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
-
-
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan"])
 def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypatch, step):
@@ -111,22 +101,6 @@ def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypat
     assert np.abs(world.simulation.v[wheels]).max() < 1e-2
     joints = np.setdiff1d(plugin.robot.actuated, wheels)
     assert np.abs(world.simulation.q[joints] - before[joints]).max() < 0.02
-
-
-@pytest.mark.daily(1)
-@pytest.mark.parametrize("step", ["stop", "close"])
-def test_a_component_that_fails_at_the_end(world, tmp_path, monkeypatch, step):
-    monkeypatch.setattr(Saboteur, "step", step)
-    middleware = MemoryMiddleware(world.bus, "test")
-    file = configuration(tmp_path, **{"class": "support.plugins.plugin:Saboteur"})
-    plugin = generate(load(file, "test"), middleware, Registry().find("test", f"{__name__}:Saboteur"))
-    world.bus.every(1.0, lambda: setattr(world.bus, "ended", world.bus.time > 0.5))
-    with pytest.raises(ComponentError, match=f"'test' failed, the robot holds: RuntimeError: sabotage in {step}"):
-        run(plugin, middleware)
-    world.bus.ended = False
-    world.run(1.0)
-    wheels = [plugin.robot.dof(wheel) for wheel in WHEELS]
-    assert np.abs(world.simulation.v[wheels]).max() < 1e-2
 
 
 @ON_BOTH

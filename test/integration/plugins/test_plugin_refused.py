@@ -66,17 +66,6 @@ def test_a_plugin_starts_after_an_emergency_stop(world):
     moves_again(world)
 
 
-@pytest.mark.soak
-def test_a_plugin_starts_anew_after_a_reset(world):
-    plugin = drive(world)
-    assert world.ask("simulator/reset", state="mammal_wide_high").success
-    before = joints(world)
-    world.run(0.5)
-    assert plugin.life is PluginState.RUNNING and set(owners(world).values()) != {""}
-    assert np.abs(joints(world) - before).max() < TOLERANCE and np.abs(speeds(world)).max() < 0.1
-    moves_again(world)
-
-
 def test_a_new_lower_level_is_claimed_anew(world):
     plugin = drive(world)
     world.received = False

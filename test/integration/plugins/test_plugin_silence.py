@@ -27,46 +27,22 @@ class SilentRelay:
             self._writer.write(self._reader.message)
 
 
-def start(world, tmp_path, on_timeout):
-    """Run a plugin that turns the wheels and receives joint states by a relay."""
+def speeds(world):
+    """Of the wheels [rad/s]."""
+    return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
+
+
+def test_damp_relaxes_springs_until_a_reset(world, tmp_path):
+    """A plugin turns the wheels, and receives joint states by a relay that falls silent."""
     path = configuration(tmp_path, **{"class": "solfer.components.joint_states:JointStates"})
     tree = yaml.safe_load(path.read_text())
-    tree["mwoibn"]["feedback"]["link_side_online"]["on_timeout"] = on_timeout
+    tree["mwoibn"]["feedback"]["link_side_online"]["on_timeout"] = "damp"
     tree["mwoibn"]["ros"]["feedback"]["link_side_online"]["source"] = RELAYED
     path.write_text(yaml.safe_dump(tree))
     relay, plugin = SilentRelay(world), world.plugin("test", path)
     world.run(0.5)
     assert world.ask("test/trajectory", joints=WHEELS, velocities=(2.0,) * 4).success
     world.run(1.5)
-    return relay, plugin
-
-
-def speeds(world):
-    """Of the wheels [rad/s]."""
-    return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
-
-
-@pytest.mark.soak
-def test_keep_drives_on_with_the_last_state(world, tmp_path):
-    relay, plugin = start(world, tmp_path, "keep")
-    relay.received = False
-    world.run(1.0)
-    assert plugin.life is PluginState.RUNNING and speeds(world) == pytest.approx([2.0] * 4, abs=0.05)
-
-
-def test_hold_stops_the_wheels_and_keeps_the_joints(world, tmp_path):
-    relay, plugin = start(world, tmp_path, "hold")
-    legs = world.simulation.q.copy()
-    relay.received = False
-    world.run(1.0)
-    assert plugin.life is PluginState.STARTING and np.abs(speeds(world)).max() < 0.05
-    joints = world.simulation.lower_level.controllers["position_controller"].dofs
-    assert np.abs(world.simulation.q - legs)[joints].max() < 0.05
-    assert not world.simulation.lower_level.emergency
-
-
-def test_damp_relaxes_springs_until_a_reset(world, tmp_path):
-    relay, plugin = start(world, tmp_path, "damp")
     relay.received = False
     world.run(0.5)
     assert world.simulation.lower_level.emergency and plugin.life is PluginState.STARTING
@@ -101,8 +77,8 @@ def test_a_reset_reaches_plugins_that_command_others_only(world):
 @pytest.mark.parametrize(
     "mode, silent, published",
     [
-        ("full", False, [True, True]),
         ("idle", False, [True, False]),
+        ("full", False, [True, True]),
         ("full", True, [False, True]),
         ("idle", True, [False, False]),
     ],
@@ -116,6 +92,7 @@ def test_idle_commands_and_silent_publishes_nothing(world, tmp_path, mode, silen
     assert plugin.life is PluginState.RUNNING and plugin.component.cycles > 20
     assert plugin.robot.command.velocity.any()  # all is computed
     assert [bool(queue.drain()) for queue in queues] == published
+    assert any(world.ask("lower_level/list_controllers").claimed_by) == (mode == "full")
 
 
 @pytest.mark.daily(1)
@@ -160,17 +137,6 @@ def shared(world):
 
 def yaw(world):
     return world.simulation.q[world.simulation.kinematics.dofs.index("torso_yaw")]
-
-
-@pytest.mark.soak
-def test_wheels_go_on_without_the_upper_body(world, shared, caplog):
-    kill(shared["upper_body"])
-    world.run(1.0)
-    died = yaw(world)
-    world.run(1.0)
-    assert abs(yaw(world) - died) < 5e-3 and speeds(world) == pytest.approx([1.0, -1.0, 1.0, -1.0], abs=0.05)
-    assert "feedback 'upper_body' (upper_body): nothing new for" in caplog.text
-    assert shared["whole_body"].health() == (1, "goes on with the last message of feedback 'upper_body' (upper_body)")
 
 
 def test_wheels_stop_without_the_lower_body(world, shared, caplog):

@@ -7,12 +7,26 @@ import pytest
 import yaml
 from support.integration.world import CONFIG, World
 from support.plugins.plugin import configuration
-from support.plugins.sharing import MOTION
 
+from solfer.components import Component
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Kinematics
 from solfer.plugins import PluginState, Registry, Sharing, generate
+
+MOTION, WATCHED = {"joints": ("torso_yaw", "j_arm1_4"), "positions": (0.4, -0.6)}, "arm1_7"
+
+
+class StateWitness(Component):
+    """Records the measured State, and where a link is."""
+
+    def init(self):
+        self.seen = []
+
+    def update(self):
+        state = self.model.state
+        place = self.model.kinematics.position(WATCHED)
+        self.seen.append((state.position.tobytes(), state.velocity.tobytes(), state.torque.tobytes(), place.tobytes()))
 
 
 @pytest.fixture
@@ -39,7 +53,7 @@ class SharedProcess:
         world.bus.every(1.0 / self.plugins[0].rate, self.cycle)
 
     def _made(self, name, settings):
-        target = settings.module.class_ if name == "joint_states" else "support.plugins.sharing:StateWitness"
+        target = settings.module.class_ if name == "joint_states" else f"{__name__}:StateWitness"
         generator = Registry().find(name, target)
         return generate(settings, MemoryMiddleware(self.world.bus, name), generator, self.sharing)
 

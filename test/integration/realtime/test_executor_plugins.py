@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-from support.integration.world import STEP, World
-from support.plugins.plugin import WHEELS, Saboteur, configuration
+from support.plugins.plugin import Saboteur, configuration
 from support.realtime.executor_plugins import Layer
 
 from solfer.errors import ClaimRefused, MiddlewareError, UnknownName
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
-from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.executor import ExecutorRules
 from solfer.telemetry.statistics import PluginCount
 
 TARGET = "support.plugins.plugin:Saboteur"
@@ -19,40 +16,6 @@ TARGET = "support.plugins.plugin:Saboteur"
 @pytest.fixture
 def layer(world, tmp_path):
     return Layer(world, tmp_path, [("joint_states",)])
-
-
-@pytest.mark.soak
-def test_joint_states_moves_as_without_an_executor(tmp_path):
-    """The same motion to 1e-9 rad over three seconds: the executor adds order and safety, no dynamics of its own."""
-    traces = []
-    for under_executor in (False, True):
-        world, trace = World(), []
-        if under_executor:
-            Layer(world, tmp_path, [("joint_states",)], ExecutorRules(blend=0.0)).executor.plugins[0].start()
-        else:
-            world.plugin("joint_states")
-        world.run(0.5)
-        assert world.ask(state="mammal_wide_high").success
-        world.bus.every(0.01, lambda world=world, trace=trace: trace.append(world.simulation.q.copy()))
-        world.run(3.0)
-        world.close()
-        traces.append(np.array(trace))
-    assert np.ptp(traces[0], axis=0).max() > 0.3
-    assert np.abs(traces[0] - traces[1]).max() < 1e-9
-
-
-@pytest.mark.soak
-def test_two_virtual_runs_are_bitwise_equal(tmp_path):
-    ends = []
-    for run in range(2):
-        world = World()
-        layer = Layer(world, tmp_path / str(run), [("joint_states",)])
-        layer.start()
-        world.ask(state="mammal_wide_high")
-        world.run(1.0)
-        ends.append((world.simulation.q.tobytes(), bytes(layer.executor.statistics.counts)))
-        world.close()
-    assert ends[0] == ends[1]
 
 
 def test_nothing_is_sent_before_the_switch(layer, world):
@@ -92,33 +55,6 @@ def test_a_start_blends_in_from_the_measured_state(layer, world):
     assert np.abs(np.diff(commands, axis=0)).max() <= 1.01 * 0.3 / 0.5 * 15 / 8 / plugin.rate
     assert np.ptp(commands, axis=0).max() > 0.25
     assert np.ptp(commands, axis=0).max() < 0.31
-
-
-@pytest.mark.daily(1)
-@pytest.mark.parametrize("step", ["init", "update", "send", "nan", "stop"])
-def test_an_exception_aborts_and_the_robot_holds(world, tmp_path, monkeypatch, step):
-    """Whatever step fails, the last commands hold the posture, joints are free, and the statistics keep the reason."""
-    monkeypatch.setattr(Saboteur, "step", step)
-    queue = MemoryMiddleware(world.bus, "ear").queue("position_controller/command", "solfer/JointCommand", 4000)
-    layer = Layer(world, tmp_path, [("test", configuration(tmp_path), TARGET)])
-    assert world.ask("test/switch", data=True).success
-    world.run(1.0)
-    if step == "stop":
-        assert layer["test"].state is PluginState.RUNNING and world.ask("test/switch", data=False).success
-        world.run(0.02)
-    managed = layer["test"]
-    assert managed.state is PluginState.ABORTED and managed.aborts == 1
-    assert ("torso_yaw" if step == "nan" else f"sabotage in {step}") in managed.reason
-    assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
-    commands = np.array([message.position for message in queue.drain()])
-    assert np.isfinite(commands).all()
-    assert (len(commands) == 0) is (step == "init")
-    assert np.abs(np.diff(commands, axis=0)).max(initial=0.0) < 1e-3
-    world.run(1.0)
-    assert np.abs(world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]).max() < 0.05
-    assert layer.executor.statistics.state(
-        0
-    ) is PluginState.ABORTED and managed.reason in layer.executor.statistics.text(0)
 
 
 def test_an_exception_in_close_lets_others_close(world, tmp_path, monkeypatch):
@@ -216,28 +152,3 @@ def test_too_many_overruns_stop_and_name_the_slowest(layer, world):
     assert (
         layer["joint_states"].state is PluginState.ABORTED and "safe stop" in reason and "'joint_states' with" in reason
     )
-
-
-def test_an_emergency_stop_is_obeyed_within_a_cycle(layer, world, tmp_path):
-    layer.start()
-    assert not world.ask("xbotcore/estop_clear").success
-    EmergencyStopLatch(tmp_path).trip("a hand on the button")  # as another process would
-    world.run(1.0 / layer.executor.rate + STEP)
-    assert layer["joint_states"].state is PluginState.ABORTED
-    assert "a hand on the button" in layer["joint_states"].reason
-    refused = world.ask("joint_states/switch", data=True)
-    assert not refused.success and "a hand on the button" in refused.message
-    assert world.ask("xbotcore/estop_clear").success
-    world.run(0.5)
-    assert layer["joint_states"].state is PluginState.ABORTED  # nothing starts by itself
-    layer.start()
-
-
-def test_a_plugin_runs_again_after_lost_feedback(layer, world):
-    layer.start()
-    world.received = False
-    world.run(0.5)
-    assert layer["joint_states"].state is PluginState.STARTING and "link_side_online" in layer["joint_states"].reason
-    world.received = True
-    world.run(1.5)
-    assert layer["joint_states"].state is PluginState.RUNNING

@@ -1,48 +1,14 @@
-"""The executor on the memory middleware and on shared memory: the same motion, and services that answer on both."""
+"""The executor on shared memory: its services and those of its plugins answer."""
 
 import time
 
-import numpy as np
-import pytest
-from support.integration.world import World
 from support.integration.xbot_system import WAIT
-from support.integration.xbot_world import XbotWorld
 from support.realtime.executor_plugins import Layer
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.plugins import PluginState
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
-
-GOAL = "mammal_wide_high"
-
-
-def moved(world, folder):
-    """Positions while `joint_states` is started, moves CENTAURO and is stopped, at the same moments in every world."""
-    layer, rows = Layer(world, folder, [("joint_states",)]), []
-    statistics = layer.executor.switchboard
-    world.run(0.1)
-    statistics.commit(statistics.plan(start=["joint_states"]))
-    world.run(1.0)
-    assert layer["joint_states"].state is PluginState.RUNNING
-    layer["joint_states"].plugin.component.trajectory(MoveJoints(GOAL))
-    for _ in range(40):
-        world.run(0.05)
-        rows.append(world.simulation.q.copy())
-    statistics.commit(statistics.plan(stop=["joint_states"]))
-    world.run(0.5)
-    assert layer["joint_states"].state is PluginState.STOPPED
-    rows.append(world.simulation.q.copy())
-    world.close()
-    return np.array(rows)
-
-
-@pytest.mark.soak
-def test_both_memories_move_alike_under_the_executor(tmp_path):
-    in_memory = moved(World(), tmp_path / "estop")
-    shared = moved(XbotWorld(tmp_path), tmp_path / "other")
-    assert np.ptp(in_memory, axis=0).max() > 0.3
-    assert np.abs(shared - in_memory).max() < 1e-9
 
 
 def test_services_switch_call_and_abort_a_layer(shared, tmp_path):
@@ -63,9 +29,11 @@ def test_services_switch_call_and_abort_a_layer(shared, tmp_path):
     assert ask("joint_states/state", "std_srvs/Trigger", NoFields()).message == "RUNNING"
     again = ask("joint_states/switch", "std_srvs/SetBool", Flag(True))
     assert not again.success and "cannot be started: RUNNING" in again.message
-    assert ask("joint_states/trajectory", "solfer/MoveJoints", MoveJoints(GOAL), Reply).success
+    assert ask("joint_states/trajectory", "solfer/MoveJoints", MoveJoints("mammal_wide_high"), Reply).success
+    assert not ask("xbotcore/estop_clear", "std_srvs/Trigger", NoFields()).success  # it runs
     assert ask("joint_states/abort", "std_srvs/Trigger", NoFields()).success
     assert layer["joint_states"].state is PluginState.ABORTED
     assert ask("xbotcore/estop", "std_srvs/Trigger", NoFields()).success
     refused = ask("joint_states/switch", "std_srvs/SetBool", Flag(True))
     assert not refused.success and "emergency stop" in refused.message
+    assert ask("xbotcore/estop_clear", "std_srvs/Trigger", NoFields()).success

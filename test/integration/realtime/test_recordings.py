@@ -9,6 +9,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from support.processes import until
 
 from solfer.errors import RecordingError
 from solfer.recording.log import Logger
@@ -27,14 +28,6 @@ def namespace():
     Namespace(name)
     yield name
     shutil.rmtree(f"/dev/shm/solfer-{name}", ignore_errors=True)
-
-
-def until(condition):
-    """Wait for something that another process does."""
-    end = time.monotonic() + WAIT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def source(plugin, numbers):

@@ -21,10 +21,13 @@ def bad_commands(simulation):
         (legs, JointMessage(("torso_yaw", "hip_yaw_1"), position=np.array([0.5, np.nan]))),
         (legs, JointMessage(("torso_yaw", "hip_yaw_1"), position=np.array([0.5, 9.0]))),
         (legs, JointMessage(("torso_yaw", "hip_yaw_9"), position=np.array([0.5, 0.1]))),
+        (legs, JointMessage(("torso_yaw", "torso_yaw"), position=np.array([0.5, 0.5]))),
         (legs, JointMessage(("torso_yaw", "j_wheel_1"), position=np.array([0.5, 0.1]))),
         (legs, JointMessage(("torso_yaw", "hip_yaw_1"), position=np.array([0.5]))),
         (legs, JointMessage(("torso_yaw",), position=np.array([0.5]), effort=np.array([10.0 * effort]))),
         (legs, JointMessage(("torso_yaw",), position=np.array([0.5]), stiffness=np.array([-1.0]))),
+        (legs, JointMessage(("torso_yaw",), position=np.array([0.5]), stiffness=np.array([1e300]))),
+        (wheels, JointMessage(("j_wheel_1", "j_wheel_2"), velocity=np.array([1.0, np.inf]))),
         (wheels, JointMessage(("j_wheel_1", "j_wheel_2"), velocity=np.array([1.0, 1e3]))),
         (wheels, JointMessage(("j_wheel_1",), velocity=np.array([1.0]), position=np.array([0.0]))),
     ]

@@ -48,14 +48,6 @@ def test_it_publishes_what_is_due_in_simulated_time(world):
     assert (poses[0].frame, poses[0].child) == ("world", "pelvis")
 
 
-def test_commands_reach_the_joints(world):
-    bus, server, plugin = world
-    writer = plugin.writer("position_controller/command", "solfer/JointCommand")
-    writer.write(JointMessage(("torso_yaw",), position=np.array([0.2])))
-    bus.run_until(1.0)
-    assert server.simulation.q[server.simulation.kinematics.dofs.index("torso_yaw")] == pytest.approx(0.2, abs=0.01)
-
-
 def test_a_wrong_command_is_only_logged_once(world, caplog):
     bus, server, plugin = world
     writer = plugin.writer("velocity_controller/command", "solfer/JointCommand")

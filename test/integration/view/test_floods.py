@@ -19,6 +19,7 @@ viser = pytest.importorskip("viser", reason="needs pip install -r requirements-v
 pytest.importorskip("foxglove", reason="needs pip install -r requirements-view.txt")
 
 from support.page import opened_page, started_view  # noqa: E402
+from support.processes import until  # noqa: E402
 from viser import _messages  # noqa: E402
 from websockets.exceptions import ConnectionClosed  # noqa: E402
 from websockets.frames import Frame, Opcode  # noqa: E402
@@ -365,10 +366,3 @@ def test_the_stop_asks_at_once_beside_a_flood(served):
                 flooding._connection.socket.send(1000 * frame)
             other.receive(0.02)
             assert time.monotonic() - begin < 1.0
-
-
-def until(condition, what, patience=20.0):
-    end = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < end, what
-        time.sleep(0.1)

@@ -18,6 +18,9 @@ RATE = 500.0  # of the layer RT [Hz]
 LARGEST_STEP = 1.001 * SPEED / RATE
 """Largest step of a commanded position while the robot moves, and when it comes to rest [rad]."""
 
+AT_ONCE = 2
+"""Cycles from a fault until the robot holds: the one in which it is seen, and the lower level's next step."""
+
 WHEEL_SPEED = 1.0  # [rad/s]
 SAG = 0.05
 """How far springs give way to the weight: a plugin that starts anew begins there [rad]."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from support.processes import SOURCES
+from support.processes import SOURCES, until
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
@@ -31,14 +31,6 @@ V_MAX = 30.0  # [rad/s], more than any joint of CENTAURO may
 
 HELD = 0.06
 """How far joints that hold may move while wheels brake [rad]: their springs swing by up to 0.057."""
-
-
-def until(condition: Callable[[], object], what: str, bound: float = WAIT) -> None:
-    """Wait for a condition; fails after `bound` [s]."""
-    end = time.monotonic() + bound
-    while not condition():
-        assert time.monotonic() < end, f"not within {bound:g} s: {what}"
-        time.sleep(0.001)
 
 
 def insist(act: Callable[[], None], condition: Callable[[], object], what: str) -> None:

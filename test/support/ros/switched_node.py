@@ -7,19 +7,12 @@ import numpy as np
 import rosgraph
 import rospy
 from std_srvs.srv import SetBool, Trigger
+from support.processes import until
 
 from solfer.srv import ListControllers
 
 WAIT = 60.0
 """Bound of every wait, on a machine that has much else to do [s]."""
-
-
-def until(condition, what):
-    """Wait until `condition` holds; fails with `what` was missing."""
-    end = time.monotonic() + WAIT
-    while not condition():
-        assert time.monotonic() < end, f"not within {WAIT:g} s: {what}"
-        time.sleep(0.02)
 
 
 class SwitchedNode:

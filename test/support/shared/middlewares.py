@@ -1,12 +1,14 @@
 """The shared plugin of Fig. 5 from one configuration, in memory and in an RT layer, on a robot that stands."""
 
+import math
+
 import numpy as np
 import yaml
 from support.integration.world import CONFIG, STEP, World
 from support.integration.xbot_world import XbotWorld
 from support.shared.figure_5 import ORDER, module, write
 
-from solfer.components import Service
+from solfer.components import Component, Service
 from solfer.components.joint_states import JointStates
 from solfer.config import load_shared
 from solfer.config.loading.rt_layer import read_layer
@@ -44,6 +46,19 @@ class BreakableJoints(JointStates):
         raise ArithmeticError("broken on request")
 
 
+class Wave(Component):
+    """Commands what depends on all that it has received."""
+
+    def init(self):
+        self._time, self._begin = 0.0, self.model.state.position.copy()
+
+    def update(self):
+        self._time += self.period
+        desired, position = self.model.command.position, self.model.state.position
+        desired[:] = 0.9 * desired + 0.1 * self._begin + 0.04 * math.sin(math.pi * self._time)
+        desired += 0.03 * (desired - position)
+
+
 def requests(positions):
     """Return two motions of the upper body from the measured `positions` of joints by name [rad]."""
     joints = tuple(name for name in positions if name.startswith(MOVED))
@@ -60,7 +75,7 @@ def write_listed(folder):
         "class": f"{__name__}:BreakableJoints",
         "secondary_file": {"file": str(CONFIG / "support" / "upper_body.yaml")},
     }
-    tags["wave"] |= module("support.recording.wave:Wave", "whole", ["wave"])
+    tags["wave"] |= module(f"{__name__}:Wave", "whole", ["wave"])
     return write(folder, shared={"plugins": ["upper_body", *(f"{name}::{name}" for name in LISTED[1:])]}, **tags)
 
 

@@ -3,18 +3,45 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from support.plugins.fleet import loaded
-from support.recording import reach
 from support.recording.sine import recorded, tree
 from support.unit.cart import URDF
 
+from solfer.components import Component
 from solfer_tools.cli.main import main
 
-REACH = "support.recording.reach:Reach"
-CLEAN = "support.recording.reach:Clean"
-FILE = Path(reach.__file__)
+REACH = f"{__name__}:Reach"
+CLEAN = f"{__name__}:Clean"
+FILE = Path(__file__)
+
+
+class Reach(Component):
+    """Takes memory in its cycle, some of it for good."""
+
+    def init(self):
+        self._begin, self._errors = self.model.state.position.copy(), []
+
+    def update(self):
+        error = self._begin - self.model.state.position
+        self._errors.append(error)
+        np.multiply(error, 0.5, out=self.model.command.position)
+        self.model.command.position += self.model.state.position
+
+
+class Clean(Component):
+    """Takes none."""
+
+    def init(self):
+        self._begin = self.model.state.position.copy()
+
+    def update(self):
+        command = self.model.command.position
+        np.subtract(self._begin, self.model.state.position, out=command)
+        command *= 0.5
+        np.add(command, self.model.state.position, out=command)
 
 
 @pytest.fixture
@@ -30,7 +57,7 @@ def check(folder, *more):
 def row_of(text, output):
     """Return the columns of the line of the component's source that has a text."""
     number = next(index for index, line in enumerate(FILE.read_text().splitlines(), 1) if text in line)
-    rows = [re.split(r"\s{2,}", line.strip()) for line in output.splitlines() if f"reach.py:{number}" in line]
+    rows = [re.split(r"\s{2,}", line.strip()) for line in output.splitlines() if f"{FILE.name}:{number}" in line]
     assert rows, output
     return rows[0]
 
@@ -43,13 +70,13 @@ def test_planted_allocations_are_named(recording, tmp_path, capsys):
     _, function, times, size, kept, because = row_of("error = ", output)
     assert (function, times, because) == ("update", "1", "-")
     assert 112 <= float(size) < 400 and 100 < float(kept) < 400
-    assert "state.py" in output and "reach.py" in row_of("+= self", output)[-1]
+    assert "state.py" in output and FILE.name in row_of("+= self", output)[-1]
 
 
 @pytest.mark.slow
 def test_component_that_allocates_nothing_passes(recording, tmp_path, capsys):
     assert check(tmp_path, "--recording", recording) == 0
-    assert "reach.py" not in capsys.readouterr().out
+    assert FILE.name not in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -85,17 +85,11 @@ def test_figure_4_has_the_arrows_of_the_paper(figure_4):
     }  # fmt: skip
 
 
-def test_a_reference_without_sender_comes_from_its_topic():
-    network = network_of(str(CENTAURO), ["whole_body"])
-    tails = {arrow.pipe: arrow.tail for arrow in network.arrows if arrow.head == plugin("whole_body")}
-    assert tails["link_side_online"] == SENSORS
-    assert tails["upper_body"] == End(Kind.TOPIC, "upper_body")
-
-
-def test_a_pipe_without_receiver_ends_at_its_topic():
-    network = network_of(str(CENTAURO), ["upper_body"])
-    heads = [arrow.head for arrow in network.arrows if arrow.tail == plugin("upper_body")]
-    assert heads == [End(Kind.TOPIC, "upper_body")]
+def test_a_pipe_whose_other_end_is_missing_has_its_topic():
+    topic = End(Kind.TOPIC, "upper_body")
+    assert topic in {arrow.tail for arrow in network_of(str(CENTAURO), ["whole_body"]).arrows}
+    arrows = network_of(str(CENTAURO), ["upper_body"]).arrows
+    assert [arrow.head for arrow in arrows if arrow.tail == plugin("upper_body")] == [topic]
 
 
 def test_the_text_names_both_ends_of_every_pipe(figure_4):

@@ -228,21 +228,6 @@ def test_a_posture_follows_its_joints(upper, make):
     assert np.abs(np.diff(yaw)).max() < 1.02 * 0.1 * math.pi * PERIOD
 
 
-def test_a_posture_goes_through_its_way_points(upper, make):
-    way = "{waypoints: [{time: 0.4, joints: {torso_yaw: 0.1}}, {time: 0.8, joints: {torso_yaw: 0.0}}]}"
-    component, joint = (
-        make(upper, HANDS.replace("gain: 0.5, weight: 0.0001", f"reference: {way}")),
-        upper.dof("torso_yaw"),
-    )
-    (posture,) = component.references._postures
-    start, yaw = posture._reference.value[joint], []
-    for _ in range(round(1.0 * RATE)):
-        run(component, PERIOD)
-        yaw.append(posture._reference.value[joint] - start)
-    assert yaw[round(0.4 * RATE) - 1] == pytest.approx(0.1, abs=1e-12) == max(yaw)
-    assert yaw[-1] == pytest.approx(0.0, abs=1e-12) and np.abs(np.diff(yaw)).max() < 0.002
-
-
 @pytest.mark.parametrize(
     ("wrong", "place", "error"),
     [

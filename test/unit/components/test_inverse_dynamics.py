@@ -31,7 +31,6 @@ TASKS = {
     "posture": {"point": "posture", "gain": 5.0, "without": ("wheels",)},
 }
 LEVELS = (("com", "base"), ("posture",))
-LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
 
 
 def centauro(contacts=CENTAURO / "contacts.yaml"):

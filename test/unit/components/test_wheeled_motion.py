@@ -21,7 +21,6 @@ from solfer.interfaces.task_references import GetReference
 from solfer.numerics.solvers.damped_descent import DampedDescent
 
 PERIOD = 1.0 / RATE  # [s]
-WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 TRACKING = 1e-6  # [rad]
 
 

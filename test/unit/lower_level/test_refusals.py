@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from support.unit.cart import DT, GAINS, GROUPS, RECORDS, URDF, bend, claim, make, turn
-from support.unit.declarations import named
 from support.unit.refusals import check_refusal
 
 from solfer.errors import ClaimRefused, CommandRefused, SolferError, Suspended, UnknownName
 from solfer.lower_level import LowerLevelRecord, LowerLevelServer, build_lower_level
 from solfer.lower_level.records import RationRecord
 from solfer.lower_level.server.server import largest_request
-from solfer.lower_level.server.services import lower_level_services
 from solfer.model import Description, Kinematics
 from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
@@ -53,9 +51,6 @@ def test_what_is_refused_changes_nothing(call, error, words):
 def test_a_stopped_controller_refuses_and_says_so():
     cart = make()
     cart.switch([], ["wheel"])
-    listed = named(lower_level_services(cart), "list_controllers").handler(None)
-    assert listed.states == ("running", "stopped") and listed.types == ("impedance", "velocity")
-    assert listed.joints == ("shoulder", "roll") and listed.claimed_by == ("", "")
     for call, error, place, words in (
         (lambda: claim(cart, "/a", ("wheel",)), Suspended, CLAIM, "controller 'wheel' is stopped"),
         (lambda: turn(cart, "/a"), Suspended, COMMAND, "controller 'wheel' is stopped"),

@@ -105,19 +105,32 @@ def test_versions_tell_which_numbers_changed(context, tags):
     assert moved == [(1, 0), (0, 0), (1, 0), (1, 0)]
 
 
-@pytest.mark.parametrize("function", ["state", "motor", "reference"])
-@pytest.mark.parametrize("fields", [("position",), ("velocity", "effort"), ("position", "velocity", "effort")])
-def test_any_interfaces_pass_between_robots(context, function, fields):
-    """A sender and a receiver of one record copy exactly the listed fields, and no other State changes."""
+@pytest.mark.parametrize(("function", "written"), [("state", "state"), ("motor", "motor"), ("reference", "command")])
+@pytest.mark.parametrize(
+    "fields",
+    [
+        ("position",),
+        ("velocity", "effort"),
+        ("position", "velocity", "effort"),
+        ("acceleration", "stiffness", "bias", "velocity"),
+    ],
+)
+def test_any_interfaces_pass_between_robots(context, function, written, fields):
+    """A sender and a receiver of one record copy exactly the listed fields, and no other State changes.
+
+    Acceleration, stiffness and a component's own field pass as well.
+    """
     interface = {field: True for field in fields}
     mine, theirs = context.robot, make_robot()
-    there = PipeContext(theirs, context.middleware, {}, RATE)
-    sender = factory.controller(published(interface=interface, function=function), context)
-    receiver = factory.feedback(received(interface=interface, function=function), there)
-    assert receiver.run() is MessageStatus.NONE
-    names = {"position": "position", "velocity": "velocity", "effort": "torque"}
-    written = {"state": "state", "motor": "motor", "reference": "command"}[function]
     source, target = (getattr(robot, written) for robot in (mine, theirs))
+    for state in (source, target):
+        state.add("bias")
+    there = PipeContext(theirs, context.middleware, {}, RATE)
+    tags = {"interface": interface, "function": function}
+    sender = factory.controller(published(**tags), context)
+    receiver = factory.feedback(received(**tags, **({"message": None} if "bias" in fields else {})), there)
+    assert receiver.run() is MessageStatus.NONE
+    names = {field: field for field in (*fields, "position", "velocity")} | {"effort": "torque"}
     random = np.random.default_rng(2)
     for name in names.values():
         source[name] = random.standard_normal(mine.size)
@@ -204,28 +217,6 @@ def test_a_filter_needs_run_and_a_low_frequency(context):
     assert pipe.message.position[6] == 2.0
     with pytest.raises(ConfigError, match="cut-off frequency of 500 Hz at 200 steps a second"):
         factory.controller(published(filter={"frequency": 500.0}), context)
-
-
-@pytest.mark.parametrize("function, state", [("state", "state"), ("reference", "command")])
-def test_interfaces_of_a_state_travel(context, function, state):
-    """Acceleration, stiffness and a component's own field pass as well; what is not listed stays zero."""
-    interface = {"acceleration": True, "stiffness": True, "bias": True, "velocity": True}
-    theirs = make_robot()
-    for robot in (context.robot, theirs):
-        getattr(robot, state).add("bias")
-    there = PipeContext(theirs, context.middleware, {}, RATE)
-    sender = factory.controller(published(interface=interface, function=function), context)
-    receiver = factory.feedback(received(interface=interface, function=function, message=None), there)
-    source, target = getattr(context.robot, state), getattr(theirs, state)
-    random = np.random.default_rng(3)
-    for name in interface:
-        source[name] = random.standard_normal(source.size)
-    sender.collect()
-    sender.send(0.5)
-    assert receiver.run() is MessageStatus.NEW
-    for name in interface:
-        assert_allclose(target[name], source[name], atol=0.0)
-    assert not target.position.any() and not target.torque.any()
 
 
 @pytest.mark.parametrize(

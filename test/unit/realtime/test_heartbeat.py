@@ -6,6 +6,7 @@ import signal
 import time
 
 import pytest
+from support.processes import until
 
 from solfer.errors import MiddlewareError
 from solfer.realtime import heartbeat
@@ -45,14 +46,6 @@ def process(tmp_path):
     yield made
     made.kill()
     made.join(WAIT)
-
-
-def until(condition):
-    """Wait for a condition."""
-    end = time.monotonic() + WAIT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.001)
 
 
 def test_without_a_process_there_is_no_heartbeat(tmp_path):

@@ -1,8 +1,7 @@
 """What is reported of plugins' pipes and their peers beside the loop."""
 
-import time
-
 import pytest
+from support.processes import until
 
 from solfer.realtime.pipe_monitor import PipeMonitor
 from solfer.transport.health import Health
@@ -36,13 +35,6 @@ class AllReports:
 
     def report(self, *report):
         self.all.append(report)
-
-
-def until(condition):
-    end = time.monotonic() + WAIT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.001)
 
 
 @pytest.fixture(autouse=True)

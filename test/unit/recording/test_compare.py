@@ -2,21 +2,67 @@
 
 import dataclasses
 import re
+from contextlib import closing
 
 import numpy as np
 import pytest
-from support.recording.motion import POSITION, Motion
+from support.integration.world import STEP, World
 
 from solfer.errors import RecordingError, UnknownName
-from solfer.recording.model import Channel, Recording
+from solfer.recording.model import JOINTS_KIND, Channel, Recording
 from solfer.recording.writer import save
 from solfer_tools.cli.main import main
 from solfer_tools.review import Difference, compare
 
+POSITION = "joint_states/feedback/link_side_online/position"
+PARTS = ("arm", "neck", "torso_yaw", "hip_pitch")
+BASE = 6  # DoFs
 NOISE = 3e-4  # [rad]
 SEEDS = range(10)
 LATE = 4  # [ms]
 KINDS = (Difference.SIGN, Difference.SWAPPED, Difference.DELAY, Difference.GAIN)
+
+
+class Motion:
+    """CENTAURO's joints, each of which moves in its own way.
+
+    Attributes:
+        joints: Their names.
+        moved: Names of those that were asked to move, all but the legs.
+        positions: Where they were in each millisecond, shape (T, joints) [rad].
+    """
+
+    def __init__(self):
+        with closing(World()) as world:
+            self._run(world)
+
+    def _run(self, world):
+        plugin, rng = world.plugin("joint_states"), np.random.default_rng(0)
+        robot = plugin.robot
+        world.run(0.5)
+        rows = []
+        world.bus.every(STEP, lambda: rows.append(world.simulation.q.copy()))
+        chosen = [name for name in robot.dofs if any(part in name for part in PARTS)]
+        dofs = [robot.dof(name) for name in chosen]
+        share = np.array([0.05 if "hip" in name else 0.25 for name in chosen])
+        start = robot.state.position[dofs].copy()
+        lower, upper = robot.lower_limits.position[dofs] + 0.01, robot.upper_limits.position[dofs] - 0.01
+        for _ in range(6):
+            goal = np.clip(start + share * rng.uniform(-1.0, 1.0, len(dofs)), lower, upper)
+            assert world.ask(joints=tuple(chosen), positions=tuple(goal), speed=1.0).success
+            world.run(rng.uniform(0.3, 0.6))
+        self.joints = tuple(robot.dofs[BASE:])
+        self.moved = [name for name in chosen if "hip" not in name]
+        self.positions = np.array(rows)[:, BASE:]
+
+    def recording(self, positions=None, rate=200.0, start=0.0, clock=0.0, noise=0.0, seed=0):
+        """Return what sensors of a rate [Hz] and a noise [rad] record from `start` [s] on, by their own clock."""
+        positions = self.positions if positions is None else positions
+        rows = positions[round(start / STEP) :: round(1.0 / rate / STEP)]
+        times = clock + np.arange(len(rows)) / rate
+        values = rows + noise * np.random.default_rng(seed).standard_normal(rows.shape)
+        units = ("rad",) * len(self.joints)
+        return Recording({POSITION: Channel(POSITION, JOINTS_KIND, self.joints, units, "", times, values)})
 
 
 @pytest.fixture(scope="module")

@@ -48,28 +48,18 @@ def turned(simulation: Simulation) -> np.ndarray:
     return np.array([odd[2, 1], odd[0, 2], odd[1, 0]])
 
 
-def assert_stands(simulation: Simulation) -> None:
-    """Assert that the robot stays as it is for a while, on its foot."""
-    height, before = simulation.body.position[2], turned(simulation)
-    for _ in range(700):
-        simulation.step()
-    assert simulation.body.position[2] == pytest.approx(height, abs=2e-3)
-    np.testing.assert_allclose(turned(simulation), before, atol=0.02)
-    assert simulation.contact_links() == ("foot",)
-
-
-def test_a_sole_is_put_down_flat(put, caplog):
-    with closing(put(-0.055)) as simulation:
-        assert "begins tilted by 3.4 degrees" in caplog.text
-        np.testing.assert_allclose(turned(simulation), [0.0, math.sin(ANKLE), 0.0], atol=1e-4)
-        assert_stands(simulation)
-
-
-def test_a_sole_is_flat_on_slopes(put):
-    slope = -0.03
+@pytest.mark.parametrize("slope", [0.0, -0.03])
+def test_a_sole_is_put_down_flat(put, caplog, slope):
+    """It stays as it is put down, for a while."""
     with closing(put(-0.055, world=f"ground: {{slope: {slope}}}")) as simulation:
-        np.testing.assert_allclose(turned(simulation), [0.0, math.sin(ANKLE - slope), 0.0], atol=1e-4)
-        assert_stands(simulation)
+        assert "begins tilted by 3.4 degrees" in caplog.text
+        before, height = np.array([0.0, math.sin(ANKLE - slope), 0.0]), simulation.body.position[2]
+        np.testing.assert_allclose(turned(simulation), before, atol=1e-4)
+        for _ in range(700):
+            simulation.step()
+        assert simulation.body.position[2] == pytest.approx(height, abs=2e-3)
+        np.testing.assert_allclose(turned(simulation), before, atol=0.02)
+        assert simulation.contact_links() == ("foot",)
 
 
 def test_yaw_and_height_keep_the_tilt(put):

@@ -80,7 +80,6 @@ def axle(robot, wheel="wheel_1"):
     return SpatialPoint(wheel, robot, record.position), (*(getattr(record.reference_axis, one) for one in "xyz"),)
 
 
-TOOL = SpatialPoint, "arm1_7", OFFSET, QUATERNION
 MORE = tuple((np.array(OFFSET) + TURN.apply((1.0, 2.0, 3.0))).tolist())
 MADE = {
     "point: position, link: tool": lambda r: LinearPoint("arm1_7", r, OFFSET),

@@ -70,6 +70,13 @@ def served(repository, control):
         yield bench, client
 
 
+@pytest.fixture(scope="module")
+def commanded(repository):
+    """Serve once for all that a client sends in vain."""
+    with served(repository, True) as made:
+        yield made
+
+
 def client_of(client):
     """Let the bench receive what is for the client."""
 
@@ -171,21 +178,23 @@ OTHER_REQUESTS = {
 
 
 @pytest.mark.parametrize("kind", OTHER_REQUESTS)
-def test_other_requests_change_nothing(repository, caplog, capfd, kind):
+def test_other_requests_change_nothing(commanded, caplog, capfd, kind):
     """They may end their connection; another client has its parameters, and nobody commands."""
-    with served(repository, True) as (bench, client):
-        with (
-            connect(bench.page.foxglove.address, subprotocols=[PROTOCOL]) as other,
-            suppress(ConnectionClosed, TimeoutError),
-        ):
-            for each in OTHER_REQUESTS[kind]:
-                other.send(json.dumps(each) if isinstance(each, dict) else each)
-                bench.run(1)
-            while True:
-                assert "root:" not in str(other.recv(timeout=0.1))
-        client.send(op="getParameters", parameterNames=[], id="all")
-        bench.until(lambda: "all" in client.answers)
-        assert client.answers["all"] == {"hands.gain": 2.0} and not bench.asked and not bench.driven.drain()
+    bench, client = commanded
+    with (
+        connect(bench.page.foxglove.address, subprotocols=[PROTOCOL]) as other,
+        suppress(ConnectionClosed, TimeoutError),
+    ):
+        for each in OTHER_REQUESTS[kind]:
+            other.send(json.dumps(each) if isinstance(each, dict) else each)
+            bench.run(1)
+        while True:
+            assert "root:" not in str(other.recv(timeout=0.1))
+    client.answers.clear()
+    bench.asked.clear()
+    client.send(op="getParameters", parameterNames=[], id="all")
+    bench.until(lambda: "all" in client.answers)
+    assert client.answers["all"] == {"hands.gain": float(bench.gain)} and not bench.asked and not bench.driven.drain()
     assert "Traceback" not in caplog.text + "".join(capfd.readouterr()) and len(caplog.records) < 10
 
 
@@ -236,19 +245,19 @@ VALUES = (
 
 
 @pytest.mark.parametrize("name", ["hands.gain", "other.gain", "..", "", "hands.gain\\u0000", 1000 * "hands."])
-def test_values_that_are_none_end_nothing(repository, caplog, name):
+def test_values_that_are_none_end_nothing(commanded, caplog, name):
     """Bytes, bytes that cannot be decoded, nested values, unknown names; then a number counts."""
     nested = 1
     for _ in range(100):
         nested = [nested]
-    with served(repository, True) as (bench, client):
-        for value, kind in VALUES:
-            value = nested if value == "nested" else value
-            client.send(op="setParameters", parameters=3 * [{"name": name, "value": value, "type": kind}])
-            client._connection.send(f'{{"op":"setParameters","parameters":[{{"name":"{name}","value":1e400}}]}}')
-            bench.run(2)
-        assert all("\n" not in line for line in caplog.messages)
-        bench.asked.clear()
-        client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.5}])
-        bench.until(lambda: bench.asked)
-        assert bench.asked == [SetParameters(("gain",), ("3.5",))]
+    bench, client = commanded
+    for value, kind in VALUES:
+        value = nested if value == "nested" else value
+        client.send(op="setParameters", parameters=3 * [{"name": name, "value": value, "type": kind}])
+        client._connection.send(f'{{"op":"setParameters","parameters":[{{"name":"{name}","value":1e400}}]}}')
+        bench.run(2)
+    assert all("\n" not in line for line in caplog.messages)
+    bench.asked.clear()
+    client.send(op="setParameters", parameters=[{"name": "hands.gain", "value": 3.5}])
+    bench.until(lambda: bench.asked)
+    assert bench.asked == [SetParameters(("gain",), ("3.5",))]
