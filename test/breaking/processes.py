@@ -8,6 +8,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from support.processes import until  # noqa: F401, for benchmark/chaos.py
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 WAIT = 60.0
 """Bound of every wait, on a machine that has much else to do [s]."""
