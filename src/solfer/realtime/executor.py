@@ -283,11 +283,12 @@ class Executor:
         if not often:
             return
         self._long.reset()
-        slowest = max(range(len(self.plugins)), key=lambda index: sum(self._set.times[index]))
+        times = [sum(each) for each in self._set.times]
+        slowest = times.index(max(times))
         reason = (
             f"{SAFE_STOP}: {self._rules.overruns} cycles of more than {LONGEST_CYCLE:g} periods, the newest "
-            f"{1e-6 * lasted:.3f} ms of {1e-6 * self._period:.3f} ms; the slowest is '{self.plugins[slowest].name}' with "
-            f"{1e-6 * sum(self._set.times[slowest]):.3f} ms"
+            f"{1e-6 * lasted:.3f} ms of {1e-6 * self._period:.3f} ms; the slowest is "
+            f"'{self.plugins[slowest].name}' with {1e-6 * times[slowest]:.3f} ms"
         )
         logger.error("%s", reason)
         self._set.abort(reason)

@@ -19,7 +19,7 @@ def watch_of(summary, times):
 
 
 @pytest.mark.parametrize(
-    ("summary", "is_lost"), [(f"ABORTED: {SAFE_STOP}: 20 cycles of more than 2.5 periods", True), ("ABORTED: no joints", False)]
+    ("summary", "is_lost"), [(f"ABORTED: {SAFE_STOP}: 20 long cycles", True), ("ABORTED: no joints", False)]
 )
 def test_an_error_that_lasts_ends_it(summary, is_lost):
     watch = watch_of(summary, (0.0, 5.0, 5.1))

@@ -54,7 +54,10 @@ class ExecutorRecord(Record):
     blend: float = Field(default=2.0, **DURATION, description="shortest time in which commands blend in at a start [s]")
     budget: float = Field(default=0.5, ge=0.01, le=1, description="fraction of the period that a component may take")
     overruns: int = Field(
-        default=20, ge=1, le=1_000_000, description="cycles too long, not forgiven, at which the plugin or the loop is stopped"
+        default=20,
+        ge=1,
+        le=1_000_000,
+        description="cycles too long, not forgiven, at which the plugin or the loop is stopped",
     )
     grace: int = Field(default=100, **COUNT, description="first cycles in which overruns do not count")
     record: float = Field(

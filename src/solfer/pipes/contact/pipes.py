@@ -65,7 +65,7 @@ class _Wrenches:
         self._turned = np.zeros_like(published) if carried.fixed else published
         self._origins = Handler(LinearPoint(contact.link, robot) for contact in carried.contacts)
         self.all = np.arange(len(published))
-        self._memory = np.zeros(0)
+        self._memory = np.zeros((0, 6))
         self._read = self._written = np.zeros((0, 3), dtype=int)
 
     def write(self, places: np.ndarray) -> None:
