@@ -20,7 +20,7 @@ from solfer.errors import SolferError
 from solfer.middleware.ros import RosMiddleware, RosNode, arguments, run_main
 from solfer.plugins import Plugin, Registry, generate
 from solfer.transport import Inbox
-from solfer.transport.lower_level import Answer, answered
+from solfer.transport.lower_level import Answer, answered_service
 from solfer.transport.middleware import TRIGGER, Flag, NoFields
 
 COSTS = 400  # cycles
@@ -64,8 +64,9 @@ class PluginsOfANode:
     def _made(self, file: str, name: str) -> Plugin:
         settings = load(file, name)
         plugin = generate(settings, self._middleware, Registry().find(name, settings.module.class_))
-        switch = answered(lambda request: plugin.restart() if request.data else plugin.stop())
-        service = Service("switch", "std_srvs/SetBool", Flag, Answer, switch)
+        service = answered_service(
+            "switch", "std_srvs/SetBool", Flag, work=lambda request: plugin.restart() if request.data else plugin.stop()
+        )
         self._middleware.serve(name, (service,), self._inbox.submit)
         return plugin
 

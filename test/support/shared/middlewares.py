@@ -8,12 +8,12 @@ from support.integration.world import CONFIG, STEP, World
 from support.integration.xbot_world import XbotWorld
 from support.shared.figure_5 import ORDER, module, write
 
-from solfer.components import Component, Service
+from solfer.components import Component
 from solfer.components.joint_states import JointStates
 from solfer.config import load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.realtime.executor import ExecutorRules
-from solfer.transport.lower_level import Answer, answered
+from solfer.transport.lower_level import answered_service
 from solfer.transport.middleware import TRIGGER, NoFields
 
 LISTED = ("upper_body", *ORDER, "wave")
@@ -37,7 +37,7 @@ class BreakableJoints(JointStates):
 
     def services(self):
         """See `Component.services`."""
-        return (*super().services(), Service("fail", TRIGGER, NoFields, Answer, answered(self._fail)))
+        return (*super().services(), answered_service("fail", TRIGGER, NoFields, work=self._fail))
 
     def _fail(self, _):
         self.update = self._broken
