@@ -238,8 +238,7 @@ class ReferenceSet:
         farthest = None
         distance = 0.0
         for target in self.list:
-            target.watch()
-            if not target.is_still:
+            if not target.watch():
                 return
             if not target.is_unreachable and target.distance > distance:
                 farthest = target

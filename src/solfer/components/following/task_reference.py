@@ -287,12 +287,14 @@ class TaskReference:
         """Return whether the point is at its reference."""
         return self._filtered.is_still and not self._residual.is_beyond()
 
-    def watch(self) -> None:
-        """Look whether the task still comes nearer to its reference; see `stays`."""
-        if self._filtered.is_still:
+    def watch(self) -> bool:
+        """Look whether the task still comes nearer to its reference, see `stays`; return whether that is at rest."""
+        is_still = self._filtered.is_still
+        if is_still:
             self._progress.look(self.distance)
         else:
             self._restart_progress()
+        return is_still
 
     def refresh(self) -> None:
         """Look again whether the task comes nearer to its reference; one that is held is held where it is now."""

@@ -108,8 +108,9 @@ class WeightedLaw:
             np.add(world, self.offsets.value, out=self._corrected)
             forces = self._forces.update(jacobian, self._corrected)
         for contact, force in zip(self._contacts, forces, strict=True):
-            contact.wrench[:3] = force
-            contact.wrench[3:] = 0.0
+            wrench = contact.wrench
+            wrench[:3] = force
+            wrench[3:] = 0.0
         if self._floating:
             self._write_push()
         if self.offsets is not None:

@@ -66,6 +66,7 @@ class _Wrenches:
         self._origins = Handler(LinearPoint(contact.link, robot) for contact in carried.contacts)
         self.all = np.arange(len(published))
         self._memory = np.zeros((0, 6))
+        self._positions = np.zeros((0, 3))
         self._read = self._written = np.zeros((0, 3), dtype=int)
 
     def write(self, places: np.ndarray) -> None:
@@ -83,9 +84,8 @@ class _Wrenches:
             np.matmul(self._turned.reshape(2, 3), self._rotation(), out=self._published.reshape(2, 3))
 
     def _move(self, source: np.ndarray, rows: np.ndarray, sign: float, out: np.ndarray, places: np.ndarray) -> None:
-        positions = self._robot.contacts.positions
         origins = self._origins.value.reshape(-1, 3)
-        self._shift(source, positions, origins, rows, sign, out, places)
+        self._shift(source, self._positions, origins, rows, sign, out, places)
 
     def _rotation(self) -> np.ndarray:
         return self._robot.kinematics.rotation(self._contacts[0].link)
@@ -94,6 +94,7 @@ class _Wrenches:
         """Update kinematics, contacts and origins to the measured State, and find contacts that came or went."""
         self._robot.update()
         contacts = self._robot.contacts  # computed on access
+        self._positions = contacts.positions
         if contacts.wrenches is not self._memory:
             self._memory, known = contacts.wrenches, [id(contact) for contact in contacts]
             members = np.array([known.index(id(each)) if id(each) in known else -1 for each in self._contacts])

@@ -300,10 +300,10 @@ class JointCommandPipe(CommandPipe):
 
         # arrays of a State stay where they are
         live = np.array([address(state[interface_of(field)]) for field in message.rows], dtype=np.int64)
-        self._copy = partial(collect, live, self.dofs, self.block)
+        self._collect = partial(collect, live, self.dofs, self.block)
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
         if not self._filters:
-            self.collect = self._copy  # type: ignore[method-assign] # without a call in between
+            self.collect = self._collect  # type: ignore[method-assign] # without a call in between
         self._attributes = vars(sent)  # to assign one, a message looks for its arrays
 
     def to_receiver(self, field: str, values: np.ndarray) -> np.ndarray:
@@ -330,7 +330,7 @@ class JointCommandPipe(CommandPipe):
 
     def collect(self) -> None:
         """Copy the values of the State into `message`."""
-        self._copy()
+        self._collect()
         for low_pass, values in self._filters:
             low_pass.step(values)
 
