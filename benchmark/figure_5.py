@@ -234,6 +234,10 @@ def main() -> int:
     parser.add_argument("--calls", action="store_true", help="count calls of Python functions in a cycle, in memory")
     parser.add_argument("--profile", action="store_true", help="list these calls by room and by function")
     given = parser.parse_args()
+    if given.beside is not None and not (given.beside / "nodes/xbot_simulator").is_file():
+        parser.error(f"{given.beside} is no clone of solfer, expected: its folder")
+    if min(*given.rate, given.seconds) <= 0.0:
+        parser.error(f"rates {given.rate} Hz for {given.seconds:g} s, expected: positive numbers")
     figures = Figures(given.json)
     if given.calls or given.profile:
         return count_calls(given.profile, figures)
