@@ -19,12 +19,11 @@ class _Element:
         self.subscribed = self.left = self.computed = 0
 
     def refresh(self) -> None:
-        """Compute if the inputs have changed."""
-        if self.stamp() != self.used:
-            self.compute()
-            self.computed += 1
-            # an element that fails stays stale; a computation may itself notice writes that the stamp does not show
-            self.used = self.stamp()
+        """Compute it, since its inputs have changed."""
+        self.compute()
+        self.computed += 1
+        # an element that fails stays stale; a computation may itself notice writes that the stamp does not show
+        self.used = self.stamp()
 
 
 class UpdateManager:
@@ -92,19 +91,23 @@ class UpdateManager:
     def update(self) -> None:
         """Compute what is subscribed and stale, and fill the call counters."""
         for element in self._required:
-            element.refresh()
+            if element.stamp() != element.used:
+                element.refresh()
             element.left = element.subscribed
 
     def use(self, name: str) -> None:
         """Count one use of an element, which is up to date afterwards, subscribed or not."""
         element = self._elements[name]
-        element.refresh()
+        if element.stamp() != element.used:
+            element.refresh()
         if element.left:
             element.left -= 1
 
     def refresh(self, name: str) -> None:
         """Bring an element up to date that another one is computed of, without counting a use."""
-        self._elements[name].refresh()
+        element = self._elements[name]
+        if element.stamp() != element.used:
+            element.refresh()
 
     def calls_left(self, name: str) -> int:
         """Return how many of the subscribed uses of an element are still to come since the last `update`."""

@@ -102,6 +102,7 @@ class TopicOut:
         message: Dataclass of a message.
         collect: Called after each `send` of the component: returns the message to publish; None: nothing this time.
         rest: Message that is published while the component, which has worked before, holds or has stopped; None: none.
+        rate: How often it is collected at most; None: after each cycle [Hz].
     """
 
     name: str
@@ -109,6 +110,7 @@ class TopicOut:
     message: type
     collect: Callable[[], Any]
     rest: Any = None
+    rate: float | None = None
 
 
 @dataclass(frozen=True)

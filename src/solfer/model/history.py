@@ -17,8 +17,7 @@ class History:
         size: Most messages of one cycle, N.
 
     Attributes:
-        interfaces: See above.
-        dofs: See above.
+        interfaces, dofs, size: See above.
         stamps: When the numbers were true, in the sender's clock, shape (N,) [s].
         arrivals: When they arrived, in the pipe's own clock, shape (N,) [s].
         values: The numbers in the State's units; NaN: the message lacks it. Shape (N, len(interfaces), k).
@@ -34,13 +33,9 @@ class History:
         self.stamps = np.zeros(size)
         self.arrivals = np.zeros(size)
         self.values = np.zeros((size, len(self.interfaces), len(dofs)))
+        self.size = size
         self.count = self.dropped = self.unread = 0
         self.sender = ""
-
-    @property
-    def size(self) -> int:
-        """Most messages of one cycle."""
-        return len(self.stamps)
 
     def clear(self) -> None:
         """Begin a cycle."""

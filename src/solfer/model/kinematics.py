@@ -147,12 +147,14 @@ class Kinematics:
 
     def position(self, link: str) -> np.ndarray:
         """Return the position of a link's origin in the world, shape (3,) [m]."""
-        self._update_frames(link)
+        if not self._frames_are_current or link not in self._frames:
+            self._update_frames(link)
         return self._positions[link]
 
     def rotation(self, link: str) -> np.ndarray:
         """Return the rotation from a link to the world, shape (3, 3)."""
-        self._update_frames(link)
+        if not self._frames_are_current or link not in self._frames:
+            self._update_frames(link)
         return self._rotations[link]
 
     def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:

@@ -53,6 +53,20 @@ def rates_of(rx, ry, wx, wy, wz):
     return wx - sy * yaw, cx * wy + sx * wz, yaw
 
 
+def moment_of(rx, ry, tx, ty, tz):
+    """Compute the moment in the axes of the chart's origin [Nm] of efforts along the three angles: G^T t.
+
+    Angular velocities w make rates G w, see `rates_of`.
+    """
+    cx = math.cos(rx)
+    sx = math.sin(rx)
+    cy = math.cos(ry)
+    if abs(cy) < 1e-3:
+        cy = math.copysign(1e-3, cy)
+    along = (tz - math.sin(ry) * tx) / cy
+    return tx, cx * ty - sx * along, sx * ty + cx * along
+
+
 class BaseChart:
     """Position and orientation of a floating base as q = (x, y, z, rx, ry, rz) [m, rad], behind a fixed origin.
 

@@ -103,15 +103,15 @@ def wrapped(displacement, revolution):
     return displacement - revolution * math.floor(displacement / revolution + 0.5) if revolution else displacement
 
 
-def _unwrap(position, part, before, revolutions, added):
+def _unwrap(before, revolutions, added, position, part):
     """Add whole revolutions to positions of senders that count within one, so that none moves by more than half of it.
 
     Args:
-        position: Positions, as they came; written.
-        part: Indices of the positions that came.
         before: The positions before, NaN: there is none; and the lowest and highest ones that came.
         revolutions: What positions may jump by; 0: nothing.
         added: What was added before; written.
+        position: Positions, as they came; written.
+        part: Indices of the positions that came.
     """
     for k in part:
         if revolutions[k]:
@@ -123,17 +123,20 @@ def _unwrap(position, part, before, revolutions, added):
             position[k] = came + added[k]
 
 
-unwrap = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1])", _unwrap)
+unwrap = cached("void(float64[:, ::1], float64[::1], float64[::1], float64[::1], int64[::1])", _unwrap)
 
 
-def _keep_revolutions(position, part, before, added):
-    """Keep positions that `unwrap` has written, for the next ones."""
+def _keep_revolutions(before, added, dofs, counts, position, part):
+    """Keep positions that `unwrap` has written, for the next ones; counts[dofs] has what was added."""
     for k in part:
         came = position[k] - added[k]
+        counts[dofs[k]] = added[k]
         before[0, k], before[1, k], before[2, k] = position[k], min(before[1, k], came), max(before[2, k], came)
 
 
-keep_revolutions = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1])", _keep_revolutions)
+keep_revolutions = cached(
+    "void(float64[:, ::1], float64[::1], int64[::1], float64[::1], float64[::1], int64[::1])", _keep_revolutions
+)
 
 
 def _shorten(displacements, revolutions):

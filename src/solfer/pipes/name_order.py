@@ -47,6 +47,8 @@ class NameOrder:
             which the message lacks: they are misspelt.
 
     Attributes:
+        matched: Names of the newest message; None before the first.
+        order: What `match` has returned for them.
         not_received: Flags of the names that no message has contained so far, shape (len(pipe_names),).
     """
 
@@ -58,8 +60,8 @@ class NameOrder:
         self._ignores = ignores
         self._ignored: set[str] = set()
         self._known = None if known is None else tuple(dict.fromkeys((*pipe_names, *known)))
-        self._names: tuple[str, ...] | None = None
-        self._order = Order(np.zeros(0, dtype=np.intp))
+        self.matched: tuple[str, ...] | None = None
+        self.order = Order(np.zeros(0, dtype=np.intp))
         self._remembered: dict[tuple[str, ...], Order] = {}
         self.not_received = np.ones(len(self._pipe_names), dtype=bool)
 
@@ -71,8 +73,8 @@ class NameOrder:
             Unrelated: None is of the pipe.
             UnknownName: A name is unknown.
         """
-        if names is self._names or names == self._names:
-            return self._order
+        if names is self.matched or names == self.matched:
+            return self.order
         order = self._remembered.get(names)
         if order is None:
             order = self._find(names)
@@ -84,8 +86,8 @@ class NameOrder:
                 f"it has none of the pipe's {len(self._pipe_names)} {self._what}s",
                 expected=f"some of {', '.join(self._pipe_names)}",
             )
-        self._names = names
-        self._order = order
+        self.matched = names
+        self.order = order
         return order
 
     def require_all(self, names: tuple[str, ...]) -> None:

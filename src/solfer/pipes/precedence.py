@@ -31,11 +31,6 @@ class Owner:
         self.dofs = np.zeros(size, dtype=bool)
         self.lost = True
 
-    def note(self, arrival: float) -> None:
-        """Record an accepted message that arrived at `arrival` [s]."""
-        self.arrival = arrival
-        self.strikes = 0
-
 
 class Watch:
     """Publishers of DoFs of which each has to go on.
@@ -120,7 +115,8 @@ class Precedence:
         owner = self._owners.get(key)
         if owner is None:
             owner = self._owners[key] = Owner(name, part, self._size)
-        owner.note(arrival)
+        owner.arrival = arrival
+        owner.strikes = 0
         if owner.lost:
             self._take(owner)
             self._arrange()

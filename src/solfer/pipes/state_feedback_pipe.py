@@ -40,41 +40,6 @@ class Reception:
     history: int = 0
 
 
-class _StateWriter:
-    """Writes numbers of certain DoFs to a State.
-
-    Args:
-        state: The State.
-        interfaces: Names of the interfaces that are written.
-        dofs: The DoFs, shape (k,).
-    """
-
-    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray):
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import scatter
-        from solfer.numerics.pointers import address
-
-        self._state = state
-        self._scatter = scatter
-        self._dofs = dofs
-        self._all = np.arange(len(dofs))
-        # arrays of a State stay where they are
-        self._live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
-        self._touched = _subsets(interfaces)
-
-    def write(self, values: np.ndarray, part: np.ndarray | None) -> bool:
-        """Write values of some of the DoFs, None: of all; return whether any number has changed.
-
-        Args:
-            values: The values, shape (interfaces, k).
-            part: Indices of the values that are written.
-        """
-        changes = self._scatter(values, self._all if part is None else part, self._dofs, self._live)
-        if changes:
-            self._state.touch(*self._touched[changes])
-        return bool(changes)
-
-
 class StateFeedbackPipe(FeedbackPipe):
     """A pipe that writes a State; filters make one step in every cycle, also without a new message.
 
@@ -107,6 +72,10 @@ class StateFeedbackPipe(FeedbackPipe):
         reception: Reception,
     ):
         super().__init__(name, reader, reception.required)
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import scatter
+        from solfer.numerics.pointers import address
+
         low_pass = reception.low_pass
         self._state = state
         self._filtered = low_pass is not None
@@ -116,14 +85,20 @@ class StateFeedbackPipe(FeedbackPipe):
             StateField(field, dofs, values, passed=passed, low_pass=low_pass(len(dofs)) if low_pass else None)
             for field, values, passed in zip(fields, self.values, self._passed, strict=True)
         )
-        self._writer = _StateWriter(state, [each.interface for each in self.state_fields], dofs)
+        interfaces = [each.interface for each in self.state_fields]
+        self._scatter = scatter
+        self._dofs = dofs
+        self._all = np.arange(len(dofs))
+        # arrays of a State stay where they are
+        self._live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
+        self._touched = _subsets(interfaces)
         self.part: np.ndarray | None = None
         self._precedence = Precedence(len(dofs)) if reception.measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
         self.history: History | None = None
         if reception.history:
-            self.history = History([each.interface for each in self.state_fields], dofs, reception.history)
+            self.history = History(interfaces, dofs, reception.history)
             state.histories.append(self.history)
 
     @property
@@ -169,7 +144,8 @@ class StateFeedbackPipe(FeedbackPipe):
                     status = OLD
                 if status is NEW:
                     if self.part is sole.part:
-                        sole.note(reader.arrival)
+                        sole.arrival = reader.arrival
+                        sole.strikes = 0
                     else:
                         precedence.note(sole.name, self.part, reader.arrival)
                     self._write_fields()
@@ -192,7 +168,9 @@ class StateFeedbackPipe(FeedbackPipe):
         if self._filtering:
             for state_field in self.state_fields:
                 state_field.filter()
-            self._writer.write(self._passed, self._ever)
+            part = self._all if self._ever is None else self._ever
+            changes = self._scatter(self._passed, part, self._dofs, self._live)
+            self._state.touch(*self._touched[changes])
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`; resets the filters as well."""
@@ -277,7 +255,9 @@ class StateFeedbackPipe(FeedbackPipe):
             return NONE if self.reader.message is None else OLD
         if self._watch is not None and self._watch.owners:
             self.arrival = self._watch.stalest.arrival
-        self.part = None if any(part is None for part in parts) else np.unique(np.concatenate(parts))
+        self.part = parts[0]
+        if len(parts) > 1:
+            self.part = None if any(part is None for part in parts) else np.unique(np.concatenate(parts))
         return NEW
 
     def _counts(self, publisher: Publisher) -> bool:
@@ -308,8 +288,13 @@ class StateFeedbackPipe(FeedbackPipe):
     def _write_fields(self) -> None:
         """Write the newest values to the State, or pass them to the filters."""
         if not self._filtered:
-            if self._writer.write(self.values, self.part):
+            part = self._all if self.part is None else self.part
+            changes = self._scatter(self.values, part, self._dofs, self._live)
+            if changes:
                 self.changed = self.arrival
+                versions = self._state.versions
+                for interface in self._touched[changes]:
+                    versions[interface] += 1
             return
         for state_field in self.state_fields:
             state_field.accept(self.part)

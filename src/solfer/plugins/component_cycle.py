@@ -1,7 +1,5 @@
 """A component's part of a cycle of its plugin."""
 
-from collections.abc import Callable, Sequence
-
 from solfer.components import Component
 from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.measured_guard import MeasuredGuard
@@ -10,20 +8,18 @@ from solfer.recording.log import Logger
 
 
 class ComponentCycle:
-    """Runs a component: its dynamics and its time, jumps of its base, its failures, what it declares and logs.
+    """Runs a component: its dynamics and its time, jumps of its base, its failures, and what it logs.
 
     Args:
         component: The component.
         robot_time: Its time.
         jumps: Finds jumps of the base; None: it has no references in the world.
         guard: Keeps what it does to its Robot, if it fails, away from others; None: it is not shared.
-        publish: Publish what it declares.
 
     Attributes:
         robot_time: See above.
         jumps: See above.
         dynamics: What it requests of the Robot's dynamics; None: nothing.
-        publish: See above.
         logger: Where the component logs its cycles; None: it logs nothing by itself.
     """
 
@@ -33,13 +29,11 @@ class ComponentCycle:
         robot_time: RobotTime,
         jumps: BaseJumps | None,
         guard: MeasuredGuard | None,
-        publish: Sequence[Callable[[], None]],
     ):
         self.robot_time = robot_time
         self._component = component
         self.jumps = jumps
         self._guard = guard
-        self.publish = tuple(publish)
         # made before the first cycle: importing its modules takes a while
         self.dynamics = component.model.dynamics if component.dynamics else None
         self.logger: Logger | None = None

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from solfer.config import FeedbackRecord
 from solfer.pipes import FeedbackPipe
-from solfer.transport.endpoints import NEW
+from solfer.transport.endpoints import NEW, MessageStatus
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
@@ -66,6 +66,10 @@ def next_state(state: FeedbackState, observed: FeedbackState | None) -> Feedback
     return WAITING if state is REPLACED else state
 
 
+REFUSAL_TIMEOUT = 0.3
+"""Time after which a feedback is wrong whose messages all contradict others [s]."""
+
+
 class NewestChange:
     """The newest change of a feedback's numbers.
 
@@ -99,6 +103,9 @@ class FeedbackTimeout:
         state: What the feedback is at present.
         timeout: See above.
         timeouts: How often it timed out.
+        count: Strikes in a row.
+        fresh: Age up to which a message is neither late nor refused [s].
+        handovers: Those of the feedback that it knows of.
         unsettled: Why no plugin may start with the received messages; empty: it may, or this was not checked yet.
     """
 
@@ -111,9 +118,10 @@ class FeedbackTimeout:
         self.unsettled = ""
         self._action = action
         self._strikes = strikes
-        self._count = 0
+        self.count = 0
+        self.fresh = min(timeout, REFUSAL_TIMEOUT)
         self._change = NewestChange()
-        self._handovers = feedback.handovers
+        self.handovers = feedback.handovers
         feedback.set_timeout(timeout, strikes)
 
     @classmethod
@@ -141,17 +149,17 @@ class FeedbackTimeout:
         """What the plugin does at a timeout: one of TIMEOUT_ACTIONS."""
         return "hold" if self.state is DISPUTED and self._action == "keep" else self._action
 
-    def read(self, now: float, distance: float = 0.0) -> bool:
-        """Read the newest message at the time `now` [s]; return whether nothing is missing or late.
+    def judge(self, status: MessageStatus, now: float, distance: float) -> bool:
+        """Judge what was read at the time `now` [s]; return whether nothing is missing or late.
 
         If not, `serves` reports what that means.
 
         Args:
+            status: What `feedback.run` has returned.
             now: The time [s].
             distance: How far joints have been commanded to move so far [rad, m].
         """
         feedback = self.feedback
-        status = feedback.run()
         age = now - feedback.arrival
         change = self._change
         if feedback.changed != change.arrival:
@@ -159,11 +167,11 @@ class FeedbackTimeout:
             change.stamp = feedback.stamp
             change.distance = distance
         observed = None
-        if feedback.handovers != self._handovers:  # another publisher measures another start
-            self._handovers = feedback.handovers
+        if feedback.handovers != self.handovers:  # another publisher measures another start
+            self.handovers = feedback.handovers
             self.restart()
             observed = REPLACED
-        elif age > 0.3 and feedback.warnings.contradicts:  # [s] each message is refused: it is wrong, not late
+        elif age > REFUSAL_TIMEOUT and feedback.warnings.contradicts:  # each message is refused: it is wrong, not late
             # what it measured last is not kept, whatever its `on_timeout` says
             observed = DISPUTED
         elif age > self.timeout:
@@ -177,10 +185,10 @@ class FeedbackTimeout:
             observed = FROZEN
         elif status is NEW:
             observed = LIVE
-            self._count = 0
+            self.count = 0
         if observed in TIMED_OUT:
-            self._count += 1
-            if self._count < self._strikes:
+            self.count += 1
+            if self.count < self._strikes:
                 observed = None
         state = self.state
         if observed is not state and (observed is not None or state is REPLACED):
@@ -209,7 +217,7 @@ class FeedbackTimeout:
         """Begin again: discard all that was received so far."""
         self.feedback.restart()
         self.state = WAITING
-        self._count = 0
+        self.count = 0
 
     @property
     def lacks(self) -> str:
@@ -299,10 +307,28 @@ class FeedbackTimeouts:
         self.complete = False
 
     def read(self, now: float, distance: float = 0.0) -> None:
-        """Read the newest messages, each pipe into its State or the component's input; see `FeedbackTimeout.read`."""
+        """Read the newest messages at the time `now` [s], each pipe into its State or the component's input.
+
+        Args:
+            now: The time [s].
+            distance: How far joints have been commanded to move so far [rad, m].
+        """
         complete = True
         for each in self._timeouts:
-            if not each.read(now, distance):
+            feedback = each.feedback
+            status = feedback.run()
+            arrival = feedback.arrival
+            if (
+                # one that goes on, whose newest message has changed something, which is nearly every one
+                each.state is LIVE
+                and now - arrival <= each.fresh
+                and (feedback.changed == arrival or feedback.changed == math.inf)
+                and feedback.received
+                and not each.count
+                and feedback.handovers == each.handovers
+            ):
+                continue
+            if not each.judge(status, now, distance):
                 complete = False
         self.complete = complete
 

@@ -46,6 +46,7 @@ class JointClaim:
         is_taken: Whether that is because others, or the lower level itself, have moved the joints since.
         restarted: Whether that is because the robot was put into another state: all plugins have to begin again.
         refused: How often the lower level reported that it refuses our commands.
+        pending: Reports whether refusals wait for `lost`.
         note: Called with kind and text of the event when the joints become ours, are lost, or are given back.
     """
 
@@ -67,6 +68,7 @@ class JointClaim:
         self._next = -math.inf
         self._settled = -math.inf
         self._refusals = middleware.queue(REFUSALS_TOPIC, REFUSALS)
+        self.pending = middleware.pending([self._refusals])
         self.reason = ""
         self.restarted = False
         self.is_taken = False

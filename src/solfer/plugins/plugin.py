@@ -25,7 +25,7 @@ from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET
 from solfer.robot import Robot
 from solfer.transport import Inbox, Middleware
-from solfer.transport.declared import Bindings
+from solfer.transport.declared import Publications
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 from solfer.transport.plugin_state import PluginState
@@ -64,7 +64,7 @@ class PluginParts:
         limits: When its loop is overloaded; None: the defaults.
         jumps: Finds jumps of the base; None: its component has no references in the world.
         guard: Keeps what the component does to its Robot, if it fails, away from others; None: it is not shared.
-        publish: Publish what the component declares, after each of its cycles.
+        publications: What the component declares to publish after its cycles; None: nothing.
         documents: Returns what a recording of it shall have besides numbers.
         requests: Notes what happens, and what others ask of the component; None: it declares nothing.
         tuning: Changes its parameters; None: it has none that are live.
@@ -83,7 +83,7 @@ class PluginParts:
     limits: OverloadRecord | None = None
     jumps: BaseJumps | None = None
     guard: MeasuredGuard | None = None
-    publish: Bindings = ()
+    publications: Publications | None = None
     documents: Callable[[], RunDocuments] = RunDocuments
     requests: RequestNotes | None = None
     tuning: Tuning | None = None
@@ -136,9 +136,8 @@ class Plugin:
         )
         self._readiness.taken = parts.outputs.forget
         self.timing = CycleTiming()
-        self._work = ComponentCycle(
-            component, RobotTime(self.feedbacks, period), parts.jumps, guard=parts.guard, publish=parts.publish
-        )
+        self._work = ComponentCycle(component, RobotTime(self.feedbacks, period), parts.jumps, guard=parts.guard)
+        self._publications = parts.publications or Publications()
         self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._wait()
 
@@ -179,17 +178,22 @@ class Plugin:
         clock = timing.nanoseconds
         times[:] = NO_TIMES
         mark = clock()
-        gap = self._readiness.stall(now)
-        if gap and (self.life is STARTING or self.life is RUNNING):
+        readiness = self._readiness
+        gap = now - readiness.newest
+        readiness.newest = now
+        if gap > readiness.longest and (self.life is STARTING or self.life is RUNNING):
+            readiness.stand_still(gap)
             self.overload.advance(gap)
             self._awake(now)
-        self.inbox.apply()
+        inbox = self.inbox
+        if inbox.waits or (inbox.sources and (inbox.refusal or inbox.pending())):
+            inbox.apply()
         times[CALLS] = -mark + (mark := clock())
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._readiness.feedbacks.read(now, self.outputs.joints.distance)
-        verdict = self._readiness.decide(now, life is RUNNING)
+        readiness.feedbacks.read(now, self.outputs.joints.distance)
+        verdict = readiness.decide(now, life is RUNNING)
         times[READ] = -mark + (mark := clock())
         if verdict is not WORK:
             self._obey(verdict, now)
@@ -208,7 +212,12 @@ class Plugin:
         component.let_pass(passed, robot_time.lost)
         component.pace = self.overload.advance(passed)
         following = self.outputs.following
-        if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
+        if (
+            following is not None
+            and life is RUNNING
+            and following.watched
+            and (fault := following.check(component.time_step))
+        ):
             if not self.peers.warning():
                 raise fault
             following.start()  # no node receives its commands, which the health says
@@ -225,8 +234,10 @@ class Plugin:
         self.outputs.collect()
         times[GATE] = -mark + (mark := clock())
         self.outputs.send(self._now())
-        for publish in work.publish:
-            publish()
+        publications = self._publications
+        publications.left -= 1
+        if not publications.left:
+            publications.run()
         times[WRITE] = -mark + (mark := clock())
         if work.logger is not None:
             work.log(now)

@@ -52,6 +52,8 @@ class Readiness:
         feedbacks: Its feedbacks with their timeouts.
         taken: Called in each cycle while others have the joints.
         lacks: What the plugin waits for.
+        newest: When its newest cycle began; infinity: it is not known [s]. Its plugin keeps it.
+        longest: Time between two cycles from which on its loop stood still [s].
     """
 
     def __init__(
@@ -72,12 +74,12 @@ class Readiness:
         self._rewinds = middleware.rewinds
         # after less a component goes on, by the time that has passed; meanwhile the lower level carries out its last
         # commands, for its lease on the joints is longer
-        self._longest = period + min(stall or max(0.2, 5 * period), self.feedbacks.shortest_timeout)
+        self.longest = period + min(stall or max(0.2, 5 * period), self.feedbacks.shortest_timeout)
         self._past = ""
         self._logged = ""
         self._earliest = -math.inf
         self._latest: float | None = None
-        self._newest = math.inf
+        self.newest = math.inf
         self.lacks = self._missing()
         self._level = logging.DEBUG
 
@@ -86,14 +88,9 @@ class Readiness:
         """Whether the joints were released, and the lower level has confirmed it."""
         return self._claim is None or self._claim.released
 
-    def stall(self, now: float) -> float:
-        """Measure how long the loop stood still before this cycle, which begins `now` [s]; 0: it did not [s]."""
-        gap = now - self._newest
-        self._newest = now
-        if gap <= self._longest:
-            return 0.0
+    def stand_still(self, gap: float) -> None:
+        """Note that the loop stood still for a time [s], before a plugin begins again."""
         self._past = f"after its own loop stood still for {gap:.3f} s"
-        return gap
 
     def decide(self, now: float, running: bool) -> CycleVerdict:
         """Decide by the messages that were read `now` [s] what a plugin that is `running` or not does in this cycle.
@@ -119,7 +116,10 @@ class Readiness:
             return self._wait_for_joints(claim, running)
         if verdict is not WORK:
             return verdict
-        ours = not claim.lost() if running else claim.granted()
+        if running:
+            ours = not (claim.lost() if claim.pending() else claim.reason)
+        else:
+            ours = claim.granted()
         if claim.is_taken:
             self.taken()
         return verdict if ours else self._wait_for_joints(claim, running)
@@ -128,7 +128,7 @@ class Readiness:
         """Mark the plugin as running: later waits are unlimited, and the duration of its start is not a stall."""
         self._logged = ""
         self._latest = math.inf
-        self._newest = self._middleware.now()
+        self.newest = self._middleware.now()
 
     def give_back(self) -> None:
         """Release or lapse the claim, or damp, after the joints were brought to rest."""
@@ -160,7 +160,7 @@ class Readiness:
         """Begin again, as before the first cycle."""
         self.feedbacks.restart()
         self._latest = None
-        self._newest = math.inf
+        self.newest = math.inf
         self.lacks = self._missing()
         self._level = logging.DEBUG
 

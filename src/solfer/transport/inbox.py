@@ -21,6 +21,7 @@ class Inbox:
     Attributes:
         refused: Calls refused because too many others were waiting.
         most: The largest number of calls, urgent ones left out, that a cycle has run.
+        waits: Whether a call may wait; a loop that finds nothing here, nor in `sources`, has nothing to `apply`.
         sources: Called with the `refusal` before the queued calls: they receive what comes in by topics.
         pending: Returns whether anything may wait in these topics; where nothing does, the sources are called only
             where there is a `refusal`.
@@ -30,6 +31,7 @@ class Inbox:
         self.refusal = refusal
         self.refused = 0
         self.most = 0
+        self.waits = False
         self._ration = ration
         self._waiting = waiting
         self._calls: deque[_Call] = deque()
@@ -60,6 +62,7 @@ class Inbox:
             BaseException: A call raised a request to exit, such as SystemExit. Its caller gets it, too; the calls
                 behind it stay queued.
         """
+        self.waits = False  # before they are looked for: another thread may submit one meanwhile
         if self.sources and (self.refusal or self.pending()):
             for receive in self.sources:
                 receive(self.refusal)
@@ -75,6 +78,8 @@ class Inbox:
                 break
         if count > self.most and not self.refusal:
             self.most = count
+        if self._calls or self._single:
+            self.waits = True
 
     def _queue(self, calls: "deque[_Call]", call: Callable[[], Any]) -> "Future[Any]":
         future: Future[Any] = Future()
@@ -84,6 +89,7 @@ class Inbox:
             future.set_exception(error)
         else:
             calls.append((call, future))
+            self.waits = True
         return future
 
     def _carry_out(self, call: Callable[[], Any], future: "Future[Any]") -> None:

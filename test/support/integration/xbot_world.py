@@ -76,7 +76,7 @@ class XbotWorld(World):
             self.node("xbot"),
             EmergencyStopLatch(self._folder),
             rules=rules or ExecutorRules(),
-            polls=[members.sharing.turns.next, *(node.poll for node in nodes.values())],
+            polls=[members.sharing.turns.next, XbotMiddleware.poll_all(nodes.values())],
             requires=members.requires,
             telemetry=ExecutorTelemetry(nanoseconds=lambda: round(1e9 * self.bus.time)),
         )

@@ -108,15 +108,14 @@ class CountingNode:
 
     def __init__(self, middleware):
         self.counter, self.inbox = Counter(), Inbox()
-        self._publish = bind("abacus", (self.counter.action(),), middleware, self.inbox)
+        self._publications = bind("abacus", (self.counter.action(),), middleware, self.inbox, rate=100.0)
 
     def cycle(self):
         """One cycle, as a plugin has it."""
         self.inbox.apply()
         if not self.inbox.refusal:
             self.counter.count += 1
-            for publish in self._publish:
-                publish()
+            self._publications.run()
 
 
 def named(declared, name):

@@ -7,7 +7,7 @@ from solfer.components import Component
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.plugins import Plugin, PluginParts
-from solfer.plugins.feedback_timeout import FeedbackTimeout
+from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.transport import Inbox, JointMessage
@@ -63,7 +63,7 @@ class Stage:
 
     def served(self, later=0.0):
         """Read the topic `joints` as a cycle does so much `later`; return whether a running plugin can work with it."""
-        self.watch.read(self.bus.time + later)
+        reads(self.watch, self.bus.time + later)
         return self.watch.serves(True)
 
     def cycles(self, count, speaks=False):
@@ -74,3 +74,10 @@ class Stage:
                 self.speak(topic="desired")
             self.plugin.cycle()
             self.bus.run_until(self.bus.time + PERIOD)
+
+
+def reads(watch, now, distance=0.0):
+    """Read a feedback with its timeout at a time [s]; return whether nothing is missing or late."""
+    timeouts = FeedbackTimeouts([watch])
+    timeouts.read(now, distance)
+    return timeouts.complete

@@ -146,7 +146,7 @@ def test_a_cycle_keeps_no_memory(robot):
 
 
 def test_each_contact_has_a_topic(robot):
-    """The wrench is in the axes of its link, at the link's origin, and each topic keeps to its rate of 50 Hz."""
+    """The wrench is in the axes of its link, at the link's origin."""
     robot.state.position[3:5] = 0.1, -0.2
     robot.state.torque[:] = carried(robot, np.tile((5.0, -8.0, 230.0), (4, 1)))
     made = component(robot, method="weighted")
@@ -159,11 +159,7 @@ def test_each_contact_has_a_topic(robot):
     force, torque = ([sent["wrench"][what][axis] for axis in "xyz"] for what in ("force", "torque"))
     np.testing.assert_allclose(turn @ force, contact.force)  # up: what the ground does to the robot
     np.testing.assert_allclose(turn @ torque, np.cross(arm, contact.force), atol=1e-12)
-    published = 0
-    for _ in range(40):
-        cycle(made)
-        published += topics["front_left_leg"].collect() is not None
-    assert published == 10  # 50 of 200 cycles a second
+    assert {each.rate for each in topics.values()} == {50.0}
 
 
 def test_what_the_ground_does_not_explain_is_a_push(robot):
@@ -220,12 +216,10 @@ def test_forces_that_ground_cannot_have(robot, caplog, *, force, others, frictio
     for contact, upward in zip(made.contacts, (None, others, others, others), strict=True):
         contact.wrench[:3] = force if upward is None else (0.0, 0.0, upward)
     made.law.update = lambda *_: None
-    statuses = []
-    for _ in range(400):
-        cycle(made)
-        report = reports["/diagnostics"]()
-        statuses += [] if report is None else report.status
-    first, second = statuses
+    cycle(made, 200)
+    (first,) = reports["/diagnostics"]().status
+    cycle(made, 200)
+    (second,) = reports["/diagnostics"]().status
     assert first == second
     assert second.message.startswith(summary) and second.name == "ground_forces: contacts"
     assert second.level == int(not summary.startswith("all"))

@@ -288,7 +288,7 @@ def test_what_cannot_be_kept_is_named_and_held(caplog):
     assert component.is_holding and np.array_equal(command.position, start) and not command.velocity.any()
     assert "friction of rear_right_leg contradicts the others; it holds" in caplog.text
     assert np.abs(command.torque - 3.0)[6:].max() < 5.0  # it passes to the carrying torques
-    report = component._due_report()
+    report = component.topics()[-1].collect()
     assert report.status[0].level == 1 and "rear_right_leg" in report.status[0].message
 
 

@@ -47,7 +47,7 @@ class FollowingClient:
         self.inbox, node = Inbox(), MemoryMiddleware(self.bus, "node")
         self.component.clock = node.now
         declared = (*self.component.topics(), *self.component.actions())
-        self._publish = bind("joint_states", declared, node, self.inbox)
+        self._publications = bind("joint_states", declared, node, self.inbox, rate=RATE)
         outside = MemoryMiddleware(self.bus, "client")
         name = "joint_states/follow_joint_trajectory"
         self.client = ActionClient(outside, name, FOLLOW, FollowGoal, FollowFeedback, result=FollowResult)
@@ -66,8 +66,7 @@ class FollowingClient:
             self.inbox.apply()
             self.component.update()
             self.component.send()
-            for publish in self._publish:
-                publish()
+            self._publications.run()
             self.client.poll()
             self.rows.append(command.velocity.copy())
             if self.follows:

@@ -36,7 +36,7 @@ class Working:
         node, self.component, self.inbox = MemoryMiddleware(bus, name), component, Inbox()
         component.set_rate(RATE)
         component.init()
-        bind(name, (*component.services(), *component.topics()), node, self.inbox)
+        bind(name, (*component.services(), *component.topics()), node, self.inbox, rate=RATE)
         self._states = node.writer("joint_states", "sensor_msgs/JointState")
         bus.every(PERIOD, self.cycle)
 

@@ -23,11 +23,14 @@ def leaps():
 
 def check(leaps, time, position, velocity=(0.0, 0.0), part=ALL, stamp=0.0):
     """Check a message; return what is wrong with it, empty if nothing is."""
-    try:
-        leaps.check(np.array(position, float), np.array(velocity, float), part, time, stamp)
-    except PipeError as error:
-        return error.what
-    return ""
+    position = np.array(position, float)
+    velocity = np.array(velocity, float)
+    wrong = leaps.find(position, velocity, part, time, stamp)
+    if wrong < 0:
+        return ""
+    with pytest.raises(PipeError) as error:
+        leaps.refuse(wrong, position, velocity, time)
+    return error.value.what
 
 
 def test_honest_joints_are_accepted(leaps):

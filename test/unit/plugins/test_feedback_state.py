@@ -4,6 +4,7 @@ import math
 from types import SimpleNamespace
 
 import pytest
+from support.unit.watch import reads
 
 from solfer.plugins.feedback_timeout import FeedbackState, FeedbackTimeout
 from solfer.transport.endpoints import MessageStatus
@@ -112,7 +113,7 @@ class ReadFeedback:
 
     def _read(self):
         self.now += CYCLE
-        return self.feedback.read(self.now - CYCLE, self.distance)
+        return reads(self.feedback, self.now - CYCLE, self.distance)
 
 
 EVENTS = {

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, received
-from support.unit.watch import PERIOD, Stage
+from support.unit.watch import PERIOD, Stage, reads
 
 from solfer.config.kinds.table import record_of
 from solfer.config.records.pipes import FeedbackRecord
@@ -335,18 +335,18 @@ def test_numbers_that_stay_while_joints_are_to_move_are_silence(caplog, way, pau
     watch = FeedbackTimeout(feedback, 0.2, 3, "hold")
     for cycle in range(100):
         feedback.arrival = feedback.changed = feedback.stamp = cycle * PERIOD
-        assert watch.read(feedback.arrival, 0.01 * cycle)
+        assert reads(watch, feedback.arrival, 0.01 * cycle)
     stays = feedback.changed
     read = []
     for cycle in range(1, 60):
         feedback.arrival = stays + cycle * PERIOD
         feedback.stamp = stays if pauses else feedback.arrival
-        read.append(watch.read(feedback.arrival, 0.99 + way * min(cycle / 10.0, 1.0)))
+        read.append(reads(watch, feedback.arrival, 0.99 + way * min(cycle / 10.0, 1.0)))
     assert read.count(False) in ((27, 28) if times_out else (0,))
     assert watch.timed_out is times_out and watch.serves(True) is not times_out
     assert ("no number has changed, though joints were commanded to move, for 0.1" in caplog.text) is times_out
     feedback.arrival = feedback.changed = feedback.stamp = feedback.arrival + PERIOD
-    assert watch.read(feedback.arrival, 2.0) and not watch.timed_out
+    assert reads(watch, feedback.arrival, 2.0) and not watch.timed_out
 
 
 def test_a_feedback_whose_changes_are_not_known_does_not_freeze():
@@ -356,7 +356,7 @@ def test_a_feedback_whose_changes_are_not_known_does_not_freeze():
     watch = FeedbackTimeout(feedback, 0.2, 3, "hold")
     for cycle in range(100):
         feedback.arrival = feedback.stamp = 1000.0 + cycle * PERIOD
-        assert watch.read(feedback.arrival, 0.1 * cycle)
+        assert reads(watch, feedback.arrival, 0.1 * cycle)
 
 
 def test_refusals_are_in_the_health_and_in_what_a_plugin_waits_for():

@@ -6,7 +6,8 @@ import pytest
 from support.unit.watch import PERIOD, Stage
 
 from solfer.plugins import PluginState
-from solfer.plugins.timing.cycle_timing import STAGES, PassedPeriods
+from solfer.plugins.timing.cycle_timing import STAGES
+from solfer.plugins.timing.robot_time import RobotTime
 
 
 def test_each_stage_has_its_time():
@@ -41,9 +42,9 @@ def test_a_closed_plugin_stays_closed():
     ],
 )
 def test_periods_that_were_left_out_count(starts, passed):
-    periods = PassedPeriods(0.005)
-    periods.restart(10.0 + 0.005 * starts[0])
-    assert tuple(periods.count(10.0 + 0.005 * start) for start in starts[1:]) == passed
+    time = RobotTime((), 0.005)
+    time.restart(10.0 + 0.005 * starts[0])
+    assert tuple(round(time.advance(10.0 + 0.005 * start) / 0.005) for start in starts[1:]) == passed
 
 
 def test_a_component_knows_how_long_it_paused():

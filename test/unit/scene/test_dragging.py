@@ -35,7 +35,7 @@ class Hands:
         self.component.set_rate(1.0 / PERIOD)
         self.component.init()
         node, self.inbox = MemoryMiddleware(self.bus, "hands"), Inbox()
-        self.published = bind("hands", self.component.topics(), node, self.inbox)
+        self.published = bind("hands", self.component.topics(), node, self.inbox, rate=1.0 / PERIOD)
         self.states = node.writer("joint_states", "sensor_msgs/JointState")
         viewer = MemoryMiddleware(self.bus, "scene")
         self.scene = LiveScene(Robot.load(self.robot.description.text), viewer)
@@ -47,8 +47,9 @@ class Hands:
         self.inbox.apply()
         self.component.update()
         self.component.send()
-        for publish in self.published:
-            publish()
+        self.published.left -= 1
+        if not self.published.left:
+            self.published.run()
         self.states.write(JointMessage(tuple(self.robot.dofs), position=self.robot.command.position.copy()))
 
     def run(self, duration):

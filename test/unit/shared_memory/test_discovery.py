@@ -18,7 +18,7 @@ def test_what_is_declared_is_found():
     wire = XbotWire()
     node, base = wire.node("counter"), wire.node("base")
     CountingNode(node)
-    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, print),), base, Inbox())
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, print),), base, Inbox(), rate=100.0)
     base.queue("pipe", "nav_msgs/Odometry")
     namespace = Namespace("contract", wire.folder)
     found = {each.topic: each.message for each in declared_topics(namespace, ("known",))}

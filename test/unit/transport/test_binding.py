@@ -14,7 +14,7 @@ def read(kind, value=None, handler=None):
     got = []
     bus = Bus({} if value is None else {"/arm/gain": value})
     parameter = Parameter("gain", kind, handler or got.append)
-    bind("arm", (parameter,), MemoryMiddleware(bus), Inbox())
+    bind("arm", (parameter,), MemoryMiddleware(bus), Inbox(), rate=100.0)
     return got
 
 

@@ -1,5 +1,7 @@
 """Topics that a component declares, in memory and in shared memory, with and without a header."""
 
+from functools import partial
+
 import pytest
 from support.unit.declarations import Header, Twist, TwistStamped, Vector
 from support.unit.wires import MemoryWire, XbotWire
@@ -11,6 +13,7 @@ from solfer.interfaces.geometry import Header as Stamp
 from solfer.interfaces.geometry import Vector as Coordinates
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
+from solfer.transport.declared.publications import Publications
 from solfer.transport.declared.topics import SoleSender
 
 KINDS = {
@@ -44,12 +47,12 @@ def wire(request):
 def test_each_message_comes_in_its_order(wire, interface):
     (first, *others), kind = VALUES[interface], KINDS[interface]
     got, inbox, waiting = [], Inbox(), [first, None, *others]
-    bind("base", (TopicIn("twist", interface, kind, got.append),), wire.middleware, inbox)
+    bind("base", (TopicIn("twist", interface, kind, got.append),), wire.middleware, inbox, rate=100.0)
     sender = wire.node("sender")
     topic = TopicOut("/base/twist", interface, kind, lambda: waiting.pop(0))
-    (publish,) = bind("stick", (topic,), sender, Inbox())
+    publications = bind("stick", (topic,), sender, Inbox(), rate=100.0)
     while waiting:
-        publish()
+        publications.run()
     inbox.apply()
     assert got == [first, *others]
 
@@ -58,15 +61,15 @@ def test_a_stream_has_one_sender(caplog):
     """On whichever of its topics: the first counts until it is silent, and the log names both."""
     wire, inbox, got = MemoryWire(), Inbox(), {"left": [], "right": []}
     topics = [TopicIn(name, "geometry_msgs/Twist", Twist, got[name].append, stream="speed") for name in got]
-    bind("base", topics, wire.middleware, inbox)
+    bind("base", topics, wire.middleware, inbox, rate=100.0)
     publish = {}
     for name, side in (("stick", "left"), ("other", "right")):
         out = TopicOut(f"/base/{side}", "geometry_msgs/Twist", Twist, lambda: TWIST)
-        (publish[name],) = bind(name, (out,), wire.node(name), Inbox())
+        publish[name] = bind(name, (out,), wire.node(name), Inbox(), rate=100.0)
 
     def send(*senders):
         for sender in senders:
-            publish[sender]()
+            publish[sender].run()
         inbox.apply()
         return len(got["left"]), len(got["right"])
 
@@ -87,14 +90,20 @@ def test_each_sender_has_a_clock_of_its_own(one, two, caplog):
     """Both send at the same time, and both count; a stamp that goes back does not, unless they stay back for 0.2 s."""
     wire, inbox, got, waiting = MemoryWire(), Inbox(), [], []
     interface = "geometry_msgs/TwistStamped"
-    bind("base", (TopicIn("twist", interface, TwistStamped, got.append, ordered=True),), wire.middleware, inbox)
+    bind(
+        "base",
+        (TopicIn("twist", interface, TwistStamped, got.append, ordered=True),),
+        wire.middleware,
+        inbox,
+        rate=100.0,
+    )
     out = TopicOut("/base/twist", interface, TwistStamped, waiting.pop)
-    publish = {name: bind(name, (out,), wire.node(name), Inbox())[0] for name in ("stick", "other")}
+    publish = {name: bind(name, (out,), wire.node(name), Inbox(), rate=100.0) for name in ("stick", "other")}
 
     def counts(sender, stamp):
         before = len(got)
         waiting.append(TwistStamped(Header(stamp, "world")))
-        publish[sender]()
+        publish[sender].run()
         inbox.apply()
         wire.pass_time(0.03)
         return len(got) > before
@@ -110,15 +119,15 @@ def test_each_sender_has_a_clock_of_its_own(one, two, caplog):
 
 def test_nothing_is_handed_over_while_refused(wire):
     got, inbox = [], Inbox("it waits")
-    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, got.append),), wire.middleware, inbox)
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, got.append),), wire.middleware, inbox, rate=100.0)
     topic = TopicOut("/base/twist", "geometry_msgs/Twist", Twist, lambda: TWIST)
-    (publish,) = bind("stick", (topic,), wire.node("sender"), Inbox())
-    publish()
+    publications = bind("stick", (topic,), wire.node("sender"), Inbox(), rate=100.0)
+    publications.run()
     inbox.apply()
     inbox.refusal = ""
     inbox.apply()
     assert not got
-    publish()
+    publications.run()
     inbox.apply()
     assert got == [TWIST]
 
@@ -128,36 +137,52 @@ def test_a_handler_that_refuses_is_logged(wire, caplog):
         raise ComponentError("a twist of the wrong kind", expected="another one")
 
     inbox = Inbox()
-    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, refuse),), wire.middleware, inbox)
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, refuse),), wire.middleware, inbox, rate=100.0)
     topic = TopicOut("/base/twist", "geometry_msgs/Twist", Twist, lambda: TWIST)
-    (publish,) = bind("stick", (topic,), wire.node("sender"), Inbox())
-    publish()
+    publications = bind("stick", (topic,), wire.node("sender"), Inbox(), rate=100.0)
+    publications.run()
     inbox.apply()
     assert "base/twist" in caplog.text and "of sender" in caplog.text and "wrong kind" in caplog.text
 
 
 def test_another_class_than_declared_is_refused():
     topic = TopicOut("out", "geometry_msgs/Twist", Twist, lambda: "fast")
-    (publish,) = bind("stick", (topic,), MemoryWire().middleware, Inbox())
+    publications = bind("stick", (topic,), MemoryWire().middleware, Inbox(), rate=100.0)
     with pytest.raises(ComponentError, match="a str for topic stick/out"):
-        publish()
+        publications.run()
 
 
 def test_messages_of_pipes_alone_cannot_be_declared():
     topic = TopicIn("base", "sensor_msgs/JointState", Twist, print)
     with pytest.raises(MiddlewareError, match="JointState cannot be declared"):
-        bind("stick", (topic,), MemoryWire().middleware, Inbox())
+        bind("stick", (topic,), MemoryWire().middleware, Inbox(), rate=100.0)
 
 
 def test_a_topic_has_one_interface():
     wire = MemoryWire()
-    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, print),), wire.middleware, Inbox())
+    bind("base", (TopicIn("twist", "geometry_msgs/Twist", Twist, print),), wire.middleware, Inbox(), rate=100.0)
     other = TopicOut("/base/twist", "geometry_msgs/TwistStamped", TwistStamped, print)
     with pytest.raises(MiddlewareError, match="carries geometry_msgs/Twist"):
-        bind("stick", (other,), wire.middleware, Inbox())
+        bind("stick", (other,), wire.middleware, Inbox(), rate=100.0)
 
 
 def test_a_name_is_declared_once():
     topics = [TopicIn("twist", "geometry_msgs/Twist", Twist, print)] * 2
     with pytest.raises(ComponentError, match="'base/twist' is declared twice"):
-        bind("base", topics, MemoryWire().middleware, Inbox())
+        bind("base", topics, MemoryWire().middleware, Inbox(), rate=100.0)
+
+
+def test_topics_with_a_rate_share_no_cycle():
+    """Of three topics at 50 Hz in a loop of 200 Hz each is published every fourth cycle, one that has none in each."""
+    publications = Publications()
+    published = []
+    for topic, cycles in (("first", 4), ("each", 1), ("second", 4), ("third", 4)):
+        publications.add(partial(published.append, topic), cycles)
+    for cycle in range(8):
+        published.append(cycle)
+        publications.left -= 1
+        if not publications.left:
+            publications.run()
+    turn = ["first", "each", "each", "second", "each", "third", "each"]
+    assert [each for each in published if isinstance(each, str)] == turn * 2
+    assert published[:4] == [0, "first", "each", 1]

@@ -56,39 +56,25 @@ class TaskProgress:
     """Whether a task comes nearer to a reference that is at rest, or has come to rest away from it.
 
     Args:
-        period: Period of the control cycle [s].
         gain: Gain of the task [1/s].
 
     Attributes:
         gain: See above.
-        period: See above.
         stays: Whether the distance does not change any more.
         is_unreachable: Whether the task has come to rest away from its reference.
     """
 
-    def __init__(self, period: float, gain: float):
+    def __init__(self, gain: float):
         self.gain = gain
-        self.period = period
         self.stays = False
         self.is_unreachable = False
         self._is_reported = False
-        self._checks = round(CHECK_PERIOD / period)
         self._creep = CREEP_RATIO
         self._last = math.inf
-        self._cycles = 0
         self._looks = 0
 
-    @property
-    def step(self) -> float:
-        """Share of an error that a cycle corrects."""
-        return self.gain * self.period
-
     def look(self, distance: float) -> None:
-        """Look whether a distance from the reference has become less; called in each cycle."""
-        self._cycles += 1
-        if self._cycles < self._checks:
-            return
-        self._cycles = 0
+        """Look whether a distance from the reference has become less; called every CHECK_PERIOD."""
         is_creeping = abs(distance - self._last) < self._creep * self.gain * distance * CHECK_PERIOD
         self._creep = min(self._creep * CREEP_GROWTH, 1.0)
         self._looks = self._looks + 1 if is_creeping else 0
@@ -105,7 +91,6 @@ class TaskProgress:
     def look_again(self) -> None:
         """Look from the beginning."""
         self._last = math.inf
-        self._cycles = 0
         self._looks = 0
         self.stays = False
 

@@ -35,13 +35,6 @@ class ReferenceInterface:
         self._list = tuple(targets.values())
         self._shown = _shown(record, targets)
         self._reaching: tuple[TaskReference, ...] = ()
-        self._countdown = self._interval = 1
-
-    def connect(self, period: float) -> None:
-        """Publish references at their rate, in control cycles of `period` [s]."""
-        rate = 20.0  # [Hz]
-        self._interval = max(round(1.0 / (period * rate)), 1)
-        self._countdown = self._interval
 
     def reset(self) -> None:
         """Forget what was requested."""
@@ -69,7 +62,9 @@ class ReferenceInterface:
             )
             for target in self._list
         )
-        published = TopicOut("references", "solfer/TaskReferences", TaskReferences, collect=self._due_references)
+        published = TopicOut(
+            "references", "solfer/TaskReferences", TaskReferences, collect=self.task_references, rate=20.0
+        )
         return (*received, published)
 
     def actions(self) -> tuple[Action, ...]:
@@ -135,13 +130,6 @@ class ReferenceInterface:
             tuple(pose_of(target.quantity, target.reference) for target in self._list),
             tuple(pose_of(target.quantity, target.desired) for target in self._list),
         )
-
-    def _due_references(self) -> TaskReferences | None:
-        self._countdown -= 1
-        if self._countdown > 0:
-            return None
-        self._countdown = self._interval
-        return self.task_references()
 
     def _listener(self, target: TaskReference) -> Callable[[Any], None]:
         def listen(message: Any) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from solfer.components.following.generated import GeneratedPosture, require_speeds
+from solfer.components.following.progress import CHECK_PERIOD
 from solfer.components.following.quantity import quantity_of
 from solfer.components.following.reference_interface import ReferenceInterface, record_of
 from solfer.components.following.tags import FollowingTags, MotionRecord
@@ -151,9 +152,9 @@ class ReferenceSet:
         """Let references move as configured, in control cycles of `period` [s]."""
         tags = self._tags
         self._period = period
+        self._left = self._between = max(1, round(CHECK_PERIOD / period))
         self._filter = ReferenceFilter(len(self.list), period)
         self._residuals = np.zeros((len(self.list), 2))
-        self.interface.connect(period)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
         for index, target in enumerate(self.list):
             target.connect(self._filter, index, tags.motion_of(target.name, period), tolerances, self._residuals[index])
@@ -234,7 +235,14 @@ class ReferenceSet:
             target.prepare(pace)
 
     def report(self) -> None:
-        """Log what cannot be reached, the farthest task first: as long as it moves, it may pull others away."""
+        """Log what cannot be reached, the farthest task first: as long as it moves, it may pull others away.
+
+        Called in each cycle; it looks every CHECK_PERIOD.
+        """
+        self._left -= 1
+        if self._left > 0:
+            return
+        self._left = self._between
         farthest = None
         distance = 0.0
         for target in self.list:

@@ -56,6 +56,7 @@ class TaskReference:
         self._filtered: FilteredReference
         self._residual: Residual
         self._progress: TaskProgress
+        self._period: float
 
     @property
     def where(self) -> str:
@@ -113,7 +114,8 @@ class TaskReference:
         self._feed_forward.connect(self._filtered.rate, motion.feed_forward and self._moves)
         self.limit(motion)
         self._residual = Residual(self.task.error.value, self._numbers, tolerances, values=residual)
-        self._progress = TaskProgress(references.period, float(self.task.gain.max()))
+        self._progress = TaskProgress(float(self.task.gain.max()))
+        self._period = references.period
 
     def limit(self, motion: MotionRecord) -> None:
         """Let the reference move by the limits of a record, and errors be corrected no faster."""
@@ -281,14 +283,17 @@ class TaskReference:
         residual = self._residual
         if not self._held.is_held:
             residual.measure()
-        return self._progress.step * math.hypot(residual.values[0], residual.values[1])
+        return self._progress.gain * self._period * math.hypot(residual.values[0], residual.values[1])
 
     def has_arrived(self) -> bool:
         """Return whether the point is at its reference."""
         return self._filtered.is_still and not self._residual.is_beyond()
 
     def watch(self) -> bool:
-        """Look whether the task still comes nearer to its reference, see `stays`; return whether that is at rest."""
+        """Look whether the task still comes nearer to its reference, see `stays`; return whether that is at rest.
+
+        Called every CHECK_PERIOD.
+        """
         is_still = self._filtered.is_still
         if is_still:
             self._progress.look(self.distance)

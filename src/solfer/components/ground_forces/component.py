@@ -1,7 +1,7 @@
 """What the ground does to the robot, from the efforts of its joints: the paper's `ground_forces` (Fig. 5)."""
 
-import functools
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +72,6 @@ class GroundForces(Component):
         self._touching = np.ones(count)
         self.law = self._make_law()
         self._filter: LowPass | None = None
-        self._cycles = 0
-        self._wrench_cycles = 1
-        self._report_cycles = 1
         weight = None if robot.kinematics.base is None else robot.kinematics.mass * robot.gravity
         self.checks = ContactChecks(names, self._pushed.normals, tags.friction, weight=weight)
         self.touch = None if tags.touch is None else Touch(count, **dict(tags.touch))
@@ -108,10 +105,10 @@ class GroundForces(Component):
         interface = "geometry_msgs/WrenchStamped"
         return (
             *(
-                TopicOut(name, interface, StampedWrench, collect=functools.partial(self._due_wrench, index))
-                for index, name in enumerate(self._pushed.names)
+                TopicOut(name, interface, StampedWrench, partial(wrench_on_link, contact, self.model), rate=50.0)
+                for name, contact in zip(self._pushed.names, self._pushed.contacts, strict=True)
             ),
-            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_report),
+            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report, rate=1.0),
         )
 
     def start_log(self, logger: Any) -> None:
@@ -128,14 +125,8 @@ class GroundForces(Component):
         if self.touch is not None:
             self._touching[:] = self.touch.touching
 
-    def _due_wrench(self, index: int) -> StampedWrench | None:
-        """Return the wrench of a contact if it is due: of each in a cycle of its own, so that none carries them all."""
-        if (self._cycles + index) % self._wrench_cycles:
-            return None
-        return wrench_on_link(self._pushed.contacts[index], self.model)
-
-    def _due_report(self) -> Statuses | None:
-        return self.checks.report(self.name) if self._cycles % self._report_cycles == 0 else None
+    def _report(self) -> Statuses:
+        return self.checks.report(self.name)
 
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
         robot = self.model
@@ -143,7 +134,7 @@ class GroundForces(Component):
         robot.dynamics.subscribe(BIAS)
         if tags.method == "projection":
             return ProjectedLaw(self._pushed.contacts, self._torque)
-        return WeightedLaw(robot, self._pushed.contacts, self._torque, tags=tags)
+        return WeightedLaw(robot, self._pushed, self._torque, tags=tags)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -202,15 +193,12 @@ class GroundForces(Component):
         super().set_rate(rate)
         tags = self.tags.filter.torque
         self._filter = None if tags is None else tags.low_pass(self.model.size, rate)
-        self._wrench_cycles = max(1, round(rate / 50.0))  # at 50 Hz at most
-        self._report_cycles = max(2, round(rate))  # once a second
 
     def init(self) -> None:
         """Begin with the torques of now, unfiltered, and with the contacts that touch now."""
         self._torque[:] = self.model.state.torque
         if self._filter is not None:
             self._filter.reset()
-        self._cycles = 0
         self.law.start(self.period)
         self._compute()
         if self.touch is not None:
@@ -220,7 +208,6 @@ class GroundForces(Component):
 
     def update(self) -> None:
         """Compute the forces of this cycle."""
-        self._cycles += 1
         self._torque[:] = self.model.state.torque
         if self._filter is not None:
             self._filter.step(self._torque)
@@ -236,9 +223,8 @@ class GroundForces(Component):
 
     def _compute(self) -> None:
         """Write what the law computes into the contacts, and note their normal forces and speeds."""
-        self.model.contacts  # noqa: B018 they are updated where they are requested
         pushed = self._pushed
-        pushed.read_jacobians()
+        pushed.read_jacobians(self.model.contacts)
         self.law.update(pushed.jacobian, self._none if self.touch is None else self.touch.lifted, self.passed)
         pushed.read_forces(self.model.state.velocity)
 

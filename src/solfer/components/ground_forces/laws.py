@@ -6,9 +6,10 @@ import numpy as np
 
 from solfer.components.ground_forces.momentum import MomentumObserver
 from solfer.components.ground_forces.offsets import TorqueOffsets
+from solfer.components.ground_forces.pushed_contacts import PushedContacts
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.weighted_forces import WeightedForces
-from solfer.numerics.base_chart import rates_of
+from solfer.numerics.base_chart import moment_of
 from solfer.points.contact.contact_forces import ContactForces
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -59,7 +60,7 @@ class WeightedLaw:
 
     Args:
         robot: The Robot.
-        contacts: Contacts of it.
+        pushed: Contacts of it.
         torque: Torques of the joints, shape (n,) [Nm, N]; live.
         tags: Tags of the component.
 
@@ -69,9 +70,10 @@ class WeightedLaw:
         offsets: Those of the torque sensors; None: they have none.
     """
 
-    def __init__(self, robot: Robot, contacts: Sequence[Contact], torque: np.ndarray, tags: GroundForcesTags):
+    def __init__(self, robot: Robot, pushed: PushedContacts, torque: np.ndarray, tags: GroundForcesTags):
+        contacts = pushed.contacts
         self._robot = robot
-        self._contacts = tuple(contacts)
+        self._pushed = pushed
         self._torque = torque
         self._floating = robot.kinematics.base is not None
         deviations = np.full(robot.size, tags.torque_deviation)
@@ -107,10 +109,7 @@ class WeightedLaw:
         else:
             np.add(world, self.offsets.value, out=self._corrected)
             forces = self._forces.update(jacobian, self._corrected)
-        for contact, force in zip(self._contacts, forces, strict=True):
-            wrench = contact.wrench
-            wrench[:3] = force
-            wrench[3:] = 0.0
+        self._pushed.write_forces(forces)
         if self._floating:
             self._write_push()
         if self.offsets is not None:
@@ -118,13 +117,10 @@ class WeightedLaw:
             self.offsets.update(jacobian, world, lifted, x * x + y * y + z * z > self._largest**2)
 
     def _write_push(self) -> None:
-        """Turn the forces along the base's six numbers into a wrench: with rates = G w of its angles, t = G^T t'."""
+        """Turn the forces along the base's six numbers into a wrench."""
         chart = self._robot.kinematics.base
         rest = self._forces.rest
         rx, ry = self._robot.state.position[3:5].tolist()
-        tx, ty, tz = rest[3:6].tolist()
-        for axis, direction in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
-            roll, pitch, yaw = rates_of(rx, ry, *direction)
-            self._moment[axis] = roll * tx + pitch * ty + yaw * tz
+        self._moment[:] = moment_of(rx, ry, *rest[3:6].tolist())
         np.dot(chart.rotation, rest[:3], out=self.push[:3])
         np.dot(chart.rotation, self._moment, out=self.push[3:])

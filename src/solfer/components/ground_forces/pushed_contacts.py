@@ -7,6 +7,7 @@ import numpy as np
 from solfer.interfaces.port import Port
 from solfer.points.contact.contacts import Contact
 from solfer.points.contact.support_vertex import UP
+from solfer.robot.contacts import Contacts
 
 
 class PushedContacts:
@@ -37,16 +38,31 @@ class PushedContacts:
         self.jacobian = np.zeros((3 * count, size))
         self.forces, self._velocities, self._along = np.zeros((3, count, 3))
         self.normal_forces, self.speeds = np.zeros((2, count))
+        self._layout: np.ndarray | None = None
+        self._jacobians: list[np.ndarray] = []
+        self._wrenches: list[np.ndarray] = []
 
-    def read_jacobians(self) -> None:
-        """Read the Jacobian of each contact."""
-        for index, contact in enumerate(self.contacts):
-            self.jacobian[3 * index : 3 * index + 3] = contact.jacobian
+    def read_jacobians(self, contacts: Contacts) -> None:
+        """Read the Jacobian of each contact, as of the last update of all contacts of the Robot."""
+        if contacts.wrenches is not self._layout:  # contacts have come or gone, and arrays have moved
+            self._layout = contacts.wrenches
+            self._jacobians = [contact.jacobian for contact in self.contacts]
+            self._wrenches = [contact.wrench for contact in self.contacts]
+        row = 0
+        for jacobian in self._jacobians:
+            self.jacobian[row : row + 3] = jacobian
+            row += 3
+
+    def write_forces(self, forces: np.ndarray) -> None:
+        """Write forces without torques to the contacts, shape (k, 3) [N]."""
+        for wrench, force in zip(self._wrenches, forces, strict=True):
+            wrench[:3] = force
+            wrench[3:] = 0.0
 
     def read_forces(self, velocity: np.ndarray) -> None:
         """Read the force of each contact, and compute its speed by the velocities of the DoFs, shape (n,) [rad/s]."""
-        for index, contact in enumerate(self.contacts):
-            self.forces[index] = contact.wrench[:3]
+        for index, wrench in enumerate(self._wrenches):
+            self.forces[index] = wrench[:3]
         np.multiply(self.forces, self.normals, out=self._along)
         np.sum(self._along, axis=1, out=self.normal_forces)
         np.dot(self.jacobian, velocity, out=self._velocities.reshape(-1))

@@ -133,7 +133,6 @@ class InverseDynamics(Component):
         torque_limits = self._torque_limits(self.tags)
         self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=torque_limits, demand=self._demand)
         self._watch.connect(self.problem.force, self._demand.slip)
-        self._report_cycles = max(2, round(rate))  # once a second
         self.references.connect(self.period)
 
     def actions(self) -> tuple[Action, ...]:
@@ -249,7 +248,7 @@ class InverseDynamics(Component):
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive references; publish forces of contacts and active constraints on `/diagnostics`."""
-        diagnostics = TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_report)
+        diagnostics = TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report, rate=1.0)
         return (*self.references.interface.topics(), diagnostics)
 
     def lift(self, request: LiftContacts) -> LiftReply:
@@ -406,9 +405,7 @@ class InverseDynamics(Component):
             self._holding.reason = ""
             self._watch.start()
 
-    def _due_report(self) -> Statuses | None:
-        if self._cycles % self._report_cycles != 1:
-            return None
+    def _report(self) -> Statuses:
         problem = self.problem
         ground = self.ground
         entries = [

@@ -39,23 +39,6 @@ FRAME = "odom"
 """World frame of the published pose, as in REP 105."""
 
 
-class RateDivider:
-    """Selects one of several cycles, the last of them.
-
-    Attributes:
-        cycles: Cycles of which one is selected.
-    """
-
-    def __init__(self) -> None:
-        self.cycles = 1
-        self._left = 0
-
-    def is_due(self) -> bool:
-        """Count a cycle; return whether it is selected."""
-        self._left = (self._left or self.cycles) - 1
-        return not self._left
-
-
 class Odometry(Component):
     """Estimates pose and velocity of the base from wheels and IMU, and writes them into both States.
 
@@ -96,8 +79,6 @@ class Odometry(Component):
         self._pose, self._rates = np.zeros((2, 6))
         self._rotation = np.eye(3)
         self._position = np.zeros(3)
-        self._pose_divider = RateDivider()
-        self._report_divider = RateDivider()
         self._throttle = Throttle(log)
         self._child = robot.kinematics.base_link or ""
         if self.tags.method == "filter":
@@ -110,9 +91,6 @@ class Odometry(Component):
             ConfigError: A filter's cut-off is not below half of the rate.
         """
         super().set_rate(rate)
-        pose_rate = 50.0  # [Hz] at most; reports follow once a second
-        self._pose_divider.cycles = max(1, round(rate / pose_rate))
-        self._report_divider.cycles = round(self._pose_divider.cycles * pose_rate)
         tags = self.tags
         self.law.filter = None if tags.filter is None else tags.filter.low_pass(3, rate)
         self.law.smoothing = None if tags.velocity is None else tags.velocity.low_pass(4, rate)
@@ -187,8 +165,10 @@ class Odometry(Component):
         known = isinstance(self.law, FilteredOdometry)
         made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, handler=self.set_pose)]
         if known:
-            made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, collect=self._due_states))
-            made.append(TopicOut("pose", interface, StampedUncertainPose, collect=self._due_pose))
+            made.append(
+                TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self.wheel_states, rate=1.0)
+            )
+            made.append(TopicOut("pose", interface, StampedUncertainPose, self.uncertain_pose, rate=50.0))
         if self.tags.transform:
             made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, collect=self._place))
         return tuple(made)
@@ -215,12 +195,6 @@ class Odometry(Component):
         """See `Component.log`: standard deviations of the pose."""
         if isinstance(self.law, FilteredOdometry):
             self._covariances.find_deviations()
-
-    def _due_pose(self) -> object:
-        return self.uncertain_pose() if self._pose_divider.is_due() else None
-
-    def _due_states(self) -> object:
-        return self.wheel_states() if self._report_divider.is_due() else None
 
     def _place(self) -> object:
         quaternion = quaternion_from_rotation(self._rotation)

@@ -99,11 +99,6 @@ class SupportShaping(WheeledMotion):
         if self.original is not None:
             self.original.program.weigh(gains)
 
-    def set_rate(self, rate: float) -> None:
-        """See `WheeledMotion.set_rate`."""
-        super().set_rate(rate)
-        self.shaping.report.set_rate(rate)
-
     def _set_step(self, step: float) -> float:
         """See `WheeledMotion._set_step`."""
         self.shaping.governor.set_period(step)
@@ -142,10 +137,10 @@ class SupportShaping(WheeledMotion):
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive what `wheeled_motion` does, and publish `<name>/support_margins`."""
-        collect = self.shaping.report.collect
+        margins = self.shaping.report.margins
         return (
             *super().topics(),
-            TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, collect=collect),
+            TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, collect=margins, rate=20.0),
         )
 
     def _published_pace(self) -> float:

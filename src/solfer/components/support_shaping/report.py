@@ -33,14 +33,9 @@ class MarginsReport:
         self._links = links
         self._governor = governor
         self._throttle = Throttle(log)
-        self._left = self._between = 1
         self.ratio = np.ones(1)
         self.reaction = np.zeros(2)
         self.start(edges)
-
-    def set_rate(self, rate: float) -> None:
-        """Set the rate of the control cycle [Hz]."""
-        self._left = self._between = max(round(rate / 20.0), 1)  # at 20 Hz
 
     def start(self, edges: Sequence[tuple[int, int]]) -> None:
         """Begin with edges of the polygon between wheels."""
@@ -61,14 +56,6 @@ class MarginsReport:
             elif reserve < tags.warn_below:
                 self._throttle.warning(name, "%s: %.3f m are left of '%s'", self._name, reserve, name)
         self.ratio[0] = governor.ratio
-
-    def collect(self) -> SupportMargins | None:
-        """Return what is to be published after this cycle; None: nothing."""
-        self._left -= 1
-        if self._left > 0:
-            return None
-        self._left = self._between
-        return self.margins()
 
     def margins(self) -> SupportMargins:
         """Return what is published of the newest cycle."""

@@ -1,5 +1,7 @@
 """Positions that a robot measures, with the revolutions that its encoders do not count."""
 
+from functools import partial
+
 import numpy as np
 
 
@@ -17,13 +19,13 @@ class MeasuredPosition:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import keep_revolutions, unwrap
 
-        self._unwrap = unwrap
-        self._keep_revolutions = keep_revolutions
-        self._revolutions = revolutions
+        size = len(revolutions)
         self._turning = np.flatnonzero(revolutions)
-        self._added = np.zeros(len(revolutions))
-        self._before = np.zeros((3, len(revolutions)))  # see the kernel
-        self.value = np.zeros(len(revolutions))
+        self._added = np.zeros(size)
+        self._before = np.zeros((3, size))  # see the kernel
+        self._unwrap = partial(unwrap, self._before, revolutions, self._added)
+        self._keep_revolutions = partial(keep_revolutions, self._before, self._added, np.arange(size), np.zeros(size))
+        self.value = np.zeros(size)
 
     def start(self, q: np.ndarray) -> None:
         """Begin at a position."""
@@ -37,6 +39,6 @@ class MeasuredPosition:
         value[:] = q
         if not self._turning.size:
             return q
-        self._unwrap(value, self._turning, self._before, self._revolutions, self._added)
-        self._keep_revolutions(value, self._turning, self._before, self._added)
+        self._unwrap(value, self._turning)
+        self._keep_revolutions(value, self._turning)
         return value

@@ -1,7 +1,7 @@
 """The Middleware of a node without ROS, in shared memory."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol, cast
 
@@ -134,11 +134,22 @@ class XbotMiddleware(Middleware):
     def poll(self) -> None:
         """Receive calls of services and replies to requests. Does not block."""
         served = self._served
-        notification = served.notification
-        if served.is_busy or notification.words[notification.place] != notification.received:
+        if served.is_busy or served.notification.is_pending():
             served.poll()
         if self._calls.open:
             self._calls.poll()
+
+    @staticmethod
+    def poll_all(nodes: Iterable["XbotMiddleware"]) -> Callable[[], None]:
+        """Return what polls several nodes in one call, each where it may have received something."""
+        rows = [(node._served, node._served.notification, node._calls, node.poll) for node in nodes]
+
+        def poll() -> None:
+            for served, notification, calls, poll_one in rows:
+                if served.is_busy or notification.words[notification.place] != notification.received or calls.open:
+                    poll_one()
+
+        return poll
 
     def publish_time(self, simulated: float) -> None:
         """See `Middleware.publish_time`; no clock follows it, but `rewinds` counts when it goes back."""

@@ -1,5 +1,8 @@
 """Finds measurements of joints that cannot be true: no joint moves as far or as fast, or otherwise than it measures."""
 
+from functools import partial
+from typing import NoReturn
+
 import numpy as np
 
 from solfer.errors import Contradiction, Stray
@@ -23,6 +26,12 @@ class JointLeaps:
     Args:
         robot: The Robot, with its limits.
         dofs: DoFs that the pipe measures, shape (k,).
+
+    Attributes:
+        find: Checks a message, and remembers it; returns a number for `refuse`, negative: it can be true. Takes the
+            measured positions, shape (k,) [rad, m], the velocities, shape (k,), or (0,) if there are none [rad/s, m/s],
+            which of the DoFs it has, when it arrived, in the pipe's own clock, and when it was true, by the sender's
+            clock [s].
     """
 
     def __init__(self, robot: Robot, dofs: np.ndarray):
@@ -30,7 +39,6 @@ class JointLeaps:
         from solfer.numerics.blocks import MemoryBlock
         from solfer.numerics.checks import joints
 
-        self._find = joints.find_leap
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
         self._before = np.zeros((joints.ROWS, len(dofs)))
@@ -42,6 +50,7 @@ class JointLeaps:
             revolutions=np.array(robot.revolutions[dofs]),
             endless=np.isinf(robot.upper_limits.position[dofs]),
         )
+        self.find = partial(joints.find_leap, self._block.address)
         self._place = self._before[joints.PLACE]
         self._arrival = self._before[joints.ARRIVAL]
         self._strayed = self._before[joints.STRAYED]
@@ -53,22 +62,12 @@ class JointLeaps:
         self._before.fill(0.0)
         self._before[self._never] = -np.inf
 
-    def check(self, position: np.ndarray, velocity: np.ndarray, part: np.ndarray, arrival: float, stamp: float) -> None:
-        """Check a message, and remember it.
-
-        Args:
-            position: Measured positions, shape (k,) [rad, m].
-            velocity: Measured velocities, shape (k,), or (0,) if there are none [rad/s, m/s].
-            part: Which of the DoFs the message has.
-            arrival: When it arrived, in the pipe's own clock [s].
-            stamp: When it was true, by the sender's clock [s].
+    def refuse(self, wrong: int, position: np.ndarray, velocity: np.ndarray, arrival: float) -> NoReturn:
+        """Refuse what `find` has found, in the message that it was given.
 
         Raises:
             Contradiction: A joint cannot be there, or so fast, or its velocities contradict it.
         """
-        wrong = self._find(self._block.address, position, velocity, part, arrival, stamp)
-        if wrong < 0:
-            return
         count = len(self._names)
         name = self._names[wrong % count]
         fastest = f"{self._fastest[wrong % count]:.3g} rad/s at most"

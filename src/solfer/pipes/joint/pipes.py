@@ -147,7 +147,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
     def _decode(self, message: JointMessage) -> None:
         names = message.names
         numbers = message.block
-        order = self._names.match(names)
+        matched = self._names
+        order = matched.order if names is matched.matched else matched.match(names)
         if numbers is None:
             rows = self._in_order
             numbers = self._stacked(message)
@@ -169,7 +170,10 @@ class JointFeedbackPipe(StateFeedbackPipe):
         if self._turns is not None:
             self._turns.unwrap(position, part)
         if self._leaps is not None:
-            self._leaps.check(position, self._velocity, part, self.reader.arrival, self._stamp)
+            arrival = self.reader.arrival
+            wrong = self._leaps.find(position, self._velocity, part, arrival, self._stamp)
+            if wrong >= 0:
+                self._leaps.refuse(wrong, position, self._velocity, arrival)
         if self._turns is not None:
             self._turns.keep(position, part)
         if not self.received:

@@ -1,5 +1,8 @@
 """Positions of continuous joints that go on counting where their driver begins again, as encoders modulo a turn do."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from solfer.numerics.rotations import whole_revolutions
@@ -19,41 +22,54 @@ class JointTurns:
         function: That of the pipe: `state`, whose count is the Robot's, `motor` with its own, which begins on the turn
             of the link side once that is measured, or `reference`, which begins with the Robot's.
         is_calibrated: Whether a calibration says where zero is: the first position is the shortest way from there.
+
+    Attributes:
+        unwrap: Adds turns to the positions of a message, shape (k,) [rad, m], of which it has a part.
+        keep: Lets the next message be compared with this one, which fits.
     """
+
+    unwrap: Callable[[np.ndarray, np.ndarray], None]
+    keep: Callable[[np.ndarray, np.ndarray], None]
 
     def __init__(self, robot: Robot, dofs: np.ndarray, function: str, is_calibrated: bool = False):
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import keep_revolutions, unwrap
 
-        self._unwrap = unwrap
-        self._keep = keep_revolutions
         self._revolutions = robot.revolutions[dofs]
         self._dofs = dofs
         self._function = function
         self._of_robot = robot.added_revolutions
-        self._before = np.repeat([[np.nan], [np.inf], [-np.inf]], len(dofs), axis=1)  # see the kernel
+        before = np.repeat([[np.nan], [np.inf], [-np.inf]], len(dofs), axis=1)  # see the kernel
         self._added = np.zeros(len(dofs))
         self._begin = robot.state.position if function == "motor" else np.zeros(robot.size)
         self._aligned = (self._revolutions == 0.0) | (function != "motor" and not is_calibrated)
+        counts = self._of_robot if function == "state" else np.zeros(robot.size)
+        self._add = partial(unwrap, before, self._revolutions, self._added)
+        self._keep = partial(keep_revolutions, before, self._added, np.asarray(dofs, dtype=np.int64), counts)
+        self._follow()
 
-    def unwrap(self, position: np.ndarray, part: np.ndarray) -> None:
-        """Add turns to the positions of a message, shape (k,) [rad, m], of which it has a `part`."""
+    def _follow(self) -> None:
+        """Choose what each message needs: a call of a kernel, once all joints are aligned."""
+        is_aligned = self._aligned.all()
+        self.unwrap = self._add if is_aligned and self._function != "reference" else self._add_more
+        self.keep = self._keep if is_aligned else self._keep_more
+
+    def _add_more(self, position: np.ndarray, part: np.ndarray) -> None:
+        """Add turns, those of the Robot's count, or those that align joints, as well."""
         if self._function == "reference":
             np.take(self._of_robot, self._dofs, out=self._added, mode="clip")
-        self._unwrap(position, part, self._before, self._revolutions, self._added)
+        self._add(position, part)
         if not self._aligned.all():
             new = self._to_align(part)
             shift = whole_revolutions(self._begin[self._dofs[new]] - position[new], self._revolutions[new])
             position[new] += shift
             self._added[new] += shift
 
-    def keep(self, position: np.ndarray, part: np.ndarray) -> None:
-        """Let the next message be compared with this one, which fits."""
-        self._keep(position, part, self._before, self._added)
-        if not self._aligned.all():
-            self._aligned[self._to_align(part)] = True
-        if self._function == "state":
-            self._of_robot[self._dofs] = self._added
+    def _keep_more(self, position: np.ndarray, part: np.ndarray) -> None:
+        """Keep positions, and which joints are aligned."""
+        self._keep(position, part)
+        self._aligned[self._to_align(part)] = True
+        self._follow()
 
     def _to_align(self, part: np.ndarray) -> np.ndarray:
         """Return which joints of a message are not aligned yet, and may be: a link side at zero is not measured."""

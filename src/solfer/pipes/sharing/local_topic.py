@@ -3,13 +3,15 @@
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from solfer.pipes.feedback_pipe import FeedbackPipe
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Reader, Writer
 from solfer.transport.messages import Message
 
 
 class LocalTopic:
-    """Counts the messages of one plugin; those of a shared Robot have their numbers there already.
+    """The newest message of one plugin; of those of a shared Robot, which have their numbers there already, the number.
 
     Args:
         component: Name of the plugin.
@@ -20,7 +22,12 @@ class LocalTopic:
         sequence: Number of messages so far.
         arrival: Time of the newest message [s]; minus infinity before the first.
         is_received: Whether another plugin receives it.
+        original: The message that was written last, whose numbers are copied; None before the first.
+        copies: Its arrays, each with that of `message` to which its numbers go.
     """
+
+    original: Message | None = None
+    copies: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     def __init__(self, component: str):
         self.component = component
@@ -31,11 +38,7 @@ class LocalTopic:
 
     def prepare(self, message: Message) -> None:
         """See `Writer.prepare`."""
-
-    def put(self, message: Message, now: float) -> None:
-        """Publish a message at a time [s]."""
-        self.sequence += 1
-        self.arrival = now
+        self.original = message
 
 
 class LocalWriter(Writer):
@@ -69,7 +72,15 @@ class LocalWriter(Writer):
 
     def write(self, message: Message) -> None:
         """See `Writer.write`; plugins of the same process have the message first."""
-        self.channel.put(message, self._now())
+        channel = self.channel
+        if message is not channel.original:
+            channel.prepare(message)
+        for source, target in channel.copies:
+            target[...] = source
+        if channel.message is not None:
+            channel.message.__dict__["stamp"] = message.stamp  # to assign one, a message looks for its arrays
+        channel.sequence += 1
+        channel.arrival = self._now()
         self._outside.write(message)
 
 
@@ -95,7 +106,13 @@ class LocalReader(Reader):
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
-        return self.read_from(self._publisher)
+        channel = self.channel
+        if channel.sequence == self._seen:
+            return OLD if self._seen else NONE
+        self._seen = channel.sequence
+        self.message = channel.message
+        self._publisher.arrival = self.arrival = channel.arrival
+        return NEW
 
     def update(self) -> Sequence[Publisher]:
         """See `Reader.update`."""
@@ -104,14 +121,8 @@ class LocalReader(Reader):
         return self.publishers
 
     def read_from(self, publisher: Publisher) -> MessageStatus:
-        """See `Reader.read_from`."""
-        channel = self.channel
-        if channel.sequence == self._seen:
-            return OLD if self._seen else NONE
-        self._seen = channel.sequence
-        self.message = channel.message
-        publisher.arrival = self.arrival = channel.arrival
-        return NEW
+        """See `Reader.read_from`; there is one publisher."""
+        return self.read()
 
     def age(self) -> float:
         """See `Reader.age`."""

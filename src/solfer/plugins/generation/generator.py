@@ -37,7 +37,7 @@ from solfer.robot.contact_pipes import contact_pipes
 from solfer.robot.names import RobotNames, check_tags
 from solfer.robot.selection import commanded_dofs
 from solfer.transport import Inbox, Middleware
-from solfer.transport.declared import Bindings, bind
+from solfer.transport.declared import Publications, bind
 from solfer.transport.endpoints import Reader, Writer
 from solfer.transport.messages import GAINS
 from solfer.transport.middleware import SEED
@@ -65,7 +65,7 @@ class Generator:
         self.configuration = configuration
         self.middleware = middleware
         self.inbox = Inbox()
-        self.publish: Bindings = ()
+        self.publications = Publications()
         self.requests = RequestNotes()
         self.tuning: Tuning | None = None
         self.faults: list[SolferError] = []
@@ -142,7 +142,7 @@ class Generator:
             limits=configuration.module.overload,
             jumps=self._jumps(robot, component),
             guard=self._guard(robot),
-            publish=self.publish,
+            publications=self.publications,
             documents=partial(self._documents, robot),
             requests=self.requests,
             tuning=self.tuning,
@@ -454,7 +454,9 @@ class Generator:
         """Bind what the component declares to the middleware: services, topics, actions and parameters, live or not."""
         component.clock = self.middleware.stamp_time
         declared = tuple(self.requests.noted(each) for each in self.declarations(component))
-        self.publish = bind(component.name, declared, self.middleware, inbox=self.inbox)
+        self.publications = bind(
+            component.name, declared, self.middleware, inbox=self.inbox, rate=self.configuration.rate
+        )
         tuning = self._guarded(lambda: Tuning(component, component.live_parameters()), "list its live parameters")
         self.tuning = tuning
         setting = cast(Service, self.requests.noted(tuning.setting()))

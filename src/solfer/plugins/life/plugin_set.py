@@ -115,7 +115,8 @@ class PluginSet:
         """Run one cycle of each plugin; returns the time of all components [ns]. Errors of plugins are not raised."""
         for poll in self._polls:
             poll()
-        self.inbox.apply()
+        if self.inbox.waits:
+            self.inbox.apply()
         components = 0
         for managed, times, budget in self._rows:
             managed.cycle()

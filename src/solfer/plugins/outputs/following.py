@@ -22,6 +22,9 @@ class JointFollowing:
         pipes: The pipes to the lower level.
         robot: The Robot.
         measured: By interface, whether each DoF is measured, shape (robot.size,): others are not watched.
+
+    Attributes:
+        watched: How joints are compared, and with which arrays; empty: none are.
     """
 
     def __init__(self, owner: str, pipes: Sequence[JointCommandPipe], robot: Robot, measured: Mapping[str, np.ndarray]):
@@ -31,7 +34,7 @@ class JointFollowing:
         self._owner = owner
         self._names = robot.dofs
         state = robot.state
-        self._watched: list[tuple[Callable[..., int], tuple[np.ndarray, ...]]] = []
+        self.watched: list[tuple[Callable[..., int], tuple[np.ndarray, ...]]] = []
         for pipe in pipes:
             fields = dict(pipe.fields)
             interface = "position" if "position" in fields else "velocity"
@@ -41,13 +44,13 @@ class JointFollowing:
             own = fields[interface], state[interface], np.array(pipe.dofs), places, np.zeros((2, len(pipe.dofs)))
             if interface == "position":
                 stiffness = fields.get("stiffness", np.ones(len(pipe.dofs)))
-                self._watched.append((find_astray, (*own, stiffness)))
+                self.watched.append((find_astray, (*own, stiffness)))
             else:
-                self._watched.append((find_stuck, own))
+                self.watched.append((find_stuck, own))
 
     def start(self) -> None:
         """Forget what was before."""
-        for _, given in self._watched:
+        for _, given in self.watched:
             given[4].fill(0.0)
 
     def check(self, passed: float) -> JointFault | None:
@@ -56,7 +59,7 @@ class JointFollowing:
         Returns:
             The error that a joint does not follow; None: all do.
         """
-        for find, given in self._watched:
+        for find, given in self.watched:
             place = find(*given, passed)
             if place >= 0:
                 return self._fault(given, place)

@@ -8,8 +8,6 @@ middleware as well, so that everybody else receives what they would without a sh
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
-
 from solfer.errors import PipeError, raise_all
 from solfer.pipes.sharing.local_topic import LocalTopic
 from solfer.transport.messages import Message, arrays, copied
@@ -45,24 +43,13 @@ class SpaceChannel(LocalTopic):
     def __init__(self, publication: SharedTopic):
         super().__init__(publication.component)
         self.publication = publication
-        self._original: Message | None = None
-        self._arrays: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
     def prepare(self, message: Message) -> None:
         """Make the memory for a message that is written again and again with other numbers."""
-        self._original, self.message = message, copied(message)
-        self._arrays = tuple(zip(arrays(message), arrays(self.message), strict=True))
+        super().prepare(message)
+        self.message = copied(message)
+        self.copies = tuple(zip(arrays(message), arrays(self.message), strict=True))
         self.message.sender = self.component
-
-    def put(self, message: Message, now: float) -> None:
-        """Publish a message at a time [s]; its numbers are copied."""
-        if message is not self._original:
-            self.prepare(message)
-        for source, target in self._arrays:
-            target[...] = source
-        self.message.stamp = message.stamp
-        self.sequence += 1
-        self.arrival = now
 
 
 class SharedSpace:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from solfer.pipes import FeedbackPipe
-from solfer.plugins.timing.cycle_timing import PassedPeriods
 
 EARLIEST = 0.03
 """Time by which the newest stamp may be before the robot's time: messages come early [s]."""
@@ -32,19 +31,26 @@ class RobotTime:
     """
 
     def __init__(self, feedbacks: Sequence[FeedbackPipe], period: float):
-        self._period, self._periods = period, PassedPeriods(period)
+        self._period = period
         self._feedback = next((each for each in feedbacks if each.measures), None)
         self.restart(0.0)
 
     def restart(self, now: float) -> None:
         """Begin at a time of the clock [s]."""
-        self._periods.restart(now)
+        self._before = now
+        self._owed = 0.0
         self._stamp = self._ahead = self._still = self._looked = self.lost = 0.0
         self._follows = False
 
     def advance(self, now: float) -> float:
         """Return how much time has passed for the robot since the last call [s], which is now by the clock [s]."""
-        by_clock = self._periods.count(now) * self._period
+        # whole periods: a cycle may begin anywhere in its own, so what is beyond one is owed until it is whole
+        owed = max(0.0, self._owed + (now - self._before) / self._period - 1.0)
+        rounding = 1e-6  # ratio of a period by which a clock's time is rounded
+        left_out = int(owed + rounding)
+        self._before = now
+        self._owed = max(0.0, owed - left_out)
+        by_clock = (1 + left_out) * self._period
         before = self._stamp
         stamp = before if self._feedback is None else self._feedback.stamp
         if -JUMP < stamp - before <= 0.0:  # nothing new, or what has been overtaken

@@ -1,21 +1,21 @@
 """Binds what a component declares to a middleware."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from solfer.errors import ComponentError, SolferError, UnknownName
 from solfer.interfaces.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.transport.declared.action_server import ActionServer
 from solfer.transport.declared.fields import exactly
+from solfer.transport.declared.publications import Publications
 from solfer.transport.declared.topics import DeclaredIn, DeclaredOut, SoleSender
 from solfer.transport.endpoints import Queue
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
 
-Bindings = Sequence[Callable[[], None]]
-"""What publishes, to be called after each cycle in which the component has worked."""
 
-
-def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, inbox: Inbox) -> Bindings:
+def bind(
+    owner: str, declared: Sequence[Declaration], middleware: Middleware, inbox: Inbox, rate: float
+) -> Publications:
     """Read the parameters, and connect the rest; what comes in is received with the calls of the inbox.
 
     Args:
@@ -23,13 +23,17 @@ def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, in
         declared: What it declares.
         middleware: Carries all of it.
         inbox: Calls from outside to the component.
+        rate: Cycles per second [Hz].
+
+    Returns:
+        What it publishes.
 
     Raises:
         SolferError: A parameter is wrong, a name is declared twice, or a dataclass does not fit its interface.
     """
     _require_unique(owner, declared)
     middleware.serve(owner, [each for each in declared if isinstance(each, Service)], inbox.submit)
-    publish: list[Callable[[], None]] = []
+    publications = Publications()
     queues: list[Queue] = []
     senders: dict[str, SoleSender] = {}
     for each in declared:
@@ -42,16 +46,16 @@ def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, in
             queues.append(topic.queue)
         elif isinstance(each, TopicOut):
             out = DeclaredOut(owner, each, middleware)
-            publish.append(out.publish)
+            publications.add(out.publish, cycles=1 if each.rate is None else max(1, round(rate / each.rate)))
             if each.rest is not None:
                 inbox.sources.append(out.rest)
         elif isinstance(each, Action):
             server = ActionServer(owner, each, middleware)
             inbox.sources.append(server.receive)
             queues += server.queues
-            publish.append(server.publish)
+            publications.add(server.publish)
     inbox.pending = middleware.pending(queues)
-    return publish
+    return publications
 
 
 def _require_unique(owner: str, declared: Sequence[Declaration]) -> None:

@@ -56,7 +56,7 @@ class ImuSamples:
 
     def start(self) -> None:
         """Begin without samples."""
-        self._samples.count = 0
+        self._samples.clear()
         self.measured_at = math.nan
         self.stamps.start()
 

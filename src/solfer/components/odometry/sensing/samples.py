@@ -21,17 +21,18 @@ class SortedSamples:
         count: Number of samples.
         stamps: Their stamps, shape (capacity,) [s].
         rows: Their numbers, shape (capacity, width).
+        newest: Stamp of the newest sample [s]; minus infinity without one.
     """
 
     def __init__(self, capacity: int, width: int):
-        self.count = 0
         self.stamps = np.zeros(capacity)
         self.rows = np.zeros((capacity, width))
+        self.clear()
 
-    @property
-    def newest(self) -> float:
-        """Stamp of the newest sample [s]; minus infinity without one."""
-        return float(self.stamps[self.count - 1]) if self.count else -math.inf
+    def clear(self) -> None:
+        """Forget all samples."""
+        self.count = 0
+        self.newest = -math.inf
 
     def insert(self, stamp: float) -> int:
         """Make room for a sample; return its row, or -1 where there is one with that stamp, or it is too old."""
@@ -50,11 +51,15 @@ class SortedSamples:
         rows[row + 1 : self.count + 1] = rows[row : self.count]
         stamps[row] = stamp
         self.count += 1
+        self.newest = max(self.newest, stamp)
         return row
 
     def drop(self, number: int) -> None:
         """Forget the oldest samples, so many of them."""
         if not number:
+            return
+        if number >= self.count:
+            self.clear()
             return
         self.count -= number
         self.stamps[: self.count] = self.stamps[number : self.count + number]

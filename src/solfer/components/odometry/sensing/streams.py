@@ -63,7 +63,7 @@ class _JointSamples:
     def start(self) -> None:
         """Begin without measurements."""
         self.stamps.start()
-        self.waiting.count = 0
+        self.waiting.clear()
         self.before[:] = math.nan
 
     def receive(self, history: SensorHistory, begin: float, after: float) -> None:
@@ -137,7 +137,7 @@ class Streams:
             waiting = self._measurements.waiting
             if waiting.count:
                 self._time = waiting.newest
-            waiting.count = 0
+            waiting.clear()
             self._begin = self._time
         self.written()
 

@@ -20,7 +20,7 @@ from solfer.middleware.shared_memory.topics.sender_segment import (
     header,
     require_message,
 )
-from solfer.middleware.shared_memory.topics.wire_records import WireRecord
+from solfer.middleware.shared_memory.topics.wire_records import SENT_COLUMN, STAMP_COLUMN, WireRecord
 from solfer.segments.namespace import Namespace, Notification
 from solfer.segments.ring import Ring
 from solfer.segments.segment import Segment
@@ -73,7 +73,7 @@ class XbotReader(Reader):
         quiet = notification.words[notification.place] == notification.received
         for sender_segment in self.publishers if quiet else self.update():
             if sender_segment.end.read():
-                sent = sender_segment.arrival = sender_segment.record.sent
+                sent = sender_segment.arrival = sender_segment.record.front[SENT_COLUMN]
                 if news is None or sent >= news.arrival:
                     news = sender_segment
         if news is None or news.arrival < self.arrival:  # sent before what is known already
@@ -102,8 +102,7 @@ class XbotReader(Reader):
             return NONE if self.message is None else OLD
         record = publisher.record
         self.message = record.decode()
-        sent = record.sent
-        self.arrival = publisher.arrival = sent
+        self.arrival = publisher.arrival = record.front[SENT_COLUMN]
         return NEW
 
     def read_next(self) -> SenderSegment | None:
@@ -112,18 +111,21 @@ class XbotReader(Reader):
             current = self.update()
             self._sources = [*(source for source in self._sources if source not in current), *current]
         oldest = None
+        arrival = 0.0
         for source in self._sources:
             if not source.ahead and source.end.words[NEWEST] != source.end.sequence:
                 self._fetch(source)
-            if source.ahead and (oldest is None or source.record.sent < oldest.record.sent):
-                oldest = source
+            if source.ahead:
+                sent = source.record.front[SENT_COLUMN]
+                if oldest is None or sent < arrival:
+                    oldest = source
+                    arrival = sent
         if oldest is None:
             self._sources = self.publishers
             return None
         oldest.ahead = False
         self.message = oldest.record.decode()
-        self.arrival = oldest.record.sent
-        oldest.arrival = self.arrival
+        self.arrival = oldest.arrival = arrival
         return oldest
 
     def _fetch(self, source: SenderSegment) -> None:
@@ -290,7 +292,15 @@ class XbotWriter(Writer):
         if message is not self._last:
             self.prepare(message)
         now = self._now()
-        self._record.encode(message, now)
+        record = self._record
+        front = record.front
+        front[SENT_COLUMN] = now
+        front[STAMP_COLUMN] = message.stamp
+        block = record.block
+        if block is not None and message.block is not None and message.rows == record.rows:
+            block[...] = message.block
+        else:
+            record.encode(message)
         self._end.put(int(1e9 * now))
 
     def close(self) -> None:

@@ -29,28 +29,29 @@ class WireRecord(abc.ABC):
 
     Attributes:
         message: The message; it changes when the array does and `decode` is called.
+        front: The columns in front of those of the message; live.
+        block: All numbers of a JointMessage as rows of one array, which takes less time to copy; None: another message.
+        rows: What the rows of `block` are.
     """
+
+    block: np.ndarray | None = None
+    rows: tuple[str, ...] = ()
 
     message: Message
     _changes = True
     """Whether `message` lacks what changes in the array until `_decode` is called."""
 
     def __init__(self, values: np.ndarray):
-        self._front: Any = memoryview(values)[:WIRE_COLUMNS]
-
-    @property
-    def sent(self) -> float:
-        """When it was sent, in the sender's clock [s]."""
-        return self._front[SENT_COLUMN]
+        self.front: Any = memoryview(values)[:WIRE_COLUMNS]
 
     @abc.abstractmethod
-    def encode(self, message: Message, sent: float) -> None:
-        """Write a message of the same layout."""
+    def encode(self, message: Message) -> None:
+        """Write a message of the same layout, behind the columns in front."""
 
     def decode(self) -> Message:
         """Bring `message` up to date and return it."""
         message = self.message
-        message.stamp = self._front[STAMP_COLUMN]
+        message.__dict__["stamp"] = self.front[STAMP_COLUMN]  # to assign one, a message looks for its arrays
         if self._changes:
             self._decode()
         return message
@@ -58,9 +59,6 @@ class WireRecord(abc.ABC):
     @abc.abstractmethod
     def copy(self) -> Message:
         """Return the content as a message of its own."""
-
-    def _stamp(self, message: Message, sent: float) -> None:
-        self._front[SENT_COLUMN], self._front[STAMP_COLUMN] = sent, message.stamp
 
     @abc.abstractmethod
     def _decode(self) -> None:
@@ -100,7 +98,6 @@ class NumbersWireRecord(WireRecord):
             start = end
         self._tuples = [(name, view) for name, view in self._views if name in tuples]
         self.message = message_type(**texts, **dict(self._views), sender=sender)
-        self._rows: tuple[str, ...] | None = None
         self._changes = bool(self._tuples)
         if isinstance(self.message, JointMessage):
             self._lay(self.message, values[WIRE_COLUMNS:start])
@@ -109,13 +106,8 @@ class NumbersWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return copied(self.decode())
 
-    def encode(self, message: Any, sent: float) -> None:
+    def encode(self, message: Any) -> None:
         """See `WireRecord.encode`."""
-        front = self._front
-        front[SENT_COLUMN], front[STAMP_COLUMN] = sent, message.stamp
-        if self._rows is not None and message.block is not None and message.rows == self._rows:
-            self._block[...] = message.block
-            return
         for name, view in self._views:
             view[...] = getattr(message, name)
 
@@ -124,8 +116,9 @@ class NumbersWireRecord(WireRecord):
         size = len(message.names)
         rows = (*(name for name, _ in self._views if name in JOINT_FIELDS), *message.interfaces)
         if all(view.shape[-1] == size for _, view in self._views) and len(rows) * size == len(values):
-            self._rows, self._block = rows, values.reshape(len(rows), size)
-            message.lay(rows, self._block)
+            self.rows = rows
+            self.block = values.reshape(len(rows), size)
+            message.lay(rows, self.block)
 
     def _decode(self) -> None:
         for name, view in self._tuples:
@@ -147,9 +140,8 @@ class TextWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return dataclasses.replace(self.decode())
 
-    def encode(self, message: Message, sent: float) -> None:
+    def encode(self, message: Message) -> None:
         """See `WireRecord.encode`."""
-        self._stamp(message, sent)
         parts = [list(getattr(message, name)) for name in self._fields]
         while len(text := json.dumps(parts).encode()) > self._text.size:
             parts = [part[:-1] for part in parts]
@@ -174,9 +166,8 @@ class FieldsWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return dataclasses.replace(self.decode())
 
-    def encode(self, message: Message, sent: float) -> None:
+    def encode(self, message: Message) -> None:
         """See `WireRecord.encode`."""
-        self._stamp(message, sent)
         self._text.write(fields_text(message))
 
     def _decode(self) -> None:
