@@ -21,7 +21,7 @@ from system import CENTAURO, SOAKS, START, end, program, started, wait_for
 
 FIGURE = CENTAURO.parent / "figures" / "figure_5.yaml"
 NAMESPACE = f"orders-{os.getpid()}"
-APART = 1.0
+APART = 0.5
 """Time between two starts [s]."""
 
 DISTANCE, NEAR = 0.2, 0.03
@@ -86,8 +86,12 @@ class OrdersTest(unittest.TestCase):
                     SETTLES,
                     lambda: f"a robot that was sent there, {self.away(places[-1]):.3f} m away, after {order}",
                 )
-                for name in sorted(processes.keys() - {"navigation", "simulator"}):
-                    code, output = end(processes[name], signal.SIGINT)
+                others = sorted(processes.keys() - {"navigation", "simulator"})
+                for name in others:
+                    processes[name].send_signal(signal.SIGINT)
+                for name in others:
+                    output, _ = processes[name].communicate(timeout=START)
+                    code = processes[name].returncode
                     self.assertEqual(code, 0, output)
         finally:
             subscriber.unregister()
