@@ -45,6 +45,7 @@ def run(words, redirection="", **environment):
 
 
 @pytest.mark.slow
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("words", [["scenario", SCENARIO], ["list", "joints", "--robot", "centauro"], ["--help"]])
 def test_streams_that_cannot_be_written_to(words):
     assert run(words, ">&-")[0] == 0
