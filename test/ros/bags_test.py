@@ -40,7 +40,7 @@ class BagsTest(unittest.TestCase):
                 wait_for(self.is_recorded, START, "rosbag that receives all")
                 self.publisher.publish(name=["torso_yaw"], position=[0.3])
                 self.robot.arrive({"torso_yaw": 0.3}, START)
-                self.robot.passes(2.0)
+                self.robot.passes(1.0)
                 code, published = end(process, signal.SIGINT)
             self.assertEqual(code, 0, published)
             recorded = {topic["topic"]: topic for topic in shown("rosbag", "info", "--yaml", bag)["topics"]}

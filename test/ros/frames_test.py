@@ -47,7 +47,7 @@ class FramesTest(unittest.TestCase):
         cls.model = Robot.load(rospy.get_param("/robot_description"))
         cls.joints, cls.bases, cls.transforms = [], [], []
         cls.buffer = tf2_ros.Buffer(rospy.Duration(60.0))
-        cls.listener = tf2_ros.TransformListener(cls.buffer)
+        cls.addClassCleanup(tf2_ros.TransformListener(cls.buffer).unregister)
         rospy.Subscriber("/joint_states", JointState, cls.joints.append, queue_size=100, tcp_nodelay=True)
         rospy.Subscriber("/floating_base", Odometry, cls.bases.append, queue_size=100, tcp_nodelay=True)
         rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)

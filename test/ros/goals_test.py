@@ -29,7 +29,7 @@ from support.unit.goal_sequences import (  # noqa: E402
 from solfer.middleware.ros import RosMiddleware, RosNode  # noqa: E402
 from solfer.transport.declared.action_server import ActionServer  # noqa: E402
 
-SEQUENCES, LENGTH, SEED = 20 if SOAKS else 8, 4, 2026
+SEQUENCES, LENGTH, SEED = 20 if SOAKS else 4, 4, 2026
 TICK = 0.1
 """Time between two events [s]."""
 

@@ -21,8 +21,11 @@ NAVIGATION = PAGE.with_name("navigation.md")
 class InverseKinematicsTest(unittest.TestCase):
     """What the page promises."""
 
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("tests")
+
     def test_the_command_of_the_page_moves_an_arm(self):
-        rospy.init_node("inverse_kinematics_test")
         robot = Robot()
         (line,) = re.findall(r"^rosservice call .*$", PAGE.read_text(), re.MULTILINE)
         rospy.wait_for_service(line.split()[2], START)
@@ -37,25 +40,30 @@ class InverseKinematicsTest(unittest.TestCase):
         wait_for(lambda: farthest() > 0.2, START, lambda: f"a moved arm: {farthest():.3f} rad")
 
     def asked(self):
-        """Return the service that says where references are, once the plugin answers."""
+        """Return a function that says where a reference is; a plugin that is late on a busy machine is waited for."""
         rospy.wait_for_service("manipulation/get_reference", START)
         ask = rospy.ServiceProxy("manipulation/get_reference", GetReference)
-        wait_for(lambda: ask("left").success, START, "a plugin that works")
-        return ask
+
+        def values(task):
+            replies = []
+            wait_for(lambda: replies.append(ask(task)) or replies[-1].success, START, "a plugin that works")
+            return replies[-1].values
+
+        values("left")
+        return values
 
     def test_the_references_of_a_file_are_followed_to_their_ends(self):
         """The command of the page of the navigation: both hands move, and their references end where they began."""
-        rospy.init_node("inverse_kinematics_test")
         (line,) = re.findall(r"^rosrun solfer navigation reference .*$", NAVIGATION.read_text(), re.MULTILINE)
         file, *options = shlex.split(line)[4:]
         ask = self.asked()
-        begin = {task: ask(task).values for task in ("left", "right")}
+        begin = {task: ask(task) for task in ("left", "right")}
         farthest = dict.fromkeys(begin, 0.0)
         with started(*program("navigation"), "reference", str(PAGE.parents[2] / file), *options) as process:
 
             def has_ended():
                 for task, first in begin.items():
-                    farthest[task] = max(farthest[task], math.dist(first, ask(task).values))
+                    farthest[task] = max(farthest[task], math.dist(first, ask(task)))
                 return process.poll() is not None
 
             wait_for(has_ended, START, "the end of the references")
@@ -64,21 +72,20 @@ class InverseKinematicsTest(unittest.TestCase):
         self.assertGreater(farthest["left"], 0.07)  # the diameter is 0.08 m
         self.assertGreater(farthest["right"], 0.07)
         for task, first in begin.items():
-            self.assertLess(math.dist(first, ask(task).values), 1e-4)
+            self.assertLess(math.dist(first, ask(task)), 1e-4)
 
     def test_a_killed_navigation_leaves_the_last_reference(self):
-        rospy.init_node("inverse_kinematics_test")
         ask = self.asked()
-        begin = ask("left").values
+        begin = ask("left")
         file = str(PAGE.parents[2] / "config/references/hands.yaml")
         with started(*program("navigation"), "reference", file, "--target", "manipulation") as process:
-            wait_for(lambda: math.dist(begin, ask("left").values) > 0.02, START, "a reference that moves")
+            wait_for(lambda: math.dist(begin, ask("left")) > 0.02, START, "a reference that moves")
             process.kill()
             process.wait()
         rospy.sleep(0.5)
-        rest = ask("left").values
+        rest = ask("left")
         rospy.sleep(1.0)
-        self.assertEqual(ask("left").values, rest)
+        self.assertEqual(ask("left"), rest)
         self.assertGreater(math.dist(begin, rest), 0.01)
 
 

@@ -111,7 +111,7 @@ class NavigationTest(unittest.TestCase):
 
     def test_way_points_in_a_map_are_where_tf_has_them(self):
         """The map is turned by a quarter and shifted; until its transform is published the base waits."""
-        with started(*NAVIGATION, "go", "0.9,0.8", "--frame", "map") as process:
+        with started(*NAVIGATION, "go", "0.9,0.8", "--frame", "map", "--speed", "0.5") as process:
             missing = "a transform from 'map' to 'odom' on /tf"
             wait_for(lambda: self.base.progress and self.base.progress.waits == missing, START, "what is missing")
             self.assertEqual(self.base.velocity, (0.0, 0.0, 0.0))

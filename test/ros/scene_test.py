@@ -20,7 +20,7 @@ class SceneTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("scene_test")
+        rospy.init_node("tests")
         cls.buffer = tf2_ros.Buffer()
         cls.listener = tf2_ros.TransformListener(cls.buffer)
 

@@ -69,24 +69,24 @@ class TwoRobotsTest(unittest.TestCase):
                 self.assertLess(math.dist(self.places[robot], goal), 0.02, (robot, self.places))
             self.nothing_crosses()
             stands = self.places["red"]
-            self.drive(blue_drives)
+            stack.enter_context(started(*blue_drives))
+            self.blue_drives()
             self.assertLess(math.dist(self.places["red"], stands), STANDS)
             self.assertTrue(shown(*stop)["success"])
-            self.drive(blue_drives)
+            self.blue_drives()
             self.assertEqual([self.owners(robot) for robot in GOALS], [[], 2 * ["/blue/wheeled_motion"]])
             code, output = end(red, signal.SIGINT)
             self.assertEqual(code, 0, output)
             self.assertEqual([name for name in self.nodes() if name.startswith("/red/")], [])
-            self.drive(blue_drives)
+            self.blue_drives()
             self.assertEqual(set(self.owners("blue")), {"/blue/wheeled_motion"})
             code, output = end(blue, signal.SIGINT)
             self.assertEqual(code, 0, output)
 
-    def drive(self, command):
-        """Let the blue robot drive by a command until it has gone 0.05 m."""
+    def blue_drives(self):
+        """Wait until the blue robot has gone 0.05 m further."""
         begin = self.places["blue"]
-        with started(*command):
-            wait_for(lambda: math.dist(self.places["blue"], begin) > 0.05, START, "a blue robot that drives")
+        wait_for(lambda: math.dist(self.places["blue"], begin) > 0.05, START, "a blue robot that drives")
 
     @staticmethod
     def nodes():

@@ -15,7 +15,11 @@ from support.page import opened_page  # noqa: E402
 
 
 class ViewTest(unittest.TestCase):
-    """A page without a browser."""
+    """A page without a browser; in the end the robot's emergency stop is latched."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("tests")
 
     def test_the_node_shows_and_stops_the_robot(self):
         command = program("view", "--port", "0", "__name:=view")
@@ -35,5 +39,4 @@ class ViewTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("view_test")
-    rostest.rosrun("solfer", "view_test", ViewTest)
+    rostest.rosrun("solfer", "view", ViewTest)

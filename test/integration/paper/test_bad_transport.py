@@ -57,7 +57,7 @@ class Course:
 
     def __init__(self, faults, file, kind=Nodes, folder=None):
         with closing(kind(folder, faults=faults)) as world:
-            world.run(2.5)
+            world.run(1.5)
             rows, hands, before, odometry = [self._pose(world)], [], world.footprint(), world.plugins["odometry"]
             estimate = [self._estimate(odometry)]
 

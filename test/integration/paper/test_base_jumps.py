@@ -13,7 +13,7 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
 from solfer.transport.messages import FieldsMessage
 
-BEFORE, AFTER, PERIOD = 1.0, 2.0, 0.02
+BEFORE, AFTER, PERIOD = 0.5, 1.0, 0.02
 """Time before the estimate jumps, after that, and between two velocities that are sent [s]."""
 
 MOTIONS = {"stands": (0.0, 0.0), "drives": (0.2, 0.0), "turns": (0.1, 0.3)}

@@ -150,8 +150,9 @@ def test_navigation_sends_positions_of_base_and_vertices(world, tmp_path):
     assert len(sent) > 50 and np.diff(sent).mean() == pytest.approx(PERIOD * world.rate)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("world", [Nodes], ids=["nodes"], indirect=True)
-@pytest.mark.parametrize("drives", [False, True])
+@pytest.mark.parametrize("drives", [True, False])
 def test_a_compensation_that_dies_and_comes_back_does_not_let_the_base_sink(world, drives):
     """Torques and targets stay when nothing arrives; the same process, continued, carries the robot from there."""
     plugin = world.plugins["full_compensation"]

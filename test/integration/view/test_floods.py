@@ -202,7 +202,7 @@ CHANNEL = {"topic": "/a", "encoding": "json", "schemaName": "a"}
 OPCODES = {"pings": Opcode.PING, "pongs": Opcode.PONG}
 
 
-@pytest.mark.daily(10)
+@pytest.mark.daily(5)
 @pytest.mark.parametrize("kind", FLOODS)
 def test_a_flood_neither_delays_others_nor_stays(served, kind):
     """As fast as the socket takes them, from a sender that reads nothing."""

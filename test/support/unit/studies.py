@@ -10,8 +10,8 @@ CONFIG = Path(__file__).parents[3] / "config"
 STUDY = {
     "configuration": {"file": str(CONFIG / "centauro.yaml")},
     "plugins": ["odometry3::odometry", "wheeled_motion"],
-    "duration": 0.2,
-    "settle": 0.5,
+    "duration": 0.1,
+    "settle": 0.1,
     "measure": {"tilt": {"columns": "simulation/base/tilt", "reduce": "max"}},
 }
 """The shortest study of CENTAURO."""
