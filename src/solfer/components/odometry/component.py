@@ -12,6 +12,7 @@ from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
+from solfer.components.odometry.ground.ground_plane import GroundPlane
 from solfer.components.odometry.messages import (
     SetBase,
     StampedUncertainPose,
@@ -158,8 +159,18 @@ class Odometry(Component):
             if check.warning:
                 self._throttle.warning(check.warning, "%s: %s, it does not count", self.name, check.warning)
                 check.warning = ""
-        if isinstance(self.law, FilteredOdometry) and self.law.consensus.contradicted > self._INCONSISTENCY_TIME:
-            self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
+        law = self.law
+        if isinstance(law, FilteredOdometry):
+            if law.consensus.contradicted > self._INCONSISTENCY_TIME:
+                self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
+            if law.ground.turns:
+                self._distrust(law.ground)
+
+    def _distrust(self, ground: GroundPlane) -> None:
+        """Let the IMU be refused, below which the ground turns: it turns on its link, or many encoders drift."""
+        reason = f"the ground turns by {ground.apart[0]:.2g} rad below wheels that carry the robot"
+        if not self.streams.distrust(reason):
+            self._throttle.warning("ground", "%s: by the IMU %s; it, or joints of legs are wrong", self.name, reason)
 
     def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""

@@ -125,6 +125,10 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         if "orientation" not in reading.lacks:
             options |= self._oriented
         if self._turn_check is not None:
+            history = self.history
+            if history is not None and history.contradiction:
+                self._turn_check.distrust(history.contradiction)
+                history.contradiction = ""
             oddity = self._turn_check.check(
                 reading.values, reading.own_axes, self.reader.arrival, self._stamp, force=reading.force
             )
