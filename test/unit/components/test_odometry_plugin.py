@@ -145,7 +145,7 @@ def test_an_imu_that_turns_on_its_link_is_refused_while_it_turns(rolling, caplog
     rolling.roll(1.6, turn)
     assert not rolling.plugin.running and "which refuses messages" in rolling.plugin.health()[1]
     (refusal,) = [text for text in caplog.messages if text.startswith("feedback 'imu_base' refuses")]
-    assert "the ground turns by 0.06" in refusal
+    assert "the ground turns by 0.05" in refusal
     rolling.roll(0.8, turn)
     assert not rolling.plugin.running
     rolling.roll(1.2, turn)

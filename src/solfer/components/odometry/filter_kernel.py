@@ -268,7 +268,8 @@ def _follow_plane(start, ground_start, heading, velocity, measured, period):
     """
     steepest = 0.3  # difference of two slopes onto which a robot drives
     margin = 0.05  # [rad/s] for which there is no reason
-    largest = 0.06  # [rad] as on stones
+    uneven = 0.04  # [rad] as by stones
+    height = 0.01  # [m] from which on a wheel counts as lifted
     motion = _motion_at(start)
     ground = _ground_at(ground_start)
     slope = ground.slope
@@ -285,7 +286,8 @@ def _follow_plane(start, ground_start, heading, velocity, measured, period):
     cosine = math.cos(heading)
     sine = math.sin(heading)
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
-    allowed = (margin + steepest * speed / shortest_side(motion.arms)) * ground.since[0]
+    side = shortest_side(motion.arms)
+    allowed = (margin + steepest * speed / side) * ground.since[0]
     x = cosine * slope[0] - sine * slope[1] - ground.followed[0]
     y = sine * slope[0] + cosine * slope[1] - ground.followed[1]
     apart = math.sqrt(x * x + y * y)
@@ -294,7 +296,7 @@ def _follow_plane(start, ground_start, heading, velocity, measured, period):
     ground.followed[1] += share * y
     ground.apart[0] = (1.0 - share) * apart
     ground.since[0] = 0.0
-    return 2 if ground.apart[0] > largest else 1
+    return 2 if ground.apart[0] > uneven + height / side else 1
 
 
 @part

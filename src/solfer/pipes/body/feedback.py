@@ -101,6 +101,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         super().restart()
         if self._turn_check is not None:
             self._turn_check.forget()
+        if self.history is not None:
+            self.history.contradiction = ""
 
     def check_fit(self, message: Message, quantity: str = "") -> None:
         """See `FeedbackPipe.check_fit`."""
