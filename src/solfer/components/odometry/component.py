@@ -12,7 +12,6 @@ from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
-from solfer.components.odometry.ground.ground_plane import GroundPlane
 from solfer.components.odometry.messages import (
     SetBase,
     StampedUncertainPose,
@@ -164,10 +163,12 @@ class Odometry(Component):
             if law.consensus.contradicted > self._INCONSISTENCY_TIME:
                 self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
             if law.ground.turns:
-                self._distrust(law.ground)
+                self._distrust(law)
 
-    def _distrust(self, ground: GroundPlane) -> None:
+    def _distrust(self, law: FilteredOdometry) -> None:
         """Let the IMU be refused, below which the ground turns: it turns on its link, or many encoders drift."""
+        law.stop_tilting()
+        ground = law.ground
         reason = f"the ground turns by {ground.apart[0]:.2g} rad below wheels that carry the robot"
         if not self.streams.distrust(reason):
             self._throttle.warning("ground", "%s: by the IMU %s; it, or joints of legs are wrong", self.name, reason)

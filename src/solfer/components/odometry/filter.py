@@ -201,11 +201,15 @@ class FilteredOdometry:
         )
         self._correct(yaw, imu_time, legs / period)
         self._integrate(yaw, imu_time, unknown)
-        self.ground.update(self._base.fresh, period, self.heading)
+        self.ground.update(self._base.fresh, period, self.heading, angular=self.angular)
         motion.remember()
         self._find_velocity()
         if measured:
             self._base.subtract_tilt(*self.kalman.tilt.tolist())
+
+    def stop_tilting(self) -> None:
+        """Assume that the base does not tilt, until the IMU measures it again."""
+        self._base.angular[:2] = 0.0
 
     def write_covariance(self, pose: np.ndarray, twist: np.ndarray) -> None:
         """Write the covariances of the pose, in world axes, and of the twist, in the heading frame.

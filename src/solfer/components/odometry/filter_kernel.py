@@ -236,8 +236,8 @@ def carries(motion, i):
 
 
 @part
-def shortest_side(arms):
-    """Return how far the contacts are apart, along x or y, where it is less [m]."""
+def sides(arms):
+    """Return how far the contacts are apart along x and along y, at least 0.1 [m]."""
     x0 = x1 = arms[0, 0]
     y0 = y1 = arms[0, 1]
     for i in range(1, len(arms)):
@@ -245,21 +245,23 @@ def shortest_side(arms):
         x1 = max(x1, arms[i, 0])
         y0 = min(y0, arms[i, 1])
         y1 = max(y1, arms[i, 1])
-    return max(min(x1 - x0, y1 - y0), 0.1)
+    return max(x1 - x0, 0.1), max(y1 - y0, 0.1)
 
 
-def _follow_plane(start, ground_start, heading, velocity, measured, period):
+def _follow_plane(start, ground_start, heading, velocity, angular, measured, period):
     """Find the plane through the contacts, and how far it has turned in the world otherwise than by driving [rad].
 
-    While all wheels carry the robot the ground turns below it where it drives onto another slope, at its speed over the
-    distance of the wheels, and never where it stands, however legs move and whatever pushes it. Slopes are followed as
-    fast as that.
+    Where a robot drives onto another slope the ground turns below it at its speed over the distance of the wheels. It
+    does not where the robot stands, however legs move and whatever pushes it: what tips it over lifts two wheels. So
+    slopes are followed as fast as that, while no wheel is lifted and at most one does not carry, of which three are
+    left.
 
     Args:
         start: Address of the motion of the wheels.
         ground_start: Address of the ground.
         heading: Heading of the base.
         velocity: Velocity of the ground point, shape (3,).
+        angular: Angular velocity of the base, shape (3,).
         measured: Whether the IMU has measured the tilt.
         period: Time since the last measurement.
 
@@ -267,7 +269,7 @@ def _follow_plane(start, ground_start, heading, velocity, measured, period):
         0: there is no plane. 1: there is. 2: it has turned too far.
     """
     steepest = 0.3  # difference of two slopes onto which a robot drives
-    margin = 0.05  # [rad/s] for which there is no reason
+    margin = 0.03  # [rad/s] for which there is no reason
     uneven = 0.04  # [rad] as by stones
     height = 0.01  # [m] from which on a wheel counts as lifted
     motion = _motion_at(start)
@@ -277,17 +279,22 @@ def _follow_plane(start, ground_start, heading, velocity, measured, period):
     if not fit_plane(motion.weights, motion.arms, -1, slope)[0]:
         ground.since[0] = math.inf
         return 0
+    carrying = 0
+    lifted = False
     for i in range(motion.count):
-        if motion.weights[i] <= 0.0 or not carries(motion, i):
-            ground.since[0] = math.inf
-            return 1
+        carrying += carries(motion, i)
+        lifted = lifted or motion.weights[i] <= 0.0
+    if lifted or carrying < max(3, motion.count - 1):
+        ground.since[0] = math.inf
+        return 1
     if not measured:
         return 1
     cosine = math.cos(heading)
     sine = math.sin(heading)
-    speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
-    side = shortest_side(motion.arms)
-    allowed = (margin + steepest * speed / side) * ground.since[0]
+    length, width = sides(motion.arms)
+    # where it turns about the vertical each of its sides climbs by one wheel
+    rate = max(abs(velocity[0]) / length, abs(velocity[1]) / width) + 0.5 * abs(angular[2])
+    allowed = (margin + steepest * rate) * ground.since[0]
     x = cosine * slope[0] - sine * slope[1] - ground.followed[0]
     y = sine * slope[0] + cosine * slope[1] - ground.followed[1]
     apart = math.sqrt(x * x + y * y)
@@ -296,7 +303,7 @@ def _follow_plane(start, ground_start, heading, velocity, measured, period):
     ground.followed[1] += share * y
     ground.apart[0] = (1.0 - share) * apart
     ground.since[0] = 0.0
-    return 2 if ground.apart[0] > uneven + height / side else 1
+    return 2 if ground.apart[0] > uneven + height / min(length, width) else 1
 
 
 @part
@@ -416,7 +423,7 @@ measure_displacements = cached(f"void(int64, {_V})", _measure_displacements)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
 learn_spreads = cached(f"void(int64, {_V}, {_F}, {_B}, {_F})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
-follow_plane = cached(f"int64(int64, int64, {_F}, {_V}, boolean, {_F})", _follow_plane)
+follow_plane = cached(f"int64(int64, int64, {_F}, {_V}, {_V}, boolean, {_F})", _follow_plane)
 find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_lifted)
 velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)

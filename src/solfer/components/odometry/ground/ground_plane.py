@@ -89,18 +89,19 @@ class GroundPlane:
         if variance > self._floor_variance + deviation * deviation:
             self._kalman.settle_height(deviation * math.sqrt(time / period))
 
-    def update(self, fresh: bool, period: float, heading: float) -> None:
+    def update(self, fresh: bool, period: float, heading: float, angular: np.ndarray) -> None:
         """Find the normal of the ground; level ground measures the error of the tilt.
 
         Args:
             fresh: Whether the IMU has measured the tilt.
             period: Time since the last measurement [s].
             heading: Heading of the base [rad].
+            angular: Its angular velocity in the heading frame, shape (3,) [rad/s].
         """
         motion = self._motion
         wheels = motion.wheels
         found = self._level and filter_kernel.follow_plane(
-            motion.block.address, self.block.address, heading, self._kalman.velocity, fresh, period
+            motion.block.address, self.block.address, heading, self._kalman.velocity, angular, fresh, period
         )
         self.turns = found == 2
         if found:
