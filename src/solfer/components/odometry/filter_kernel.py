@@ -252,9 +252,8 @@ def _follow_plane(start, ground_start, heading, velocity, angular, measured, per
     """Find the plane through the contacts, and how far it has turned in the world otherwise than by driving [rad].
 
     Where a robot drives onto another slope the ground turns below it at its speed over the distance of the wheels. It
-    does not where the robot stands, however legs move and whatever pushes it: what tips it over lifts two wheels. So
-    slopes are followed as fast as that, while no wheel is lifted and at most one does not carry, of which three are
-    left.
+    does not where the robot stands, however legs move and whatever pushes it: what tips it over lifts wheels. So slopes
+    are followed as fast as that, while all wheels carry the robot and it tilts more slowly than in a fall.
 
     Args:
         start: Address of the motion of the wheels.
@@ -279,14 +278,11 @@ def _follow_plane(start, ground_start, heading, velocity, angular, measured, per
     if not fit_plane(motion.weights, motion.arms, -1, slope)[0]:
         ground.since[0] = math.inf
         return 0
-    carrying = 0
-    lifted = False
+    falls = math.sqrt(angular[0] ** 2 + angular[1] ** 2) > 0.5  # [rad/s]
     for i in range(motion.count):
-        carrying += carries(motion, i)
-        lifted = lifted or motion.weights[i] <= 0.0
-    if lifted or carrying < max(3, motion.count - 1):
-        ground.since[0] = math.inf
-        return 1
+        if falls or motion.weights[i] <= 0.0 or not carries(motion, i):
+            ground.since[0] = math.inf
+            return 1
     if not measured:
         return 1
     cosine = math.cos(heading)
