@@ -23,6 +23,7 @@ ALARMS = (
     "' does not follow '",
     "a specific force of",
     "the accelerometer measures",
+    "the ground turns by",
     "arrivals count instead",
 )
 """Parts of the messages that name a sensor, a motor or a joint."""

@@ -166,6 +166,52 @@ def test_wheels_that_climb_are_not_lifted(robot):
     assert risen == pytest.approx((0.5 * base + SPEED) * math.sin(steepest), abs=0.025)
 
 
+def tilt(made, duration, rate, speed=0.0, carries=(True, True, True, True), largest=math.inf):
+    """Let the base and its ground pitch [rad/s], where some wheels carry 250 N; return when that contradicts [s]."""
+    robot, contradicted = made.model, []
+
+    def pitch(k):
+        turn = Rotation.from_euler("z", 0.4) * Rotation.from_euler("y", -min(rate * (k + 1) / RATE, largest))
+        robot.state.position[3:6] = turn.as_euler("XYZ")
+        robot.state.velocity[3:6] = 1e-9 * (k % 2)
+        robot.state.torque[6:] = -250.0 * np.array(carries) @ made.law._motion.wheels.jacobian[2::3]
+        if made.law.ground.turns:
+            contradicted.append(k / RATE)
+
+    drive(made, duration, np.full(4, speed), move=pitch)
+    return contradicted[0] if contradicted else None
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.15])
+def test_the_ground_does_not_turn_below_a_robot(robot, speed):
+    """An IMU turns on its link, and all that it measures agrees: the wheels that carry the robot are the witness."""
+    assert tilt(component(robot), 1.5, 0.2, speed) < 1.0
+
+
+@pytest.mark.parametrize("speed", [0.15, 0.6, 2.0])
+def test_the_ground_turns_below_a_robot_that_drives_onto_a_ramp(robot, speed):
+    base, steepest = 1.092, math.radians(15.0)
+    assert tilt(component(robot), base / speed + 0.5, steepest * speed / base, speed, largest=steepest) is None
+
+
+@pytest.mark.parametrize("rate", [0.2, 2.0])
+@pytest.mark.parametrize("wheels", [(), (0,), (0, 1), (0, 1, 2, 3)])
+def test_a_robot_that_tips_lifts_wheels(robot, wheels, rate):
+    """It turns as a whole on the others, at first as slowly as a wrong IMU; then it falls."""
+    carries = [wheel not in wheels for wheel in range(4)]
+    assert tilt(component(robot), 0.8, rate, 0.02, carries) is None or not wheels and rate < 0.5
+
+
+def test_a_robot_that_is_pushed_with_a_wheel_lifted_may_turn(robot):
+    made, knee = component(robot), robot.dof("knee_pitch_1")
+
+    def lift(k):
+        robot.state.position[knee] += 0.002 * (k < 100)
+
+    drive(made, 0.6, np.zeros(4), move=lift)
+    assert made.law.lifted[0] and tilt(made, 0.8, 0.2, 0.02) is None
+
+
 def test_the_bias_is_learned_at_rest(robot):
     made = component(robot)
     drive(made, 2.0, np.zeros(4), bias=0.003)

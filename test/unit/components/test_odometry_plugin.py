@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support.estimation import part
 
 from solfer.transport.messages import ImuMessage, JointMessage
@@ -127,6 +128,30 @@ def test_what_is_no_number_is_refused(rolling, spoil):
 
 
 @pytest.mark.slow
+def test_an_imu_that_turns_on_its_link_is_refused_while_it_turns(rolling, caplog):
+    """All that it measures agrees, but the ground would turn below wheels that carry the robot."""
+    begin = rolling.time
+
+    def turn(sample):
+        wheels = rolling.plugin.component.law._motion.wheels
+        sample.joints.effort[:] = -250.0 * wheels.jacobian[2::3].sum(axis=0)
+        passed = rolling.time - begin
+        angle = 0.2 * passed if passed < 2.5 else 0.0
+        orientation = Rotation.from_quat(sample.imu.orientation) * Rotation.from_rotvec((angle, 0.0, 0.0))
+        sample.imu.orientation[:] = orientation.as_quat()
+        sample.imu.angular[0] += 0.2 * (passed < 2.5)
+        sample.imu.acceleration[:] = orientation.inv().apply((0.0, 0.0, 9.81))
+
+    rolling.roll(1.6, turn)
+    assert not rolling.plugin.running and "which refuses messages" in rolling.plugin.health()[1]
+    (refusal,) = [text for text in caplog.messages if text.startswith("feedback 'imu_base' refuses")]
+    assert "the ground turns by 0.05" in refusal
+    rolling.roll(0.8, turn)
+    assert not rolling.plugin.running
+    rolling.roll(1.2, turn)
+    assert rolling.plugin.running
+
+
 def test_time_that_goes_back_begins_anew(rolling):
     assert rolling.way > 0.1
     bus = rolling._plugins._bus

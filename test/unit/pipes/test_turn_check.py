@@ -215,3 +215,19 @@ def test_an_accelerometer_in_other_units_or_without_gravity_is_named(force, meas
     assert bool(named) == bool(measured)
     if named:
         assert named[0][0] < 2.0 and f"measures {measured}" in named[-1][1]
+
+
+def test_what_others_distrust_is_refused_until_it_rests():
+    check, refused = TurnCheck(), []
+    for step in range(2000):
+        time = step * PERIOD
+        rate = 0.1 if 0.5 < time < 2.0 else 0.0
+        tilt = 0.1 * min(max(time - 0.5, 0.0), 1.5)
+        if step == 500:
+            check.distrust("the ground turns")
+        try:
+            check.check(values(Rotation.from_euler("x", tilt), (rate, 0.0, 0.0)), True, time, time)
+        except PipeError as error:
+            assert "the ground turns" in error.what
+            refused.append(time)
+    assert refused[0] == pytest.approx(1.0) and refused[-1] == pytest.approx(2.5, abs=0.21)

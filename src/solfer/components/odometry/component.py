@@ -136,8 +136,20 @@ class Odometry(Component):
             if check.warning:
                 self._throttle.warning(check.warning, "%s: %s, it does not count", self.name, check.warning)
                 check.warning = ""
-        if isinstance(self.law, FilteredOdometry) and self.law.consensus.contradicted > self._INCONSISTENCY_TIME:
-            self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
+        law = self.law
+        if isinstance(law, FilteredOdometry):
+            if law.consensus.contradicted > self._INCONSISTENCY_TIME:
+                self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
+            if law.ground.turns:
+                self._distrust(law)
+
+    def _distrust(self, law: FilteredOdometry) -> None:
+        """Let the IMU be refused, below which the ground turns: it turns on its link, or many encoders drift."""
+        law.stop_tilting()
+        ground = law.ground
+        reason = f"the ground turns by {ground.apart[0]:.2g} rad below wheels that carry the robot"
+        if not self.streams.distrust(reason):
+            self._throttle.warning("ground", "%s: by the IMU %s; it, or joints of legs are wrong", self.name, reason)
 
     def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""

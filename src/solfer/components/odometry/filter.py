@@ -74,6 +74,7 @@ class FilteredOdometry:
     Attributes:
         kalman: The filter.
         consensus: Finds the wheels that roll.
+        ground: The ground below them.
         position: Position of the base's origin in the world, shape (3,) [m]; live.
         heading: Angle about the vertical from the world to the base's x axis [rad].
         velocity: Velocity of the base's origin in the heading frame, shape (3,) [m/s]; live.
@@ -98,7 +99,7 @@ class FilteredOdometry:
         )
         self.consensus = WheelConsensus(count, tags.slip_time)
         self._motion = WheelMotion(wheels)
-        self._ground = GroundPlane(self._motion, self.kalman, math.tan(math.radians(tags.level)))
+        self.ground = GroundPlane(self._motion, self.kalman, math.tan(math.radians(tags.level)))
         self._imu = ImuProgress(wheels.joints)
         self.filter: LowPass | None = None
         self.smoothing: LowPass | None = None
@@ -110,7 +111,7 @@ class FilteredOdometry:
     @property
     def lifted(self) -> np.ndarray:
         """Which wheels are lifted, shape (k,); live."""
-        return self._ground.lifted
+        return self.ground.lifted
 
     def take(self, tags: OdometryTags) -> None:
         """Go on with the numbers of other tags by which wheels and ground are classified."""
@@ -132,13 +133,13 @@ class FilteredOdometry:
         wheels.update(base.heading)
         self.heading = base.heading
         self._imu.start()
-        self._ground.start()
+        self.ground.start()
         motion.spreads[:] = 0.0
         self._weigh()
         motion.trusted[:] = motion.weights
         filter_kernel.turn_rotation(base.rotation, -base.heading, kalman.axes)
         self._imu.rate_before[:] = base.angular
-        self._ground.start_map()
+        self.ground.start_map()
         base.subtract_tilt(*kalman.tilt.tolist())
         wheels.subtract_tilt(*kalman.tilt.tolist())
         self.position[:] = 0.0, 0.0, -motion.mean_height()
@@ -165,7 +166,7 @@ class FilteredOdometry:
     def place(self, x: float, y: float, heading: float) -> None:
         """Put the base somewhere else on the ground [m], with another heading [rad]; the pose is known then."""
         self.kalman.place()
-        self._ground.map.forget()
+        self.ground.map.forget()
         self.position[:2] = x, y
         self._imu.offset += heading - self.heading
         self.heading = heading
@@ -200,11 +201,15 @@ class FilteredOdometry:
         )
         self._correct(yaw, imu_time, legs / period)
         self._integrate(yaw, imu_time, unknown)
-        self._ground.update(self._base.fresh, period)
+        self.ground.update(self._base.fresh, period, self.heading, angular=self.angular)
         motion.remember()
         self._find_velocity()
         if measured:
             self._base.subtract_tilt(*self.kalman.tilt.tolist())
+
+    def stop_tilting(self) -> None:
+        """Assume that the base does not tilt, until the IMU measures it again."""
+        self._base.angular[:2] = 0.0
 
     def write_covariance(self, pose: np.ndarray, twist: np.ndarray) -> None:
         """Write the covariances of the pose, in world axes, and of the twist, in the heading frame.
@@ -258,7 +263,7 @@ class FilteredOdometry:
         return shaken, sample
 
     def _weigh(self) -> None:
-        self._motion.weigh(self._ground.lifted, self._tags.touch if self._tags.forces else None)
+        self._motion.weigh(self.ground.lifted, self._tags.touch if self._tags.forces else None)
 
     def _measure_yaw(self) -> tuple[float, float, float]:
         """Return the yaw [rad], the time that the gyroscope measures [s], and a variance [rad^2].
@@ -338,13 +343,13 @@ class FilteredOdometry:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
         # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead; below 0.15 m/s
         # encoders are too coarse to measure that
-        sloped = 0.0 if self._ground.map.level else 1.5 * float(self._motion.spreads.max()) / max(speed, 0.15)
+        sloped = 0.0 if self.ground.map.level else 1.5 * float(self._motion.spreads.max()) / max(speed, 0.15)
         noise = 5e-4  # [m/s] by encoders
         return noise * noise + (self._tags.radius_share * speed) ** 2 + sloped * sloped
 
     def _integrate(self, measured: float, imu_time: float, unknown: float) -> None:
         """Integrate the pose, in the middle of the yaw, and come to the height of the map."""
-        ground = self._ground
+        ground = self.ground
         imu = self._imu
         motion = self._motion
         kalman = self.kalman

@@ -90,6 +90,9 @@ MOTION = BlockLayout(
     arms=(float, "count", 3),
     arms_before=(float, "count", 3),
     step=(float, "joint_count"),
+    # torques of the joints, and which of them do not roll
+    torques=(float, "joint_count"),
+    legs=(bool, "joint_count"),
     # weights of wheels that touch, of those that also roll, and the spread of what is left of each one's velocity
     weights=(float, "count"),
     trusted=(float, "count"),
@@ -109,8 +112,12 @@ GROUND = BlockLayout(
     slope=(float, 2),
     rise=(float, "count"),  # of each wheel above the others
     lifted=(bool, "count"),
+    # slopes in the world that driving explains, how far those of the plane are from them, and the time since then
+    followed=(float, 2),
+    apart=(float, 1),
+    since=(float, 1),
 )
-"""What `find_lifted` writes."""
+"""What `find_lifted` and `follow_plane` write."""
 
 _motion_at = MOTION.at
 _ground_at = GROUND.at
@@ -215,6 +222,84 @@ def fit_plane(weights, arms, without, slope):
 def _plane(weights, arms, slope):
     """Write the slopes of the plane through the contacts that count, along x and y; return whether there is one."""
     return fit_plane(weights, arms, -1, slope)[0]
+
+
+@part
+def carries(motion, i):
+    """Return whether torques press a wheel onto the ground; those of a leg in the air hold it up."""
+    down = 0.0
+    row = 3 * i + 2
+    for k in range(motion.joint_count):
+        if motion.legs[k]:
+            down -= motion.jacobian[row, k] * motion.torques[k]
+    return down > 0.0
+
+
+@part
+def sides(arms):
+    """Return how far the contacts are apart along x and along y, at least 0.1 [m]."""
+    x0 = x1 = arms[0, 0]
+    y0 = y1 = arms[0, 1]
+    for i in range(1, len(arms)):
+        x0 = min(x0, arms[i, 0])
+        x1 = max(x1, arms[i, 0])
+        y0 = min(y0, arms[i, 1])
+        y1 = max(y1, arms[i, 1])
+    return max(x1 - x0, 0.1), max(y1 - y0, 0.1)
+
+
+def _follow_plane(start, ground_start, heading, velocity, angular, measured, period):
+    """Find the plane through the contacts, and how far it has turned in the world otherwise than by driving [rad].
+
+    Where a robot drives onto another slope the ground turns below it at its speed over the distance of the wheels. It
+    does not where the robot stands, however legs move and whatever pushes it: what tips it over lifts wheels. So slopes
+    are followed as fast as that, while all wheels carry the robot and it tilts more slowly than in a fall.
+
+    Args:
+        start: Address of the motion of the wheels.
+        ground_start: Address of the ground.
+        heading: Heading of the base.
+        velocity: Velocity of the ground point, shape (3,).
+        angular: Angular velocity of the base, shape (3,).
+        measured: Whether the IMU has measured the tilt.
+        period: Time since the last measurement.
+
+    Returns:
+        0: there is no plane. 1: there is. 2: it has turned too far.
+    """
+    steepest = 0.3  # difference of two slopes onto which a robot drives
+    margin = 0.03  # [rad/s] for which there is no reason
+    uneven = 0.04  # [rad] as by stones
+    height = 0.01  # [m] from which on a wheel counts as lifted
+    motion = _motion_at(start)
+    ground = _ground_at(ground_start)
+    slope = ground.slope
+    ground.since[0] += period
+    if not fit_plane(motion.weights, motion.arms, -1, slope)[0]:
+        ground.since[0] = math.inf
+        return 0
+    falls = math.sqrt(angular[0] ** 2 + angular[1] ** 2) > 0.5  # [rad/s]
+    for i in range(motion.count):
+        if falls or motion.weights[i] <= 0.0 or not carries(motion, i):
+            ground.since[0] = math.inf
+            return 1
+    if not measured:
+        return 1
+    cosine = math.cos(heading)
+    sine = math.sin(heading)
+    length, width = sides(motion.arms)
+    # where it turns about the vertical each of its sides climbs by one wheel
+    rate = max(abs(velocity[0]) / length, abs(velocity[1]) / width) + 0.5 * abs(angular[2])
+    allowed = (margin + steepest * rate) * ground.since[0]
+    x = cosine * slope[0] - sine * slope[1] - ground.followed[0]
+    y = sine * slope[0] + cosine * slope[1] - ground.followed[1]
+    apart = math.sqrt(x * x + y * y)
+    share = allowed / apart if apart > allowed else 1.0
+    ground.followed[0] += share * x
+    ground.followed[1] += share * y
+    ground.apart[0] = (1.0 - share) * apart
+    ground.since[0] = 0.0
+    return 2 if ground.apart[0] > uneven + height / min(length, width) else 1
 
 
 @part
@@ -334,6 +419,7 @@ measure_displacements = cached(f"void(int64, {_V})", _measure_displacements)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
 learn_spreads = cached(f"void(int64, {_V}, {_F}, {_B}, {_F})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
+follow_plane = cached(f"int64(int64, int64, {_F}, {_V}, {_V}, boolean, {_F})", _follow_plane)
 find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_lifted)
 velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)

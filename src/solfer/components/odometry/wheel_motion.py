@@ -45,6 +45,8 @@ class WheelMotion:
             arms=wheels.arms,
             arms_before=self._arms_before,
             step=self.step,
+            torques=wheels.torque,
+            legs=wheels.legs,
             weights=self.weights,
             trusted=self.trusted,
             spreads=self.spreads,

@@ -132,6 +132,11 @@ class Wheels:
         """Number of DoFs without the base."""
         return len(self.legs)
 
+    @property
+    def torque(self) -> np.ndarray:
+        """Measured torques of the joints, shape (joints,) [Nm]; live."""
+        return self._robot.state.torque[6:]
+
     def update(self, heading: float) -> None:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)

@@ -51,7 +51,16 @@ WITNESSED = 22
 FORCE_SIZE = 23
 """Mean size of the specific force."""
 
-NUMBERS = 24
+IS_DISTRUSTED = 24
+"""Whether others have found it to be wrong; until it rests."""
+
+STILL = 25
+"""Quaternion from which the tilt has not moved, 4 numbers."""
+
+STILL_TIME = 29
+"""For how long."""
+
+NUMBERS = 30
 """How many numbers these are."""
 
 
@@ -125,6 +134,18 @@ def _find_skew(quaternion, before):
 
 
 @part
+def _find_rest(quaternion, passed, before):
+    """Trust a link again that has not tilted for a while."""
+    if _tilt_between(quaternion, before, STILL) > 0.02:  # [rad]
+        for k in range(4):
+            before[STILL + k] = quaternion[k]
+        before[STILL_TIME] = 0.0
+    before[STILL_TIME] += passed
+    if before[STILL_TIME] > 0.5:  # [s]
+        before[IS_DISTRUSTED] = 0.0
+
+
+@part
 def _compare_rotations(values, last, own_axes, passed, rate, before):
     """Compare the rotation since the quaternion before, in the axes of the link or of the world, with the rates."""
     fastest = 10.0  # rate beyond which the orientation has to rotate as fast: else it is a spike [rad/s]
@@ -179,6 +200,11 @@ def _find_fault(values, own_axes, force, arrival, stamp, before):
     if is_next and rate < 0.5:  # [rad/s]: a sensor that rotates faster does not measure gravity alone
         _add_force(quaternion, force, passed, before)
     fault, size = _find_skew(quaternion, before)
+    if before[IS_DISTRUSTED]:
+        if is_next:
+            _find_rest(quaternion, passed, before)
+        if fault == 0 and before[IS_DISTRUSTED]:
+            return 6, 0.0
     if fault or not is_next or rate == 0.0:  # many senders leave rates zero
         return fault, size
     fault, size = _compare_rotations(values, last, own_axes, passed, rate, before)
@@ -203,7 +229,7 @@ def _check_rotation(values, own_axes, force, arrival, stamp, before):
     Returns:
         1 and an angle: the tilt has leapt by it. 2: it rotates by this angle, and otherwise by its rates. 3: the
         specific force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow.
-        0: none. 5: the mean specific force is so large [m/s^2], which refutes nothing.
+        0: none. 5: the mean specific force is so large [m/s^2], which refutes nothing. 6: others distrust the link.
     """
     fault, size = _find_fault(values, own_axes, force, arrival, stamp, before)
     if fault == 0 or fault == 5:

@@ -101,6 +101,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         super().restart()
         if self._turn_check is not None:
             self._turn_check.forget()
+        if self.history is not None:
+            self.history.contradiction = ""
 
     def check_fit(self, message: Message, quantity: str = "") -> None:
         """See `FeedbackPipe.check_fit`."""
@@ -125,6 +127,10 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         if "orientation" not in reading.lacks:
             options |= self._oriented
         if self._turn_check is not None:
+            history = self.history
+            if history is not None and history.contradiction:
+                self._turn_check.distrust(history.contradiction)
+                history.contradiction = ""
             oddity = self._turn_check.check(
                 reading.values, reading.own_axes, self.reader.arrival, self._stamp, force=reading.force
             )

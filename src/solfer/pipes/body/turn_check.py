@@ -20,7 +20,8 @@ class TurnCheck:
     agree again, or until messages pause for 0.1 s. Rates that are all zero were not measured; those above 10 rad/s are
     spikes where the orientation since the message before differs from them by half. The mean specific force of 1.5 s is
     vertical within 0.1 rad, which is a change of the velocity by 1.5 m/s; it does not count where it is not within
-    1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
+    1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall. A link that others
+    distrust counts again when its tilt has stayed within 0.02 rad for 0.5 s.
     """
 
     def __init__(self) -> None:
@@ -30,12 +31,20 @@ class TurnCheck:
         self._check = orientations.check_rotation
         self._before = np.zeros(orientations.NUMBERS)
         self._times = self._before[orientations.ARRIVAL : orientations.STAMP + 1]
+        self._is_distrusted = orientations.IS_DISTRUSTED
+        self._reason = ""
         self.forget()
 
     def forget(self) -> None:
         """Accept whatever comes next."""
         self._before[:] = 0.0
         self._times[:] = -math.inf
+
+    def distrust(self, reason: str) -> None:
+        """Refuse the link until it rests, for a reason that others have found."""
+        self._before[self._is_distrusted :] = 0.0
+        self._before[self._is_distrusted] = 1.0
+        self._reason = reason
 
     def check(
         self, values: np.ndarray, has_own_axes: bool, arrival: float, stamp: float, force: np.ndarray = UNMEASURED
@@ -68,6 +77,8 @@ class TurnCheck:
             )
         if result == 4:
             raise Contradiction(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")
+        if result == 6:
+            raise Contradiction(self._reason, expected="an IMU and joints of legs that agree, at rest for 0.5 s")
         if result == 5:
             return f"the accelerometer measures {angle:.3g} m/s^2 on average (expected: 9.81 at rest, in m/s^2)"
         return ""

@@ -25,7 +25,9 @@ class GroundPlane:
         slope: Slope of the plane through the contacts, shape (2,); live.
         rise: Rise of each wheel above the others, shape (k,) [m]; live.
         lifted: Which wheels are lifted, shape (k,); live.
-        block: What compiled functions get of these three.
+        turns: Whether the plane has turned otherwise than a robot can drive, with all wheels on the ground.
+        apart: By how much it has, shape (1,) [rad]; live.
+        block: What compiled functions get of these.
     """
 
     def __init__(self, motion: WheelMotion, kalman: WheelInertialFilter, level: float):
@@ -37,8 +39,17 @@ class GroundPlane:
         self.slope = np.zeros(2)
         self.rise = np.zeros(count)
         self.lifted = np.zeros(count, dtype=bool)
+        self.turns = False
+        self.apart, self._since = np.zeros((2, 1))
         self.block = MemoryBlock(
-            filter_kernel.GROUND, count=count, slope=self.slope, rise=self.rise, lifted=self.lifted
+            filter_kernel.GROUND,
+            count=count,
+            slope=self.slope,
+            rise=self.rise,
+            lifted=self.lifted,
+            followed=np.zeros(2),
+            apart=self.apart,
+            since=self._since,
         )
         self._floor = math.nan
         self._floor_variance = 0.0
@@ -49,6 +60,8 @@ class GroundPlane:
         """Begin on level ground, which all wheels touch."""
         self.rise[:] = 0.0
         self.lifted[:] = False
+        self.turns = False
+        self._since[:] = math.inf  # any slope is explained
         self._samples = 0
         self._elapsed = 0.0
 
@@ -76,15 +89,21 @@ class GroundPlane:
         if variance > self._floor_variance + deviation * deviation:
             self._kalman.settle_height(deviation * math.sqrt(time / period))
 
-    def update(self, fresh: bool, period: float) -> None:
+    def update(self, fresh: bool, period: float, heading: float, angular: np.ndarray) -> None:
         """Find the normal of the ground; level ground measures the error of the tilt.
 
         Args:
             fresh: Whether the IMU has measured the tilt.
             period: Time since the last measurement [s].
+            heading: Heading of the base [rad].
+            angular: Its angular velocity in the heading frame, shape (3,) [rad/s].
         """
-        wheels = self._motion.wheels
-        found = bool(self._level) and filter_kernel.plane(self._motion.weights, wheels.arms, self.slope)
+        motion = self._motion
+        wheels = motion.wheels
+        found = self._level and filter_kernel.follow_plane(
+            motion.block.address, self.block.address, heading, self._kalman.velocity, angular, fresh, period
+        )
+        self.turns = found == 2
         if found:
             a, b = self.slope.tolist()
             if math.hypot(a, b) > self._level * (1.0 if wheels.is_level else 0.7):

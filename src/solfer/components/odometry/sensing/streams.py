@@ -188,6 +188,12 @@ class Streams:
             max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, LONGEST_EXTRAPOLATION
         )
 
+    def distrust(self, reason: str) -> bool:
+        """Let the pipe of the IMU refuse what it measures until it rests; return whether there is one that can."""
+        if self._histories is not None:
+            self._histories[1].history.contradiction = reason
+        return self._histories is not None
+
     def turned_since(self) -> np.ndarray | None:
         """Return how the base has turned since the last measurement, in its axes, shape (3, 3); None: not known."""
         return self._samples.turned_since(self._time)
