@@ -6,7 +6,7 @@ layer of another clone of solfer, which has its environment, by turns in the sam
 base drives ahead and back. Times in microseconds, and those of the layer's loop in u too: one `pin.computeAllTerms` of
 CENTAURO in the same minute. `--calls` counts the calls of Python functions in a cycle in memory, which do not depend
 on the machine, and fails if they exceed those in `figure_5_calls.txt` by more than 2 %; `--profile` lists them by room
-and by function.
+and by function, and the memory that a cycle allocates: what it still has at its end by line, and the most at one time.
 """
 
 import os
@@ -16,11 +16,13 @@ import subprocess
 import sys
 import tempfile
 import time
+import tracemalloc
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import CodeType, FrameType
+from unittest import mock
 
 import yaml
 from form import Figures, parser_of
@@ -225,6 +227,39 @@ def called(cycles: int) -> Counter[tuple[str, str]]:
     return own
 
 
+def allocated(cycles: int, figures: Figures) -> None:
+    """Print the memory that cycles of the layer in memory allocate, the median of each figure."""
+    from support.paper.full_control import Figure5Layer
+
+    kept: Counter[str] = Counter()
+    peaks = []
+    cycle = Executor.cycle
+
+    def traced(executor: Executor, *given: int) -> None:
+        if not is_settled:
+            cycle(executor, *given)
+            return
+        tracemalloc.start()
+        cycle(executor, *given)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        for each in tracemalloc.take_snapshot().statistics("lineno"):
+            frame = each.traceback[0]
+            if frame.filename != tracemalloc.__file__:
+                kept[f"{'/'.join(Path(frame.filename).parts[-3:])}:{frame.lineno}"] += each.size
+        tracemalloc.stop()
+
+    is_settled = False
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(Executor, "cycle", traced):
+        world = Figure5Layer(Path(folder))
+        world.run(2.0)
+        is_settled = True
+        world.run(cycles / world.rate)
+    for line, size in kept.most_common(30):
+        figures.row(line[-50:], bytes=size / cycles)
+    figures.row("allocated at the end of a cycle", bytes=sum(kept.values()) / cycles)
+    figures.row("allocated at one time", bytes=sorted(peaks)[len(peaks) // 2])
+
+
 def main() -> int:
     """Measure, or count."""
     parser = parser_of(__doc__)
@@ -259,6 +294,7 @@ def count_calls(lists: bool, figures: Figures) -> int:
             figures.row(room, calls=number / cycles)
         for (path, function), number in found.most_common():
             figures.row(f"{path} {function}"[-50:], calls=number / cycles)
+        allocated(50, figures)
     calls = sum(found.values()) / cycles
     kept = float(KEPT.read_text())
     figures.row("calls of Python functions in a cycle", calls=calls, kept=kept)

@@ -23,7 +23,7 @@ class History:
         values: The numbers in the State's units; NaN: the message lacks it. Shape (N, len(interfaces), k).
         sender: Name of the publisher of the newest message.
         count: Messages of this cycle; 0: nothing new.
-        contradiction: What contradicts the measurements, as who uses them has found; empty: nothing. The pipe takes it.
+        contradiction: Why their user finds the measurements wrong; empty: nothing contradicts them. The pipe takes it.
         dropped: Messages that were lost so far because there were more than N in a cycle, the oldest of them.
         unread: Those of them that were lost before the pipe read them.
     """
