@@ -28,7 +28,6 @@ KERNELS = {
     "gather",
     "objective",
     "self._check",
-    "self._find",
     "self._shift",
 }
 """Compiled functions by the names under which they are called."""

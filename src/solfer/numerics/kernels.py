@@ -71,7 +71,7 @@ def _gather(numbers, rows, source, places, out):
     return wrong
 
 
-def _scatter(values, places, dofs, arrays):
+def _scatter(dofs, arrays, values, places):
     """Write values[row, places] to the entries dofs[places] of the array at the address arrays[row], for each row.
 
     Returns the rows that this changed, a bit each.
@@ -176,5 +176,5 @@ def _keep(block, kept, steps):
 
 keep = cached("float64(float64[:, ::1], float64[:, ::1], float64[::1])", _keep)
 gather = cached("int64(float64[:, ::1], int64[::1], int64[::1], int64[::1], float64[:, ::1])", _gather)
-scatter = cached("int64(float64[:, ::1], int64[::1], int64[::1], int64[::1])", _scatter)
+scatter = cached("int64(int64[::1], int64[::1], float64[:, ::1], int64[::1])", _scatter)
 collect = cached("void(int64[::1], int64[::1], float64[:, ::1])", _collect)

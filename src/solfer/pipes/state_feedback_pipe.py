@@ -5,6 +5,7 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -40,6 +41,35 @@ class Reception:
     history: int = 0
 
 
+class _Destination:
+    """What a pipe writes of a State.
+
+    Args:
+        state: The State.
+        interfaces: Names of the interfaces that are written.
+        dofs: The DoFs, shape (k,).
+
+    Attributes:
+        scatter: Writes values, shape (interfaces, k), of which it gets the indices, and returns what has changed.
+        all: The indices of all values, shape (k,).
+        changed: Names of the interfaces that have changed, by what `scatter` returns.
+    """
+
+    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import scatter
+        from solfer.numerics.pointers import address
+
+        # arrays of a State stay where they are
+        live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
+        self.scatter = partial(scatter, dofs, live)
+        self.all = np.arange(len(dofs))
+        self.changed = tuple(
+            tuple(name for bit, name in enumerate(interfaces) if number >> bit & 1)
+            for number in range(1 << len(interfaces))
+        )
+
+
 class StateFeedbackPipe(FeedbackPipe):
     """A pipe that writes a State; filters make one step in every cycle, also without a new message.
 
@@ -72,10 +102,6 @@ class StateFeedbackPipe(FeedbackPipe):
         reception: Reception,
     ):
         super().__init__(name, reader, reception.required)
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import scatter
-        from solfer.numerics.pointers import address
-
         low_pass = reception.low_pass
         self._state = state
         self._filtered = low_pass is not None
@@ -86,12 +112,7 @@ class StateFeedbackPipe(FeedbackPipe):
             for field, values, passed in zip(fields, self.values, self._passed, strict=True)
         )
         interfaces = [each.interface for each in self.state_fields]
-        self._scatter = scatter
-        self._dofs = dofs
-        self._all = np.arange(len(dofs))
-        # arrays of a State stay where they are
-        self._live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
-        self._touched = _subsets(interfaces)
+        self._destination = _Destination(state, interfaces, dofs)
         self.part: np.ndarray | None = None
         self._precedence = Precedence(len(dofs)) if reception.measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
@@ -168,9 +189,9 @@ class StateFeedbackPipe(FeedbackPipe):
         if self._filtering:
             for state_field in self.state_fields:
                 state_field.filter()
-            part = self._all if self._ever is None else self._ever
-            changes = self._scatter(self._passed, part, self._dofs, self._live)
-            self._state.touch(*self._touched[changes])
+            destination = self._destination
+            changes = destination.scatter(self._passed, destination.all if self._ever is None else self._ever)
+            self._state.touch(*destination.changed[changes])
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`; resets the filters as well."""
@@ -288,12 +309,12 @@ class StateFeedbackPipe(FeedbackPipe):
     def _write_fields(self) -> None:
         """Write the newest values to the State, or pass them to the filters."""
         if not self._filtered:
-            part = self._all if self.part is None else self.part
-            changes = self._scatter(self.values, part, self._dofs, self._live)
+            destination = self._destination
+            changes = destination.scatter(self.values, destination.all if self.part is None else self.part)
             if changes:
                 self.changed = self.arrival
                 versions = self._state.versions
-                for interface in self._touched[changes]:
+                for interface in destination.changed[changes]:
                     versions[interface] += 1
             return
         for state_field in self.state_fields:
@@ -303,10 +324,3 @@ class StateFeedbackPipe(FeedbackPipe):
     @abc.abstractmethod
     def _match(self, message: Message) -> None:
         """Find out which DoFs a message contains: `part`. `_decode` does so, too, and raises the same."""
-
-
-def _subsets(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Return the names of which the bits of a number are set, for each number."""
-    return tuple(
-        tuple(name for bit, name in enumerate(names) if number >> bit & 1) for number in range(1 << len(names))
-    )

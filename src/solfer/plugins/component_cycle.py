@@ -5,6 +5,7 @@ from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.timing.robot_time import RobotTime
 from solfer.recording.log import Logger
+from solfer.transport.declared import Publications
 
 
 class ComponentCycle:
@@ -15,11 +16,13 @@ class ComponentCycle:
         robot_time: Its time.
         jumps: Finds jumps of the base; None: it has no references in the world.
         guard: Keeps what it does to its Robot, if it fails, away from others; None: it is not shared.
+        publications: What it declares to publish; None: nothing.
 
     Attributes:
         robot_time: See above.
         jumps: See above.
         dynamics: What it requests of the Robot's dynamics; None: nothing.
+        publications: See above; its loop counts them down.
         logger: Where the component logs its cycles; None: it logs nothing by itself.
     """
 
@@ -29,6 +32,7 @@ class ComponentCycle:
         robot_time: RobotTime,
         jumps: BaseJumps | None,
         guard: MeasuredGuard | None,
+        publications: Publications | None,
     ):
         self.robot_time = robot_time
         self._component = component
@@ -36,6 +40,7 @@ class ComponentCycle:
         self._guard = guard
         # made before the first cycle: importing its modules takes a while
         self.dynamics = component.model.dynamics if component.dynamics else None
+        self.publications = publications or Publications()
         self.logger: Logger | None = None
         self._began = 0.0  # [s]
 

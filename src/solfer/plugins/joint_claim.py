@@ -46,7 +46,7 @@ class JointClaim:
         is_taken: Whether that is because others, or the lower level itself, have moved the joints since.
         restarted: Whether that is because the robot was put into another state: all plugins have to begin again.
         refused: How often the lower level reported that it refuses our commands.
-        pending: Reports whether refusals wait for `lost`.
+        refusals: What the lower level refuses; where none waits, `lost` has nothing new.
         note: Called with kind and text of the event when the joints become ours, are lost, or are given back.
     """
 
@@ -67,8 +67,7 @@ class JointClaim:
         self._since = -math.inf
         self._next = -math.inf
         self._settled = -math.inf
-        self._refusals = middleware.queue(REFUSALS_TOPIC, REFUSALS)
-        self.pending = middleware.pending([self._refusals])
+        self.refusals = middleware.queue(REFUSALS_TOPIC, REFUSALS)
         self.reason = ""
         self.restarted = False
         self.is_taken = False
@@ -110,9 +109,9 @@ class JointClaim:
 
         A command that is refused because it is wrong is logged, and returned by `warning`.
         """
-        if self._refusals.waits:
+        if self.refusals.waits:
             before = self.reason
-            for message in self._refusals.drain():
+            for message in self.refusals.drain():
                 self._receive(message)
             if self.reason != before:
                 self.note(LOST, self.reason)
@@ -120,8 +119,8 @@ class JointClaim:
 
     def restarts(self) -> bool:
         """Return whether the robot was put into another state while the plugin waits; see `restarted`."""
-        if self._refusals.waits:
-            for message in self._refusals.drain():
+        if self.refusals.waits:
+            for message in self.refusals.drain():
                 if ALL_OWNERS in message.owners:
                     self.reason = message.reasons[message.owners.index(ALL_OWNERS)]
                     self.restarted = True

@@ -136,8 +136,13 @@ class Plugin:
         )
         self._readiness.taken = parts.outputs.forget
         self.timing = CycleTiming()
-        self._work = ComponentCycle(component, RobotTime(self.feedbacks, period), parts.jumps, guard=parts.guard)
-        self._publications = parts.publications or Publications()
+        self._work = ComponentCycle(
+            component,
+            RobotTime(self.feedbacks, period),
+            parts.jumps,
+            guard=parts.guard,
+            publications=parts.publications,
+        )
         self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._wait()
 
@@ -234,7 +239,7 @@ class Plugin:
         self.outputs.collect()
         times[GATE] = -mark + (mark := clock())
         self.outputs.send(self._now())
-        publications = self._publications
+        publications = work.publications
         publications.left -= 1
         if not publications.left:
             publications.run()

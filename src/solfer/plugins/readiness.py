@@ -117,7 +117,7 @@ class Readiness:
         if verdict is not WORK:
             return verdict
         if running:
-            ours = not (claim.lost() if claim.pending() else claim.reason)
+            ours = not (claim.lost() if claim.refusals.waits else claim.reason)
         else:
             ours = claim.granted()
         if claim.is_taken:

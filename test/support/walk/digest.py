@@ -50,7 +50,18 @@ ADDRESSES = ("numba", "llvmlite", "pinocchio", "concurrent", "threading", "pybul
 PLACE = re.compile(r"[^ ]*\.yaml(:\d+)+(: [\w.]+)?")
 """Places in files, which move with every change; they are for errors."""
 
-UNSTEADY = ("_version", "client", "_client", "_program", "_live", "_collect", "collect", "_address", "address")
+UNSTEADY = (
+    "_version",
+    "client",
+    "_client",
+    "_program",
+    "scatter",
+    "_collect",
+    "collect",
+    "find",
+    "_address",
+    "address",
+)
 """Attributes that count what happened in this process before, or have addresses of what is elsewhere."""
 
 

@@ -44,12 +44,12 @@ def test_scattered_values_are_found_where_they_change(live):
     dofs, values = np.array([5, 0, 2]), np.zeros((2, 3))
     values[0], values[1] = live[0][dofs], live[1][dofs]
     everything = np.arange(3)
-    assert scatter(values, everything, dofs, addresses(live)) == 0
+    assert scatter(dofs, addresses(live), values, everything) == 0
     values[1, 2] += 1.0
-    assert scatter(values, everything, dofs, addresses(live)) == 2
+    assert scatter(dofs, addresses(live), values, everything) == 2
     assert_array_equal(live[1], [10.0, 11.0, 13.0, 13.0, 14.0, 15.0])
     values += 1.0
-    assert scatter(values, np.array([1]), dofs, addresses(live)) == 3
+    assert scatter(dofs, addresses(live), values, np.array([1])) == 3
     assert_array_equal(live[0], [1.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 
 

@@ -152,7 +152,7 @@ class ReferenceSet:
         """Let references move as configured, in control cycles of `period` [s]."""
         tags = self._tags
         self._period = period
-        self._left = self._between = max(1, round(CHECK_PERIOD / period))
+        self._left = 0
         self._filter = ReferenceFilter(len(self.list), period)
         self._residuals = np.zeros((len(self.list), 2))
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
@@ -242,7 +242,7 @@ class ReferenceSet:
         self._left -= 1
         if self._left > 0:
             return
-        self._left = self._between
+        self._left = round(CHECK_PERIOD / self._period)
         farthest = None
         distance = 0.0
         for target in self.list:

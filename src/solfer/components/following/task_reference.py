@@ -292,7 +292,7 @@ class TaskReference:
     def watch(self) -> bool:
         """Look whether the task still comes nearer to its reference, see `stays`; return whether that is at rest.
 
-        Called every CHECK_PERIOD.
+        Called every 20 ms.
         """
         is_still = self._filtered.is_still
         if is_still:
