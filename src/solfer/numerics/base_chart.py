@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 
-# These three are compiled as well (`solfer.numerics.twist_transport`).
+# All but the last of these functions are compiled as well (`solfer.numerics.twist_transport`).
 
 
 def angles_of(rotation):
@@ -53,6 +53,14 @@ def rates_of(rx, ry, wx, wy, wz):
     return wx - sy * yaw, cx * wy + sx * wz, yaw
 
 
+def angular_of(rx, ry, roll, pitch, yaw):
+    """Compute the angular velocity in the axes of the chart's origin [rad/s] from the rates of the three angles."""
+    cx = math.cos(rx)
+    sx = math.sin(rx)
+    cy = math.cos(ry)
+    return roll + math.sin(ry) * yaw, cx * pitch - sx * cy * yaw, sx * pitch + cx * cy * yaw
+
+
 def moment_of(rx, ry, tx, ty, tz):
     """Compute the moment in the axes of the chart's origin [Nm] of efforts along the three angles: G^T t.
 
@@ -81,7 +89,7 @@ class BaseChart:
 
     def __init__(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: np.ndarray | None = None):
         self.position = np.array(position, dtype=float)
-        self.rotation = np.eye(3) if rotation is None else np.array(rotation, dtype=float)
+        self.rotation = np.eye(3) if rotation is None else np.array(rotation, dtype=float, order="C")
 
     def from_pose(self, position: ArrayLike, quaternion: Sequence[float] | np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write the six numbers of a pose.
@@ -129,10 +137,4 @@ class BaseChart:
     def twist_from_rates(self, base: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute linear [m/s] and angular velocity [rad/s] of the base in world axes, shape (3,) each."""
         rx, ry, _ = base[3:6].tolist()
-        cx = math.cos(rx)
-        sx = math.sin(rx)
-        cy = math.cos(ry)
-        sy = math.sin(ry)
-        roll, pitch, yaw = rates[3:6]
-        angular = (roll + sy * yaw, cx * pitch - sx * cy * yaw, sx * pitch + cx * cy * yaw)
-        return self.rotation @ rates[:3], self.rotation @ angular
+        return self.rotation @ rates[:3], self.rotation @ angular_of(rx, ry, *rates[3:6].tolist())

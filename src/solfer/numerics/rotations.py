@@ -86,16 +86,19 @@ class QuaternionConvention:
     Args:
         order: One of QUATERNION_ORDERS.
         kind: One of QUATERNION_KINDS.
+
+    Attributes:
+        is_ours: Whether it is that of a Hamilton quaternion (x, y, z, w).
     """
 
     def __init__(self, order: str = "xyzw", kind: str = "HAMILTONIAN"):
-        self._alike = order == "xyzw" and kind == "HAMILTONIAN"
+        self.is_ours = order == "xyzw" and kind == "HAMILTONIAN"
         self._indices = np.array((0, 1, 2, 3) if order == "xyzw" else (1, 2, 3, 0))
         self._signs = np.array((1.0, 1.0, 1.0, 1.0) if kind == "HAMILTONIAN" else (-1.0, -1.0, -1.0, 1.0))
 
     def read(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write the Hamilton quaternion (x, y, z, w) of an external one into `out`; shape (4,) each, not the same."""
-        if self._alike:
+        if self.is_ours:
             out[...] = quaternion
             return out
         np.take(quaternion, self._indices, out=out, mode="clip")
@@ -103,6 +106,9 @@ class QuaternionConvention:
 
     def write(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write the external quaternion of a Hamilton one (x, y, z, w) into `out`; shape (4,) each, not the same."""
+        if self.is_ours:
+            out[...] = quaternion
+            return out
         out[self._indices] = quaternion
         out[self._indices] *= self._signs
         return out

@@ -1,4 +1,4 @@
-"""Pose and twist of a floating base from those of a sensor that it carries, compiled: one call a message.
+"""Pose and twist of a floating base, compiled: from those of a sensor that it carries, or from its six numbers.
 
 With the pose (p_s, R_s) and the twist (v_s, w_s) of the sensor in the world, and its pose (r, R) and twist (v, w)
 against the base in the axes of the base, the base has
@@ -126,6 +126,7 @@ _matrix = part(_matrix)
 _angles = part(chart.angles_of)
 _rates = part(chart.rates_of)
 _rotation = part(chart.rotation_of)
+_angular = part(chart.angular_of)
 
 
 def update(values, mount, world, origin, base, rates, options):
@@ -161,3 +162,38 @@ def update(values, mount, world, origin, base, rates, options):
 
 
 _update = cached(f"void({'float64[::1], ' * 6}int64)", update, sources=[Path(chart.__file__)])
+
+
+class BaseMotion:
+    """Pose and twist of a floating base in the world, by its six numbers: of its own link without kinematics.
+
+    Args:
+        base_chart: Chart of the base.
+
+    Attributes:
+        rotation: Rotation from the base to the world, shape (3, 3).
+        position: Its position, shape (3,) [m].
+        velocity: Linear, then angular velocity in world axes, shape (6,) [m/s, rad/s].
+    """
+
+    def __init__(self, base_chart: BaseChart):
+        self._numbers = np.zeros(18)
+        self.rotation = self._numbers[:9].reshape(3, 3)
+        self.position = self._numbers[9:12]
+        self.velocity = self._numbers[12:]
+        self._chart = np.concatenate((base_chart.rotation.ravel(), base_chart.position))
+
+    def update(self, base: np.ndarray, rates: np.ndarray) -> None:
+        """Compute them of the six numbers [m, rad] and their rates, which may be the first ones of longer arrays."""
+        _move(base, rates, self._chart, self._numbers)
+
+
+def move(base, rates, origin, out):
+    """Compute pose and twist of the base; see `BaseMotion`."""
+    out[:9] = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
+    out[9:12] = _rotated(origin, base[:3]) + origin[9:12]
+    out[12:15] = _rotated(origin, rates[:3])
+    out[15:18] = _rotated(origin, np.array(_angular(base[3], base[4], rates[3], rates[4], rates[5])))
+
+
+_move = cached(f"void({', '.join(['float64[::1]'] * 4)})", move, sources=[Path(chart.__file__)])

@@ -20,7 +20,7 @@ from solfer.components.odometry.messages import (
     transform,
 )
 from solfer.components.odometry.pose_covariances import PoseCovariances
-from solfer.components.odometry.sensing.measured_base import MeasuredBase, about_vertical
+from solfer.components.odometry.sensing.measured_base import MeasuredBase
 from solfer.components.odometry.sensing.streams import Streams
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
@@ -29,6 +29,7 @@ from solfer.interfaces.declaration import Accepted, LiveParameter, Parameter, Se
 from solfer.interfaces.geometry import bare_frame
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.numerics.base_chart import BaseChart
+from solfer.numerics.blocks import MemoryBlock
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
 from solfer.throttle import Throttle
@@ -70,7 +71,6 @@ class Odometry(Component):
         self._wheels = wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, where=self.tags.where("chain"))
         self.streams = Streams(robot, self.tags.imu_delay)
         self._base = MeasuredBase(robot)
-        self._chart = robot.kinematics.base or BaseChart()
         self.law: FilteredOdometry | GeometricOdometry
         if self.tags.method == "geometric":
             self.law = GeometricOdometry(robot, wheels, self._base)
@@ -79,6 +79,20 @@ class Odometry(Component):
         self._pose, self._rates = np.zeros((2, 6))
         self._rotation = np.eye(3)
         self._position = np.zeros(3)
+        chart = robot.kinematics.base or BaseChart()
+        self._block = MemoryBlock(
+            filter_kernel.POSE,
+            position=self.law.position,
+            velocity=self.law.velocity,
+            angular=self.law.angular,
+            axes=chart.rotation,
+            origin=chart.position,
+            place=self._position,
+            rotation=self._rotation,
+            local=np.zeros(9),
+            pose=self._pose,
+            rates=self._rates,
+        )
         self._throttle = Throttle(log)
         self._child = robot.kinematics.base_link or ""
         if self.tags.method == "filter":
@@ -280,25 +294,17 @@ class Odometry(Component):
         return Accepted()
 
     def _write(self) -> None:
-        """Write where the base is now into the measured State; its angles go on without jumps by revolutions."""
-        law = self.law
+        """Write where the base is now into the measured State."""
+        heading = self.law.heading
+        base = self._base
         state = self.model.state
         ahead = self.streams.ahead
-        linear = about_vertical(law.velocity, law.heading)
-        angular = about_vertical(law.angular, law.heading)
-        yaw = law.heading - self._base.heading
         turned = self.streams.turned_since() if ahead else None
-        if turned is None:
-            yaw += ahead * float(angular[2])
-        filter_kernel.turn_rotation(self._base.rotation, yaw, self._rotation)
-        if turned is not None:
-            self._rotation[:] = self._rotation @ turned
-        angles = self._pose[3:].tolist()
-        np.add(law.position, ahead * linear, out=self._position)
-        self._chart.from_rotation(self._position, self._rotation, self._pose)
-        for axis, angle in enumerate(angles, 3):
-            self._pose[axis] += 2.0 * math.pi * round((angle - self._pose[axis]) / (2.0 * math.pi))
-        self._chart.rates_from_twist(self._pose, linear, angular, self._rates)
+        before, after = turned or (self._position, self._position)
+        yaw = heading - base.heading
+        filter_kernel.write_pose(
+            self._block.address, base.rotation, heading, yaw, ahead, before, after, turned is not None
+        )
         state.position[:6] = self._pose
         state.velocity[:6] = self._rates
         self.streams.written()

@@ -1,9 +1,15 @@
 """Compiled steps of odometry on wheels. Arrays are described in `Wheels`, `MeasuredBase` and `FilteredOdometry`."""
 
 import math
+from pathlib import Path
 
+from solfer.numerics import base_chart as chart
 from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
+
+_angles_of = part(chart.angles_of)
+_rates_of = part(chart.rates_of)
+_rotation_of = part(chart.rotation_of)
 
 
 def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
@@ -40,6 +46,90 @@ def turn_about_vertical(rotation, angle, out):
         x = rotation[0, k]
         y = rotation[1, k]
         out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
+
+
+POSE = BlockLayout(
+    "Pose",
+    # of the base, in the world and in its heading frame
+    position=(float, 3),
+    velocity=(float, 3),
+    angular=(float, 3),
+    # of the origin of its chart
+    axes=(float, 3, 3),
+    origin=(float, 3),
+    # what is written: place, rotation in the world and in the chart, the six numbers and their rates
+    place=(float, 3),
+    rotation=(float, 3, 3),
+    local=(float, 9),
+    pose=(float, 6),
+    rates=(float, 6),
+)
+"""What `write_pose` reads and writes."""
+
+_pose_at = POSE.at
+
+
+@part
+def turn_by(rotation, before, after):
+    """Turn a rotation, in its own axes, as a chart has turned from three angles to three others [rad]."""
+    first = _rotation_of(before[0], before[1], before[2])
+    second = _rotation_of(after[0], after[1], after[2])
+    for i in range(3):
+        x = rotation[i, 0]
+        y = rotation[i, 1]
+        z = rotation[i, 2]
+        for k in range(3):
+            total = 0.0
+            for row in range(3):
+                total += (x * first[3 * row] + y * first[3 * row + 1] + z * first[3 * row + 2]) * second[3 * row + k]
+            rotation[i, k] = total
+
+
+def _write_pose(start, base, heading, yaw, ahead, before, after, is_turned):
+    """Write pose and rates of the base some time after its measurement; its angles go on without jumps by revolutions.
+
+    Args:
+        start: Address of the `POSE`.
+        base: Rotation of the base as it was measured.
+        heading: Heading of the base [rad].
+        yaw: How far it has to be turned about the vertical for that [rad].
+        ahead: The time [s].
+        before: Angles of the base when it was measured [rad].
+        after: The newest ones.
+        is_turned: Whether these are known; else it goes on turning about the vertical.
+    """
+    written = _pose_at(start)
+    cosine = math.cos(heading)
+    sine = math.sin(heading)
+    x, y, z = written.velocity
+    velocity = cosine * x - sine * y, sine * x + cosine * y, z
+    x, y, z = written.angular
+    angular = cosine * x - sine * y, sine * x + cosine * y, z
+    rotation = written.rotation
+    turn_about_vertical(base, yaw if is_turned else yaw + ahead * z, rotation)
+    if is_turned:
+        turn_by(rotation, before, after)
+    axes = written.axes
+    pose = written.pose
+    rates = written.rates
+    for k in range(3):
+        written.place[k] = written.position[k] + ahead * velocity[k]
+    for k in range(3):
+        pose[k] = rates[k] = 0.0
+        for row in range(3):
+            pose[k] += axes[row, k] * (written.place[row] - written.origin[row])
+            rates[k] += axes[row, k] * velocity[row]
+        for column in range(3):
+            written.local[3 * k + column] = (
+                axes[0, k] * rotation[0, column] + axes[1, k] * rotation[1, column] + axes[2, k] * rotation[2, column]
+            )
+    wx = axes[0, 0] * angular[0] + axes[1, 0] * angular[1] + axes[2, 0] * angular[2]
+    wy = axes[0, 1] * angular[0] + axes[1, 1] * angular[1] + axes[2, 1] * angular[2]
+    wz = axes[0, 2] * angular[0] + axes[1, 2] * angular[1] + axes[2, 2] * angular[2]
+    angles = _angles_of(written.local)
+    for k in range(3):
+        pose[3 + k] = angles[k] + math.tau * round((pose[3 + k] - angles[k]) / math.tau)
+    rates[3], rates[4], rates[5] = _rates_of(pose[3], pose[4], wx, wy, wz)
 
 
 def _turn_rotation(rotation, angle, out):
@@ -424,3 +514,6 @@ find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_
 velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
+write_pose = cached(
+    f"void(int64, {_M}, {_F}, {_F}, {_F}, {_V}, {_V}, boolean)", _write_pose, sources=[Path(chart.__file__)]
+)

@@ -1,6 +1,7 @@
 """Operational-space command pipes: publish pose and twist of a link."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from solfer.numerics.rotations import QuaternionConvention, quaternion_from_rota
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.transport.endpoints import Writer
 from solfer.transport.messages import VECTOR_MESSAGES, BodyMessage, Message, VectorMessage
+
+if TYPE_CHECKING:
+    from solfer.numerics.twist_transport import BaseMotion
 
 SENT_MESSAGES = {
     "nav_msgs/Odometry": ("position", "velocity"),
@@ -63,12 +67,13 @@ class BodyCommandPipe(CommandPipe):
         convention = link.convention
         self._frame = link.frame
         self._covariances = None if covariances is None else tuple(each.reshape(6, 6) for each in covariances)
-        self._kinematics = kinematics
         self._state = state
+        self._motion = _motion(kinematics, link.name)
         self._link = link.name
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._twist_frame = convention.twist.frame
+        self._is_prescribed = self._convention.is_ours and self._twist_frame != "world"
         self._fill = {
             "nav_msgs/Odometry": self._fill_odometry,
             "geometry_msgs/PoseStamped": self._fill_pose,
@@ -79,7 +84,7 @@ class BodyCommandPipe(CommandPipe):
 
     def collect(self) -> None:
         """Compute pose and twist from the State, and fill the message."""
-        self._kinematics.update(self._state.position, self._state.velocity)
+        self._motion.update(self._state.position, self._state.velocity)
         self._fill()
 
     def _empty(self, message: str) -> Message:
@@ -90,18 +95,23 @@ class BodyCommandPipe(CommandPipe):
 
     def _fill_odometry(self) -> None:
         sent = self.sent
-        sent.position[:] = self._kinematics.position(self._link)
+        motion = self._motion
+        sent.position[:] = motion.position
         self._orient(sent.orientation)
-        linear, angular = self._twist(self._twist_frame or "body")
-        # the message holds the twist in world axes, as turned by a receiver that trusts its orientation
-        prescribed = rotation_from_quaternion(sent.orientation)
-        np.matmul(prescribed, linear, out=sent.linear)
-        np.matmul(prescribed, angular, out=sent.angular)
+        if self._is_prescribed:
+            sent.linear[:] = motion.velocity[:3]
+            sent.angular[:] = motion.velocity[3:]
+        else:
+            linear, angular = self._twist(self._twist_frame or "body")
+            # the message holds the twist in world axes, as turned by a receiver that trusts its orientation
+            prescribed = rotation_from_quaternion(sent.orientation)
+            np.matmul(prescribed, linear, out=sent.linear)
+            np.matmul(prescribed, angular, out=sent.angular)
         if self._covariances is not None:
             sent.pose_covariance[...], sent.twist_covariance[...] = self._covariances
 
     def _fill_pose(self) -> None:
-        self.sent.values[:3] = self._kinematics.position(self._link)
+        self.sent.values[:3] = self._motion.position
         self._orient(self.sent.values[3:])
 
     def _fill_orientation(self) -> None:
@@ -112,11 +122,39 @@ class BodyCommandPipe(CommandPipe):
 
     def _twist(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return linear and angular velocity of the link in the axes of the world or of the body, shape (3,) each."""
-        velocity = self._kinematics.velocity(self._link)
+        velocity = self._motion.velocity
         if frame == "world":
             return velocity[:3], velocity[3:]
-        rotation = self._kinematics.rotation(self._link)
+        rotation = self._motion.rotation
         return velocity[:3] @ rotation, velocity[3:] @ rotation
 
     def _orient(self, out: np.ndarray) -> None:
-        self._convention.write(quaternion_from_rotation(self._kinematics.rotation(self._link)), out)
+        self._convention.write(quaternion_from_rotation(self._motion.rotation), out)
+
+
+class _LinkMotion:
+    """Pose and twist of a link in the world, see `BaseMotion`."""
+
+    def __init__(self, kinematics: Kinematics, link: str):
+        self._kinematics = kinematics
+        self._link = link
+        self.rotation = np.eye(3)
+        self.position = np.zeros(3)
+        self.velocity = np.zeros(6)
+
+    def update(self, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Compute them of the DoFs, shape (n,) each."""
+        kinematics = self._kinematics
+        kinematics.update(position, velocity)
+        self.rotation = kinematics.rotation(self._link)
+        self.position = kinematics.position(self._link)
+        self.velocity = kinematics.velocity(self._link)
+
+
+def _motion(kinematics: Kinematics, link: str) -> "BaseMotion | _LinkMotion":
+    # imported here: its compiler takes a while to load
+    from solfer.numerics.twist_transport import BaseMotion
+
+    if kinematics.base is not None and link == kinematics.base_link:
+        return BaseMotion(kinematics.base)
+    return _LinkMotion(kinematics, link)

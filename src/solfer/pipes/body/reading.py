@@ -1,7 +1,6 @@
 """Reads messages of a rigid body, and converts them from the sender's conventions to ours."""
 
 import abc
-import math
 from typing import ClassVar
 
 import numpy as np
@@ -19,16 +18,19 @@ from solfer.numerics.rotations import (
 from solfer.transport.inexact import InexactOrientations
 from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
 
-NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
-"""In place of an orientation that is not measured."""
+LACKING = (
+    frozenset[str](),
+    frozenset(("orientation",)),
+    frozenset(("angular",)),
+    frozenset(("orientation", "angular")),
+)
+"""What an inertial measurement unit lacks, by what `read_imu` returns."""
 
-LACKING = {
-    (True, True): frozenset[str](),
-    (False, True): frozenset(("orientation",)),
-    (True, False): frozenset(("angular",)),
-    (False, False): frozenset(("orientation", "angular")),
-}
-"""What an inertial measurement unit lacks, by whether it measures orientation and angular velocity."""
+TOP_SPEED = 50.0
+"""No legged or wheeled robot is as fast [m/s]."""
+
+TOP_RATE = 60.0
+"""Nor as this; gyroscopes end at 35 rad/s, 2000 degrees/s [rad/s]."""
 
 CHART_AXES = (0, 1, 2)
 """Turns of the chart of a floating base: about x, then y, then z."""
@@ -65,10 +67,14 @@ class BodyReading(abc.ABC):
         self.own_axes = False
         self.force = np.zeros(3)
         self.lacks: frozenset[str] = frozenset()
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.checks.imu import plausible, read_imu
+
+        self._is_plausible = plausible
+        self._read_imu = read_imu
         self._quaternion = self.values[:4]
         self._position = self.values[4:7]
         self._twist = self.values[7:]
-        self._angular = self._twist[3:]
         self._quaternion[3] = 1.0
 
     def read(self, message: Message) -> None:
@@ -79,19 +85,14 @@ class BodyReading(abc.ABC):
             NotFinite: A value is NaN or infinite.
         """
         self._read_values(message)
-        numbers = self.values.tolist()
-        if not math.isfinite(sum(numbers)):  # the sum is finite only if each is
+        if self._is_plausible(self.values, TOP_SPEED, TOP_RATE):
+            return
+        if not np.isfinite(self.values).all():
             raise NotFinite("a position or a velocity that is not a finite number")
-        vx, vy, vz, wx, wy, wz = numbers[7:]
-        # no legged or wheeled robot is as fast; gyroscopes end at 35 rad/s (2000 degrees/s)
-        top_rate = 60.0  # [rad/s]
-        top_speed = 50.0  # [m/s]
-        if not -top_rate < min(wx, wy, wz) <= max(wx, wy, wz) < top_rate:
-            rate = max(abs(wx), abs(wy), abs(wz))
-            raise PipeError(f"an angular velocity of {rate:.3g} rad/s", expected=f"{top_rate:g} rad/s at most")
-        if not -top_speed < min(vx, vy, vz) <= max(vx, vy, vz) < top_speed:
-            speed = max(abs(vx), abs(vy), abs(vz))
-            raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{top_speed:g} m/s at most")
+        speed, rate = np.abs(self.values[7:].reshape(2, 3)).max(axis=1).tolist()
+        if rate >= TOP_RATE:
+            raise PipeError(f"an angular velocity of {rate:.3g} rad/s", expected=f"{TOP_RATE:g} rad/s at most")
+        raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{TOP_SPEED:g} m/s at most")
 
     def check_body(self, message: Message) -> None:  # noqa: B027 most messages name no body
         """Check that a message describes this body.
@@ -146,19 +147,10 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        no_quaternion = [0.0] * 4
-        zeros = message.orientation.tolist() == no_quaternion  # no orientation: some drivers publish them instead of -1
-        oriented = not (zeros or np.isnan(message.orientation).all())
-        turning = not np.isnan(message.angular).all()
-        if oriented:
+        lacks = self._read_imu(message.orientation, message.angular, message.acceleration, self.values, self.force)
+        self.lacks = LACKING[lacks]
+        if "orientation" not in self.lacks:
             self._orient(message.orientation, message.sender)
-        else:
-            self._quaternion[:] = NO_TURN
-        self._angular[...] = message.angular if turning else 0.0
-        self.lacks = LACKING[oriented, turning]
-        np.copyto(self.force, message.acceleration)
-        if not math.isfinite(sum(self.force.tolist())):
-            self.force.fill(0.0)
         self.own_axes = self._twist_frame != "world"
 
 

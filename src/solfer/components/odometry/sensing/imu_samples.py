@@ -7,7 +7,6 @@ import numpy as np
 from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.state import State
-from solfer.numerics.base_chart import BaseChart
 
 LONGEST_LAG = 0.03
 """Longest time for which joints wait for what the IMU measures at their time [s]."""
@@ -29,7 +28,6 @@ class ImuSamples:
     """The newest samples of the IMU.
 
     Args:
-        chart: Chart of the base.
         offset: Time by which the IMU's stamps are behind those of the joints [s].
         stamps: Check of its stamps.
 
@@ -38,16 +36,14 @@ class ImuSamples:
         measured_at: Time of the newest measurement [s]; NaN before the first.
     """
 
-    def __init__(self, chart: BaseChart, offset: float, stamps: StampCheck):
+    def __init__(self, offset: float, stamps: StampCheck):
         self.stamps = stamps
         self.measured_at = math.nan
-        self._chart = chart
         self._offset = offset
         self._samples = SortedSamples(CAPACITY, 9)
         self._turned = np.zeros(3)
         self._angles = np.zeros(3)
         self._angles_before = np.zeros(3)
-        self._base = np.zeros(6)
 
     @property
     def newest(self) -> float:
@@ -77,16 +73,12 @@ class ImuSamples:
             for later in range(max(row, 1), samples.count):
                 samples.rows[later, INTEGRALS] = self._turned_at(later - 1, later, 1.0)
 
-    def turned_since(self, time: float) -> np.ndarray | None:
-        """Return how the base has turned since the measurement of a time [s], in its axes; None: not known."""
+    def turned_since(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the base's angles at the measurement of a time [s], and the newest ones; None: not known."""
         samples = self._samples
-        base = self._base
         if self.measured_at != time or not samples.newest > time:
             return None
-        base[3:] = self._angles
-        before = self._chart.to_rotation(base)
-        base[3:] = samples.rows[samples.count - 1, ANGLES]
-        return before.T @ self._chart.to_rotation(base)
+        return self._angles, samples.rows[samples.count - 1, ANGLES]
 
     def measure(self, time: float, state: State) -> bool:
         """Write the base's angles at a time [s], and the mean of their rates since they were measured the last time.

@@ -7,7 +7,6 @@ import numpy as np
 from solfer.components.odometry.sensing.imu_samples import CAPACITY, LONGEST_LAG, ImuSamples
 from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.sensing.stamps import StampCheck
-from solfer.numerics.base_chart import BaseChart
 from solfer.robot import Robot
 
 LONGEST_EXTRAPOLATION = 0.1
@@ -109,7 +108,7 @@ class Streams:
         self.silence = SensorSilence()
         self._measurements = _JointSamples(robot.size - 6)
         imu_check = StampCheck(self._measurements.stamps, offset)
-        self._samples = ImuSamples(robot.kinematics.base or BaseChart(), offset, imu_check)
+        self._samples = ImuSamples(offset, imu_check)
         self.stamp_checks = self._measurements.stamps, imu_check
         self._written = np.zeros((2, 3))
         self._time = math.nan
@@ -194,8 +193,8 @@ class Streams:
             self._histories[1].history.contradiction = reason
         return self._histories is not None
 
-    def turned_since(self) -> np.ndarray | None:
-        """Return how the base has turned since the last measurement, in its axes, shape (3, 3); None: not known."""
+    def turned_since(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the base's angles at the last measurement, and the newest ones, shape (3,) [rad]; None: not known."""
         return self._samples.turned_since(self._time)
 
     def written(self) -> None:
