@@ -38,7 +38,7 @@ class RecordedClaim(JointClaim):
 
     @reason.setter
     def reason(self, reason: str) -> None:
-        """Ignore what others say of the joints."""
+        """Ignore any other reason: the recording decides."""
 
 
 class RecordedTime(RobotTime):

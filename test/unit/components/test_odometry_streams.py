@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.unit.golden import lower_body
 
-from solfer.components.odometry.sensing.imu_samples import LONGEST_LAG
 from solfer.components.odometry.sensing.samples import SortedSamples
+from solfer.components.odometry.sensing.samples_kernel import LONGEST_LAG
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.components.odometry.sensing.streams import LONGEST_EXTRAPOLATION, Streams
 from solfer.model.history import History

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 
+from solfer.components.odometry.sensing import samples_kernel
 from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.state import State
-
-LONGEST_LAG = 0.03
-"""Longest time for which joints wait for what the IMU measures at their time [s]."""
 
 CAPACITY = 256
 """Samples that are kept of each sensor: half a second of an IMU at 500 Hz."""
@@ -19,9 +17,6 @@ ANGLES = slice(0, 3)
 
 RATES = slice(3, 6)
 """Rates of the angles [rad/s]."""
-
-INTEGRALS = slice(6, 9)
-"""Integrals of the rates [rad]."""
 
 
 class ImuSamples:
@@ -70,8 +65,7 @@ class ImuSamples:
             if row < 0:
                 continue
             history.copy(index, samples.rows[row, :6])
-            for later in range(max(row, 1), samples.count):
-                samples.rows[later, INTEGRALS] = self._turned_at(later - 1, later, 1.0)
+            samples_kernel.integrate(samples.stamps, samples.rows, row, samples.count)
 
     def turned_since(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the base's angles at the measurement of a time [s], and the newest ones; None: not known."""
@@ -104,28 +98,18 @@ class ImuSamples:
             change = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
             self._angles[axis] = first[axis] + fraction * change
         state.position[3:6] = self._angles
-        turned = self._turned_at(before, after, fraction)
+        turned = self._turned
+        turned_before = turned.copy()
+        samples_kernel.find_turned(samples.stamps, samples.rows, before, after, fraction, turned)
         passed = time - self.measured_at
         if not passed > 0.0:
             state.velocity[3:6] = first[RATES]
         elif samples.stamps[0] <= self.measured_at:
-            state.velocity[3:6] = (turned - self._turned) / passed
+            state.velocity[3:6] = (turned - turned_before) / passed
         else:  # the samples since then are gone, but for their angles
             turned_by = self._angles - self._angles_before
             state.velocity[3:6] = (turned_by - 2.0 * math.pi * np.round(turned_by / (2.0 * math.pi))) / passed
-        self._turned[:] = turned
         self.measured_at = time
         kept_time = 0.1  # [s] for measurements of the joints that come late
         samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - kept_time)) - 1))
         return True
-
-    def _turned_at(self, before: int, after: int, fraction: float) -> np.ndarray:
-        """Return the integral of the rates at a fraction of the time from one sample to the next, shape (3,) [rad]."""
-        samples = self._samples
-        first = samples.rows[before]
-        second = samples.rows[after]
-        span = samples.stamps[after] - samples.stamps[before]
-        if span > LONGEST_LAG:  # too long for rates: angles do not drift in it
-            change = second[ANGLES] - first[ANGLES]
-            return first[INTEGRALS] + fraction * (change - 2.0 * math.pi * np.round(change / (2.0 * math.pi)))
-        return first[INTEGRALS] + fraction * span * (first[RATES] + 0.5 * fraction * (second[RATES] - first[RATES]))

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from solfer.components.odometry.sensing import samples_kernel
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.history import History
 from solfer.robot import Robot
@@ -36,22 +37,10 @@ class SortedSamples:
 
     def insert(self, stamp: float) -> int:
         """Make room for a sample; return its row, or -1 where there is one with that stamp, or it is too old."""
-        stamps = self.stamps
-        rows = self.rows
-        row = self.count
-        is_full = self.count == len(stamps)
-        while row and stamps[row - 1] > stamp:
-            row -= 1
-        if row == 0 and is_full or row and stamps[row - 1] == stamp:
-            return -1
-        if is_full:
-            self.drop(1)
-            row -= 1
-        stamps[row + 1 : self.count + 1] = stamps[row : self.count]
-        rows[row + 1 : self.count + 1] = rows[row : self.count]
-        stamps[row] = stamp
-        self.count += 1
-        self.newest = max(self.newest, stamp)
+        row = samples_kernel.insert(self.stamps, self.rows, self.count, stamp)
+        if row >= 0:
+            self.count = min(self.count + 1, len(self.stamps))
+            self.newest = max(self.newest, stamp)
         return row
 
     def drop(self, number: int) -> None:
@@ -75,9 +64,8 @@ class SensorHistory:
     """
 
     def __init__(self, history: History, first: int):
-        places = history.dofs - first
         self.history = history
-        self._places = (places, len(places) + places)
+        self._places = np.array(history.dofs - first, dtype=np.int64)
         self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
 
     @classmethod
@@ -98,10 +86,4 @@ class SensorHistory:
 
     def copy(self, index: int, out: np.ndarray) -> None:
         """Copy a row: all positions, then all velocities; what it lacks stays as it is."""
-        for row, places in zip(self._rows, self._places, strict=True):
-            values = self.history.values[index, row]
-            if math.isnan(values.sum()):
-                known = ~np.isnan(values)
-                out[places[known]] = values[known]
-            else:
-                out[places] = values
+        samples_kernel.copy(self.history.values[index], *self._rows, self._places, out)

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.sensing.imu_samples import CAPACITY, LONGEST_LAG, ImuSamples
+from solfer.components.odometry.sensing.imu_samples import CAPACITY, ImuSamples
 from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
+from solfer.components.odometry.sensing.samples_kernel import LONGEST_LAG
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.robot import Robot
 
