@@ -1,4 +1,4 @@
-"""Compiled steps of `WeightedForces` and `TorqueOffsets`, number by number. Arrays are described there."""
+"""Compiled steps of the parts of `GroundForces`, number by number. Arrays are described there."""
 
 from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, part
@@ -34,6 +34,55 @@ def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
     for i in range(len(forces)):
         for column in columns:
             rest[column] -= jacobian[i, column] * forces[i]
+
+
+def _observe(bias, torque, inertia, velocity, before, period, coefficient, value):
+    """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference."""
+    count = len(value)
+    for i in range(count):
+        world = bias[i] - torque[i]
+        for k in range(count):
+            world += inertia[i, k] * ((velocity[k] - before[k]) / period)
+        value[i] += coefficient * (world - value[i])
+    for i in range(count):
+        before[i] = velocity[i]
+
+
+def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
+    """Write force and speed of each contact along its normal."""
+    for i in range(len(normals)):
+        normal_forces[i] = speeds[i] = 0.0
+        for axis in range(3):
+            speed = 0.0
+            for k in range(len(velocity)):
+                speed += jacobian[3 * i + axis, k] * velocity[k]
+            speeds[i] += normals[i, axis] * speed
+            normal_forces[i] += normals[i, axis] * forces[i, axis]
+
+
+def _touch(forces, speeds, period, limits, touching, lifted, times):
+    """Decide which contacts touch, see `Touch`.
+
+    Args:
+        forces: Their normal forces [N].
+        speeds: Their speeds along the normal [m/s].
+        period: Time since the cycle before [s].
+        limits: Force from which on one touches, below which it ends [N], time until it changes [s], and reduction of
+            the force by the speed [Ns/m].
+        touching: Which touch; written.
+        lifted: Which are in the air for sure; written.
+        times: For how long each was about to change, and has not touched [s]; written.
+    """
+    begin, end, delay, reduction = limits
+    for i in range(len(forces)):
+        force = forces[i] - reduction * abs(speeds[i])
+        changes = force < end if touching[i] else force > begin
+        times[0, i] = times[0, i] + period if changes else 0.0
+        if changes and times[0, i] >= delay - 1e-9:
+            touching[i] = not touching[i]
+            times[0, i] = 0.0
+        times[1, i] = 0.0 if touching[i] else times[1, i] + period
+        lifted[i] = times[1, i] > 0.1  # [s]
 
 
 OFFSETS = BlockLayout(
@@ -118,3 +167,9 @@ fit = cached(
     sources=[DENSE],
 )
 learn = cached(f"void(int64, {_VECTOR}, {_VECTOR})", _learn, sources=[DENSE])
+observe = cached(f"void({_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _observe)
+measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
+touch = cached(
+    f"void({_VECTOR}, {_VECTOR}, float64, {_VECTOR}, boolean[::1], boolean[::1], {_MATRIX})",
+    _touch,
+)

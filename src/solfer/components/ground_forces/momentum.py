@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.components.ground_forces import kernel
 from solfer.dynamics import BIAS, INERTIA
 from solfer.robot import Robot
 
@@ -30,7 +31,7 @@ class MomentumObserver:
         self._robot = robot
         self._cut_off = cut_off
         robot.dynamics.subscribe([BIAS] if cut_off is None else [BIAS, INERTIA])
-        self.value, self._input, self._before, self._change = np.zeros((4, robot.size))
+        self.value, self._before = np.zeros((2, robot.size))
 
     def start(self, torque: np.ndarray) -> None:
         """Begin, not accelerated, with the torques of now, shape (n,)."""
@@ -39,16 +40,11 @@ class MomentumObserver:
 
     def update(self, torque: np.ndarray, period: float) -> np.ndarray:
         """Return what the world does after `period` [s] more, by the torques of now, shape (n,); live."""
-        np.subtract(self._robot.dynamics.bias, torque, out=self._input)
-        coefficient = 1.0
-        if self._cut_off is not None:
-            velocity = self._robot.state.velocity
-            np.subtract(velocity, self._before, out=self._change)
-            self._before[:] = velocity
-            self._change /= period
-            self._input += self._robot.dynamics.inertia @ self._change
-            coefficient = -math.expm1(-2.0 * math.pi * self._cut_off * period)
-        self._input -= self.value
-        self._input *= coefficient
-        self.value += self._input
+        dynamics = self._robot.dynamics
+        bias = dynamics.bias
+        if self._cut_off is None:
+            return np.subtract(bias, torque, out=self.value)
+        ratio = -math.expm1(-2.0 * math.pi * self._cut_off * period)
+        velocity = self._robot.state.velocity
+        kernel.observe(bias, torque, dynamics.inertia, velocity, self._before, period, ratio, self.value)
         return self.value

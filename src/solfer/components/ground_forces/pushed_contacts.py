@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from solfer.components.ground_forces import kernel
 from solfer.interfaces.port import Port
 from solfer.points.contact.contacts import Contact
 from solfer.points.contact.support_vertex import UP
@@ -33,10 +34,10 @@ class PushedContacts:
         count = len(contacts)
         self.names = tuple(names)
         self.contacts = tuple(contacts)
-        self.normals = np.array([getattr(contact, "normal", UP) for contact in contacts])
+        self.normals = np.array([getattr(contact, "normal", UP) for contact in contacts], dtype=float)
         self.ports = [Port("force") for _ in contacts]
         self.jacobian = np.zeros((3 * count, size))
-        self.forces, self._velocities, self._along = np.zeros((3, count, 3))
+        self.forces = np.zeros((count, 3))
         self.normal_forces, self.speeds = np.zeros((2, count))
         self._layout: np.ndarray | None = None
         self._jacobians: list[np.ndarray] = []
@@ -63,8 +64,4 @@ class PushedContacts:
         """Read the force of each contact, and compute its speed by the velocities of the DoFs, shape (n,) [rad/s]."""
         for index, wrench in enumerate(self._wrenches):
             self.forces[index] = wrench[:3]
-        np.multiply(self.forces, self.normals, out=self._along)
-        np.sum(self._along, axis=1, out=self.normal_forces)
-        np.dot(self.jacobian, velocity, out=self._velocities.reshape(-1))
-        np.multiply(self._velocities, self.normals, out=self._along)
-        np.sum(self._along, axis=1, out=self.speeds)
+        kernel.measure(self.jacobian, velocity, self.normals, self.forces, self.normal_forces, self.speeds)

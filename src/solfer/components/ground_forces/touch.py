@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from solfer.components.ground_forces import kernel
+
 
 class Touch:
     """Contacts that touch the ground, by their normal forces.
@@ -23,21 +25,19 @@ class Touch:
     """
 
     def __init__(self, count: int, above: float, below: float, delay: float, speed: float = 0.0):
+        self._limits = np.zeros(4)
         self.set(above, below, delay, speed=speed)
-        self.touching, self._changing, self._above, self.lifted = np.zeros((4, count), dtype=bool)
-        self._waited, self._away, self._reduced = np.zeros((3, count))
+        self.touching, self.lifted = np.zeros((2, count), dtype=bool)
+        self._times = np.zeros((2, count))
 
     def set(self, above: float, below: float, delay: float, speed: float = 0.0) -> None:
         """Set when contacts touch, see above; those that touch do so until they end."""
-        self._begin = above
-        self._end = below
-        self._delay = delay
-        self._rise = speed
+        self._limits[:] = above, below, delay, speed
 
     def start(self, forces: np.ndarray) -> None:
         """Begin with the forces of now, shape (k,) [N], without a delay."""
-        np.greater(forces, self._begin, out=self.touching)
-        self._waited[:] = self._away[:] = 0.0
+        np.greater(forces, self._limits[0], out=self.touching)
+        self._times[:] = 0.0
         self.lifted[:] = False
 
     def update(self, forces: np.ndarray, speeds: np.ndarray, period: float) -> np.ndarray:
@@ -48,20 +48,5 @@ class Touch:
             speeds: Their speeds along the normal, shape (k,) [m/s].
             period: See above.
         """
-        np.abs(speeds, out=self._reduced)
-        self._reduced *= -self._rise
-        self._reduced += forces
-        # a contact that touches changes below `below`, another one above `above`
-        np.greater(self._reduced, self._begin, out=self._changing)
-        np.less(self._reduced, self._end, out=self._above)
-        np.copyto(self._changing, self._above, where=self.touching)
-        self._waited += period
-        self._waited *= self._changing
-        np.greater_equal(self._waited, self._delay - 1e-9, out=self._above)
-        np.logical_and(self._above, self._changing, out=self._changing)
-        np.logical_xor(self.touching, self._changing, out=self.touching)
-        np.copyto(self._waited, 0.0, where=self._changing)
-        self._away += period
-        np.copyto(self._away, 0.0, where=self.touching)
-        np.greater(self._away, 0.1, out=self.lifted)
+        kernel.touch(forces, speeds, period, self._limits, self.touching, self.lifted, self._times)
         return self.touching
