@@ -137,6 +137,26 @@ def _turn_rotation(rotation, angle, out):
     turn_about_vertical(rotation, angle, out)
 
 
+def _turn_twist(rotation, heading, covariance, turned, half, out):
+    """Write the covariance of a twist, in the heading frame, in the axes of the base with a rotation.
+
+    Work space: the rotation from the base to the heading frame, and half of the product.
+    """
+    turn_about_vertical(rotation, -heading, turned)
+    for i in range(6):
+        block = i // 3 * 3
+        for k in range(6):
+            half[i, k] = 0.0
+            for j in range(3):
+                half[i, k] += turned[j, i - block] * covariance[block + j, k]
+    for i in range(6):
+        for k in range(6):
+            block = k // 3 * 3
+            out[i, k] = 0.0
+            for j in range(3):
+                out[i, k] += half[i, block + j] * turned[j, k - block]
+
+
 def _joint_motion(step, legs, sway, keep):
     """Smooth the steps of the joints as `sway`; return the largest step of all, of legs, and the largest sway [rad]."""
     largest = largest_leg = largest_sway = 0.0
@@ -514,6 +534,7 @@ find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_
 velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
+turn_twist = cached(f"void({_M}, {_F}, {_M}, {_M}, {_M}, {_M})", _turn_twist)
 write_pose = cached(
     f"void(int64, {_M}, {_F}, {_F}, {_F}, {_V}, {_V}, boolean)", _write_pose, sources=[Path(chart.__file__)]
 )

@@ -22,16 +22,15 @@ class PoseCovariances:
         self.pose, self._twist = (command.add(name, 36).reshape(6, 6) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
         self.deviations = np.zeros(6)
         self._variances = np.einsum("ii->i", self.pose)
-        self._heading_twist, self._half, self._axes = np.zeros((3, 6, 6))
+        self._heading_twist, self._half = np.zeros((2, 6, 6))
         self._heading_rotation = np.zeros((3, 3))
 
     def write(self, law: FilteredOdometry, rotation: np.ndarray) -> None:
         """Write the covariances; that of the twist in the axes of the base with a rotation, shape (3, 3)."""
         law.write_covariance(self.pose, self._heading_twist)
-        filter_kernel.turn_rotation(rotation, -law.heading, self._heading_rotation)
-        self._axes[:3, :3] = self._axes[3:, 3:] = self._heading_rotation
-        np.matmul(self._axes.T, self._heading_twist, out=self._half)
-        np.matmul(self._half, self._axes, out=self._twist)
+        filter_kernel.turn_twist(
+            rotation, law.heading, self._heading_twist, self._heading_rotation, self._half, self._twist
+        )
 
     def find_deviations(self) -> None:
         """Compute the standard deviations of the pose."""

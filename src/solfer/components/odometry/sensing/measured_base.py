@@ -7,6 +7,7 @@ import numpy as np
 from solfer.components.odometry import filter_kernel
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
+from solfer.numerics.twist_transport import BaseMotion
 from solfer.robot import Robot
 
 
@@ -29,7 +30,7 @@ class MeasuredBase:
     def __init__(self, robot: Robot):
         self.averages = False
         chart = robot.kinematics.base
-        self._chart: BaseChart = chart if chart is not None else BaseChart()
+        self._motion = BaseMotion(chart if chart is not None else BaseChart())
         self._state = robot.state
         self._rates = np.zeros(6)
         self.fresh = True
@@ -57,13 +58,13 @@ class MeasuredBase:
             self._known = self.rotation
 
     def _read(self) -> None:
-        self.rotation = self._chart.to_rotation(self._state.position[:6])
+        self._rates[3:] = self._state.velocity[3:6]
+        self._motion.update(self._state.position, self._rates)
+        self.rotation = self._motion.rotation.copy()
         self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
     def _measure(self) -> None:
-        self._rates[3:] = self._state.velocity[3:6]
-        angular = self._chart.twist_from_rates(self._state.position[:6], self._rates)[1]
-        self.angular[:] = about_vertical(angular, -self.heading)
+        self.angular[:] = about_vertical(self._motion.velocity[3:], -self.heading)
 
     def subtract_tilt(self, x: float, y: float) -> None:
         """Subtract an error of the tilt, rotations about x and y of the heading frame [rad]; the next lacks it."""
