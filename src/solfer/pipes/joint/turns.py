@@ -49,21 +49,24 @@ class JointTurns:
         self._follow()
 
     def _follow(self) -> None:
-        """Choose what each message needs: a call of a kernel, once all joints are aligned."""
+        """Choose what each message needs: mostly a call of a kernel, once all joints are aligned."""
         is_aligned = self._aligned.all()
-        self.unwrap = self._add if is_aligned and self._function != "reference" else self._add_more
+        add = self._add_counted if self._function == "reference" else self._add
+        self.unwrap = add if is_aligned else partial(self._align, add)
         self.keep = self._keep if is_aligned else self._keep_more
 
-    def _add_more(self, position: np.ndarray, part: np.ndarray) -> None:
-        """Add turns, those of the Robot's count, or those that align joints, as well."""
-        if self._function == "reference":
-            np.take(self._of_robot, self._dofs, out=self._added, mode="clip")
+    def _add_counted(self, position: np.ndarray, part: np.ndarray) -> None:
+        """Add turns from the Robot's count on."""
+        np.take(self._of_robot, self._dofs, out=self._added, mode="clip")
         self._add(position, part)
-        if not self._aligned.all():
-            new = self._to_align(part)
-            shift = whole_revolutions(self._begin[self._dofs[new]] - position[new], self._revolutions[new])
-            position[new] += shift
-            self._added[new] += shift
+
+    def _align(self, add: Callable[[np.ndarray, np.ndarray], None], position: np.ndarray, part: np.ndarray) -> None:
+        """Add turns, and those that align joints."""
+        add(position, part)
+        new = self._to_align(part)
+        shift = whole_revolutions(self._begin[self._dofs[new]] - position[new], self._revolutions[new])
+        position[new] += shift
+        self._added[new] += shift
 
     def _keep_more(self, position: np.ndarray, part: np.ndarray) -> None:
         """Keep positions, and which joints are aligned."""
