@@ -67,10 +67,11 @@ def main() -> None:
     plugin = generate(configuration, MemoryMiddleware(bus, "joint_states"), DrivingGenerator)
     bus.every(1.0 / plugin.rate, plugin.cycle)
     velocity = TopicOut("/joint_states/cmd_vel", "geometry_msgs/Twist", Twist, lambda: Twist(Vector(0.2)))
-    (publish,) = bind("navigation", (velocity,), MemoryMiddleware(bus, "navigation"), Inbox())
+    node = MemoryMiddleware(bus, "navigation")
+    navigation = bind("navigation", (velocity,), node, Inbox(), rate=plugin.rate)
     bus.run_until(START)  # until the plugin runs
     begin = simulation.q[:2].copy()
-    publish()
+    navigation.run()
     bus.run_until(START + duration)
     forward, aside = simulation.q[:2] - begin
     print(f"drove {forward:.3f} m forward and {aside:.3f} m aside in {duration:g} s")

@@ -164,7 +164,7 @@ def update(values, mount, world, origin, base, rates, options):
 _update = cached(f"void({'float64[::1], ' * 6}int64)", update, sources=[Path(chart.__file__)])
 
 
-class BaseMotion:
+class BaseKinematics:
     """Pose and twist of a floating base in the world, by its six numbers: of its own link without kinematics.
 
     Args:
@@ -189,7 +189,7 @@ class BaseMotion:
 
 
 def move(base, rates, origin, out):
-    """Compute pose and twist of the base; see `BaseMotion`."""
+    """Compute pose and twist of the base; see `BaseKinematics`."""
     out[:9] = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
     out[9:12] = _rotated(origin, base[:3]) + origin[9:12]
     out[12:15] = _rotated(origin, rates[:3])

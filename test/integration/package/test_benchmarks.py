@@ -1,6 +1,7 @@
 """All benchmarks have one form: they explain themselves, and the table lists them."""
 
 import json
+import logging
 import re
 import runpy
 import subprocess
@@ -18,6 +19,7 @@ PICTURES = ("rviz.py",)
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_help_is_all_that_help_prints(script, monkeypatch, capsys):
     monkeypatch.setattr("solfer.supervision.supervise", lambda: None)  # it would fork
+    monkeypatch.setattr(logging.root.manager, "disable", logging.NOTSET)  # some do without the warnings of others
     monkeypatch.setattr(sys, "argv", [script, "--help"])
     monkeypatch.syspath_prepend(BENCHMARK)
     with pytest.raises(SystemExit) as ended:

@@ -148,7 +148,7 @@ def numbers_of(component):
                 )
                 yield [governor.speed, governor._rows.horizon, governor._rows.recovery]
         case GroundForces():
-            yield [component.touch._begin, component.touch._end, component.touch._delay, component.touch._rise]
+            yield component.touch._limits
             yield [component.checks.friction]
         case Odometry():
             yield from (each.factors for each in (component.law.filter, component.law.smoothing) if each is not None)

@@ -13,7 +13,7 @@ from solfer.transport.endpoints import Writer
 from solfer.transport.messages import VECTOR_MESSAGES, BodyMessage, Message, VectorMessage
 
 if TYPE_CHECKING:
-    from solfer.numerics.twist_transport import BaseMotion
+    from solfer.numerics.twist_transport import BaseKinematics
 
 SENT_MESSAGES = {
     "nav_msgs/Odometry": ("position", "velocity"),
@@ -133,7 +133,7 @@ class BodyCommandPipe(CommandPipe):
 
 
 class _LinkMotion:
-    """Pose and twist of a link in the world, see `BaseMotion`."""
+    """Pose and twist of a link in the world, see `BaseKinematics`."""
 
     def __init__(self, kinematics: Kinematics, link: str):
         self._kinematics = kinematics
@@ -151,10 +151,10 @@ class _LinkMotion:
         self.velocity = kinematics.velocity(self._link)
 
 
-def _motion(kinematics: Kinematics, link: str) -> "BaseMotion | _LinkMotion":
+def _motion(kinematics: Kinematics, link: str) -> "BaseKinematics | _LinkMotion":
     # imported here: its compiler takes a while to load
-    from solfer.numerics.twist_transport import BaseMotion
+    from solfer.numerics.twist_transport import BaseKinematics
 
     if kinematics.base is not None and link == kinematics.base_link:
-        return BaseMotion(kinematics.base)
+        return BaseKinematics(kinematics.base)
     return _LinkMotion(kinematics, link)

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.components.odometry import filter_kernel
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
-from solfer.numerics.twist_transport import BaseMotion
+from solfer.numerics.twist_transport import BaseKinematics
 from solfer.robot import Robot
 
 
@@ -30,7 +30,7 @@ class MeasuredBase:
     def __init__(self, robot: Robot):
         self.averages = False
         chart = robot.kinematics.base
-        self._motion = BaseMotion(chart if chart is not None else BaseChart())
+        self._motion = BaseKinematics(chart if chart is not None else BaseChart())
         self._state = robot.state
         self._rates = np.zeros(6)
         self.fresh = True
