@@ -63,6 +63,14 @@ class Inbox:
                 behind it stay queued.
         """
         self.waits = False  # before they are looked for: another thread may submit one meanwhile
+        try:
+            self._run()
+        finally:
+            if self._urgent or self._calls or self._single:
+                self.waits = True
+
+    def _run(self) -> None:
+        """Run the queued calls; see `apply`."""
         if self.sources and (self.refusal or self.pending()):
             for receive in self.sources:
                 receive(self.refusal)
@@ -78,8 +86,6 @@ class Inbox:
                 break
         if count > self.most and not self.refusal:
             self.most = count
-        if self._calls or self._single:
-            self.waits = True
 
     def _queue(self, calls: "deque[_Call]", call: Callable[[], Any]) -> "Future[Any]":
         future: Future[Any] = Future()

@@ -36,3 +36,15 @@ def test_of_some_calls_one_is_run_in_a_cycle():
     inbox.refusal = "it has stopped"
     inbox.apply()
     assert str(futures[2].exception(0)) == "it has stopped"
+
+
+def test_calls_behind_one_that_ends_the_process_wait_for_the_next_cycle():
+    inbox, ran = Inbox(), []
+    inbox.submit(lambda: exit(4))
+    inbox.submit(lambda: ran.append("behind"))
+    assert inbox.waits
+    with pytest.raises(SystemExit):
+        inbox.apply()
+    assert inbox.waits and not ran
+    inbox.apply()
+    assert ran == ["behind"] and not inbox.waits

@@ -186,3 +186,27 @@ def test_topics_with_a_rate_share_no_cycle():
     turn = ["first", "each", "each", "second", "each", "third", "each"]
     assert [each for each in published if isinstance(each, str)] == turn * 2
     assert published[:4] == [0, "first", "each", 1]
+
+
+def test_what_cannot_be_published_keeps_nothing_from_going_on():
+    publications = Publications()
+    published = []
+
+    def fail():
+        if not published:
+            raise ComponentError("no number", expected="a number")
+
+    for publish, cycles in ((fail, 1), (partial(published.append, "slow"), 3)):
+        publications.add(publish, cycles)
+
+    def cycle():
+        publications.left -= 1
+        if not publications.left:
+            publications.run()
+
+    with pytest.raises(ComponentError):
+        cycle()
+    published.append("begun")
+    for _ in range(6):
+        cycle()
+    assert published == ["begun", "slow", "slow"]

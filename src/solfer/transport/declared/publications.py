@@ -17,6 +17,7 @@ class _Publication:
         self.publish = publish
         self.cycles = cycles
         self.left = left
+        self.is_due = False
 
 
 class Publications:
@@ -43,8 +44,11 @@ class Publications:
         soonest = sys.maxsize
         for each in self._all:
             each.left -= self._waited
-            if not each.left:
+            each.is_due = not each.left
+            if each.is_due:
                 each.left = each.cycles
-                each.publish()
             soonest = min(soonest, each.left)
-        self.left = self._waited = soonest
+        self.left = self._waited = soonest  # before anything is published: where that fails, the next cycle goes on
+        for each in self._all:
+            if each.is_due:
+                each.publish()
