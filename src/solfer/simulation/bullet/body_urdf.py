@@ -64,7 +64,7 @@ def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrd
         folder: Folder for meshes that have to be written in another format; the URDF names them there.
 
     Raises:
-        SimulationError: A link has an inertia that no body has; a collision shape's mesh is missing.
+        SimulationError: A collision shape's mesh is missing.
     """
     base = description.floating.child if floating and description.floating else description.root
     members = _members(description, base)

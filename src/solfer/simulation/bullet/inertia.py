@@ -1,11 +1,9 @@
-"""Inertias that no body has, made physical where they nearly are."""
+"""Inertias that no body has, made physical."""
 
 import logging
 import math
 
 import numpy as np
-
-from solfer.errors import SimulationError
 
 MARGIN = 1e-5
 """Smallest second moment of mass over their sum: Bullet, in single precision, drops inertias without it."""
@@ -16,7 +14,7 @@ _FROM_MOMENTS = np.ones((3, 3)) - np.eye(3)
 
 
 class Inertias:
-    """Checks the inertias of a robot's links, and repairs those that miss what every body has by a little.
+    """Checks the inertias of a robot's links, and repairs those that no body has.
 
     No principal inertia is negative, and none is larger than the sum of the other two. Source: P. Wensing, S. Kim,
     J.-J. Slotine, "Linear Matrix Inequalities for Physically Consistent Inertial Parameter Identification", 2018.
@@ -38,9 +36,6 @@ class Inertias:
             link: Its link.
             mass: Its mass [kg].
             inertia: Inertia about the centre of mass, symmetric.
-
-        Raises:
-            SimulationError: It is far from the inertia of any body.
         """
         principal, axes = np.linalg.eigh(inertia)
         if abs(principal).max() < mass * 1e-6**2:  # a radius of gyration of less than 1e-6 m stands for no inertia
@@ -54,7 +49,8 @@ class Inertias:
         small, middle, large = principal
         rounding = 1e-6  # over the largest principal inertia: it is worth no warning
         if small < -rounding * large or large > (small + middle) * (1.0 + rounding):
-            self._repair(link, principal, nearest)
+            change = np.linalg.norm(nearest - principal) / np.linalg.norm(principal)
+            self._note(link, principal, nearest, change=f" (by {100.0 * change:.2g} %)")
         return (axes * nearest) @ axes.T
 
     def warn(self) -> None:
@@ -65,21 +61,6 @@ class Inertias:
             logger.warning(
                 "%s: principal inertias that no body has are replaced by the nearest: %s%s", self._where, listed, more
             )
-
-    def _repair(self, link: str, principal: np.ndarray, nearest: np.ndarray) -> None:
-        """Note a repair.
-
-        Raises:
-            SimulationError: It is no repair, but another body.
-        """
-        change = np.linalg.norm(nearest - principal) / np.linalg.norm(principal)
-        if change > 0.1:
-            raise SimulationError(
-                f"no body has the principal inertia {_listed(principal)} kg m^2",
-                where=f"{self._where}: link '{link}'",
-                expected="none negative, none larger than the sum of the others",
-            )
-        self._note(link, principal, nearest, change=f" (by {100.0 * change:.2g} %)")
 
     def _note(self, link: str, before: np.ndarray, after: np.ndarray, change: str = "") -> None:
         self._repaired.append(f"link '{link}': {_listed(before)} -> {_listed(after)} kg m^2{change}")
