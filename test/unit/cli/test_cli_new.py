@@ -135,12 +135,33 @@ def test_it_makes_the_package_of_a_robot(urdf, srdf, folder, capsys):
     assert capsys.readouterr().out.endswith("2 configurations, no errors, no warnings\n")
 
 
+MASS = '<inertial>{}<mass value="9"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+
+
+SHAPES = {
+    "error: {}/given/cart.urdf: link 'world': the mesh 'none.stl' of a": '<mesh filename="none.stl"/>',
+    "warning: cart/config/cart.yaml:9:5: mwoibn.robot.name: ": '<box size="0.1 0.1 0.1"/>',
+}
+"""What `solfer check` finds in a cart with its weight beside these shapes."""
+
+
+@pytest.mark.parametrize("finding", SHAPES)
+def test_the_simulation_is_tried(finding, urdf, folder, capsys, caplog):
+    """By `new` and by `check`."""
+    shape = f"<collision><geometry>{SHAPES[finding]}</geometry></collision>"
+    mass = MASS.format('<origin xyz="0 1 1"/>')
+    (folder / urdf).write_text(CART.replace('<link name="world"/>', f'<link name="world">{mass}{shape}</link>'))
+    assert main(["new", "robot", "cart", "--urdf", urdf, "--floating-base"]) == 0
+    assert "the simulation refuses this robot" in caplog.text or "the robot falls within 1 s" in caplog.text
+    assert main(["check", "cart/config/cart.yaml"]) == (2 if finding.startswith("error") else 0)
+    assert capsys.readouterr().err.startswith(finding.format(folder))
+
+
 def test_a_robot_may_float(urdf, folder, capsys):
     given = folder / urdf
-    mass = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
     arguments = ["new", "robot", "cart", "--urdf", urdf, "--floating-base"]
     assert main(arguments) == 2 and "links move and have no mass: world" in capsys.readouterr().err
-    given.write_text(given.read_text().replace('<link name="world"/>', f'<link name="world">{mass}</link>'))
+    given.write_text(given.read_text().replace('<link name="world"/>', f'<link name="world">{MASS.format("")}</link>'))
     assert main(arguments) == 0
     assert read_bundle(folder / "cart/config/robots/cart/robot.yaml").floating_base is True
 

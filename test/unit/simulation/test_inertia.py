@@ -29,7 +29,7 @@ def test_inertias_of_bodies_stay_to_the_bit(caplog):
 
 @pytest.mark.parametrize(
     "principal",
-    [(0.2, 0.3, 0.51), (0.001, 0.3, 0.305), (-0.002, 0.3, 0.301), (0.0, 0.0, 0.2), (-0.1, 0.1, 0.1), (-1.0, -1.0, -1.0)],
+    [(0.2, 0.3, 0.51), (0.001, 0.3, 0.305), (-0.002, 0.3, 0.301), (0.0, 0.0, 0.2), (-0.1, 0.1, 0.1), (-1.0,) * 3],
 )
 def test_no_body_is_nearer(principal):
     """Of many bodies around, none is nearer to what the file says than the repaired one."""

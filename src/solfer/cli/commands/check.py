@@ -3,13 +3,22 @@
 The exit code is 0 if the configuration can be used, also with warnings, and 2 if not. Names of joints, links, groups
 and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf. Each plugin
 is made as at its start, component included, but connects to nothing. A package that is not built yet is looked for
-beside FILE. Of an RT layer, such as config/xbot.yaml, the plugins that it lists are checked as they run in the layer.
+beside FILE. Where nothing is wrong, the robot is simulated for a second. Of an RT layer, such as config/xbot.yaml, the
+plugins that it lists are checked as they run in the layer.
 """
 
 import argparse
+import importlib.util
 import sys
+from typing import TYPE_CHECKING
 
 from solfer.cli.options import add_file, add_robot_files, add_search_paths, add_system
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from solfer.config import CheckReport
+    from solfer.config.yaml.nodes import Mark
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +57,8 @@ def run(options: argparse.Namespace) -> int:
         system=options.system,
         robot=given_robot(options),
     )
+    if not report.errors:
+        _simulate_robots(report)
     findings = findings_of(report)
     if options.json:
         import json
@@ -59,3 +70,27 @@ def run(options: argparse.Namespace) -> int:
         sys.stderr.flush()
         print(summary(options.file, report))
     return 2 if report.errors else 0
+
+
+def _simulate_robots(report: "CheckReport") -> None:
+    """Add what is wrong with the simulation of the robots that a file names."""
+    from solfer.errors import SolferError
+    from solfer.robot.description.shipped import bundle_of
+
+    robots: dict[Path, Mark] = {}
+    for configuration in report.configurations.values():
+        bundle = bundle_of(configuration) if configuration.system == "SM" else None
+        if bundle is not None and bundle.suffix == ".yaml":
+            robots.setdefault(bundle, configuration.tree.nearest(("robot", "name")).head)
+    if not robots or importlib.util.find_spec("pybullet") is None:
+        return
+    from solfer.simulation.trial import simulate_for_a_second
+
+    for bundle, mark in robots.items():
+        try:
+            wrong = simulate_for_a_second(bundle)
+        except SolferError as error:
+            report.problems.put(mark, error)
+        else:
+            if wrong:
+                report.problems.warn(mark, f"{bundle}: {wrong}")

@@ -9,9 +9,12 @@ example-robot-data, pybullet_data or robot_descriptions instead of a file.
 """
 
 import argparse
+import logging
 from pathlib import Path
 
 from solfer.cli.options import add_robot_files
+
+logger = logging.getLogger(__name__)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,10 +68,24 @@ def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
     urdf = options.urdf if options.source is None else find_in_collection(options.source)
     skeleton = RobotSkeleton(name, folder, urdf, srdf=options.srdf, floating_base=options.floating_base)
     skeleton.write()
+    _simulate(skeleton.bundle)
     print(f"{folder} is a catkin package now, with the robot {name} of {skeleton.dofs} DoFs.\n")
     _print_steps(
         name, folder, skeleton.package, test="simulates the robot, and moves one of its joints, in one process"
     )
+
+
+def _simulate(bundle: Path) -> None:
+    """Warn of a robot that the simulation refuses, or that does not keep its posture; hardware may use the package."""
+    from solfer.errors import SolferError
+    from solfer.simulation.trial import simulate_for_a_second
+
+    try:
+        wrong = simulate_for_a_second(bundle)
+    except SolferError as error:
+        wrong = f"the simulation refuses this robot: {error}"
+    if wrong:
+        logger.warning("%s", wrong)
 
 
 def _print_steps(name: str, folder: Path, package: str, test: str) -> None:

@@ -102,6 +102,7 @@ class RobotSkeleton(Skeleton):
 
     Attributes:
         dofs: Number of its DoFs.
+        bundle: Its bundle, once it is written.
 
     Raises:
         ConfigError: A name cannot be used, or the folder exists.
@@ -116,6 +117,7 @@ class RobotSkeleton(Skeleton):
         check_masses(description, kinematics.base is not None)
         warn_of_unfit(description, kinematics.base is not None)
         self.dofs = kinematics.size
+        self.bundle = folder / BUNDLE.replace("@NAME@", name) / "robot.yaml"
         if srdf is not None:
             Semantics.from_file(srdf, description)
         seen = self._seen_from_bundle(urdf, name)
