@@ -12,7 +12,7 @@ from solfer.simulation.simulation import Simulation
 
 
 def simulate_for_a_second(bundle: Path) -> str:
-    """Simulate a robot that nobody commands; return how it does not keep its posture, or an empty string.
+    """Simulate a robot without commands; return how it does not keep its posture, or an empty string.
 
     Args:
         bundle: Its bundle, such as config/robots/centauro/robot.yaml.
@@ -27,14 +27,18 @@ def simulate_for_a_second(bundle: Path) -> str:
         for _ in range(round(1.0 / STEP)):
             simulation.step()
         if not np.isfinite(simulation.q).all():
-            raise SimulationError("the motion of the robot becomes infinite within 1 s", where=str(bundle))
+            raise SimulationError(
+                "the motion of the robot becomes infinite within 1 s",
+                where=str(bundle),
+                expected="gains, masses and inertias that fit each other",
+            )
         base = simulation.kinematics.base_link
         if base is not None and simulation.state.now.rotation(base)[2, 2] < fallen:
-            return "the robot falls within 1 s when nobody commands it"
+            return "the robot falls within 1 s without commands"
         joints = slice(6 if simulation.floating else 0, None)
         moved = np.abs(simulation.q - begin)[joints]
         names = simulation.kinematics.dofs[joints]
         weak = int(moved.argmax()) if len(moved) else 0
         if len(moved) and moved[weak] > sag:
-            return f"joint '{names[weak]}' gives way by {moved[weak]:.2g} within 1 s when nobody commands it"
+            return f"joint '{names[weak]}' gives way by {moved[weak]:.2g} within 1 s without commands"
     return ""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MissingDependency, RecordingError, writing
+from solfer.installation import pip_install
 from solfer.recording.block import CONTENT, Block, RecordedTopic, together, topics_of
 from solfer.recording.model import COLUMNS_KIND, Recording
 
@@ -40,9 +41,8 @@ def save_bag(recording: Recording, path: Path) -> Iterator[None]:
         from rosbags.rosbag1 import Writer
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        raise MissingDependency(
-            "bags need the package rosbags", expected='pip install "rosbags>=0.10,<0.12"'
-        ) from error
+        expected = pip_install("rosbags>=0.10,<0.12")
+        raise MissingDependency("bags need the package rosbags", expected=expected) from error
     store = get_typestore(Stores.ROS1_NOETIC)
     ros2 = get_typestore(Stores.ROS2_HUMBLE)
     with writing("the bag", path, RecordingError):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from solfer.errors import MissingDependency, RecordingError, writing
+from solfer.installation import pip_install
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +32,7 @@ def new_figure(width: float, height: float) -> "Figure":
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise MissingDependency("pictures need matplotlib", expected="pip install matplotlib") from error
+        raise MissingDependency("pictures need matplotlib", expected=pip_install("matplotlib")) from error
     return Figure(figsize=(width, height), layout="constrained")
 
 

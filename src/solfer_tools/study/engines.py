@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from solfer.errors import StudyError
+from solfer.installation import pip_install
 
 
 class WorkerEngine(abc.ABC):
@@ -174,7 +175,7 @@ def needs(package: str, project: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError:
-        raise StudyError(f"the package '{package}' is missing", expected=f"pip install {project}") from None
+        raise StudyError(f"the package '{package}' is missing", expected=pip_install(project)) from None
 
 
 def worker_command(folder: Path, follow: bool) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError, MissingDependency
+from solfer.installation import pip_install
 from solfer.numerics.rotations import quaternion_from_rotation
 from solfer_tools.scene import ContactForce, SceneState
 from solfer_tools.view.columns import PlottedColumns
@@ -42,7 +43,7 @@ try:
 except ModuleNotFoundError as error:
     raise MissingDependency(
         f"a server for Foxglove needs foxglove-sdk, and there is no module '{error.name}'",
-        expected="pip install -r requirements-view.txt",
+        expected=pip_install("foxglove-sdk", file="requirements-view.txt"),
     ) from error
 
 

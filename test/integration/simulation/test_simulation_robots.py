@@ -126,10 +126,10 @@ def test_a_moving_link_without_mass_is_named(tmp_path):
         Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=True))
 
 
-def test_a_link_whose_inertia_no_body_has_moves(tmp_path, caplog):
-    """As the fingers of Fetch; the warning says what is used."""
-    inertial = f'<inertial><mass value="1"/>{SOUND}</inertial>'
-    (tmp_path / "pair.urdf").write_text(BODY.format(inertial=inertial, inertia=WRONG))
+def test_what_makers_publish_moves(tmp_path, caplog):
+    """An inertia that no body has, as of the fingers of Fetch, is replaced; H1-2 has materials without names."""
+    visual = '<visual><geometry><sphere radius="1"/></geometry><material><color rgba="1 0 0 1"/></material></visual>'
+    (tmp_path / "pair.urdf").write_text(BODY.format(inertial=visual, inertia=WRONG))
     run(Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=False)), 1000)
     assert "link 'arm': 0, 0, 0.3 -> 0.100002, 0.100002, 0.199998 kg m^2 (by 58 %)" in caplog.text
 

@@ -1,5 +1,6 @@
 """`solfer new robot --from`: robots of collections."""
 
+import sys
 from pathlib import Path
 
 import pybullet_data
@@ -97,4 +98,4 @@ def test_a_collection_that_is_not_installed(collection, monkeypatch):
     monkeypatch.setattr(collections.importlib, "import_module", nothing)
     with pytest.raises(MissingDependency, match=f"{collection} is not installed") as caught:
         collections.find_in_collection(f"{collection}:arm")
-    assert caught.value.expected == f"pip install {collection}"
+    assert caught.value.expected == f"{sys.executable} -m pip install {collection}"

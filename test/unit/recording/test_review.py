@@ -6,6 +6,7 @@ import sys
 import pytest
 from support.recording.sine import recorded
 
+from solfer.installation import pip_install
 from solfer_tools.cli.main import main
 
 MATPLOTLIB = ("matplotlib", "matplotlib.figure")
@@ -49,5 +50,5 @@ def test_pictures_without_matplotlib_are_one_error(without_matplotlib, repositor
             assert main(command) == 0
             capsys.readouterr()
         assert main([*command, *picture]) == 2
-        assert capsys.readouterr().err == "error: pictures need matplotlib\n  expected: pip install matplotlib\n"
+        assert capsys.readouterr().err == f"error: pictures need matplotlib\n  expected: {pip_install('matplotlib')}\n"
     assert not list(tmp_path.glob("out.*"))

@@ -152,6 +152,10 @@ def _shape(shape: Element, place: Transform) -> Element:
     inner = Transform.from_rpy(_numbers(origin.get("xyz")), _numbers(origin.get("rpy")))
     for key, value in (place @ inner).origin().items():
         origin.set(key, value)
+    for material in moved.iter("material"):
+        if not material.get("name"):  # for PyBullet an error; equal names are of equal colours
+            colour = material.find("color")
+            material.set("name", "nameless" if colour is None else f"rgba {colour.get('rgba')}")
     return moved
 
 

@@ -12,6 +12,7 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from solfer.errors import MissingDependency, SimulationError
+from solfer.installation import pip_install
 
 STDOUT = 1
 """File descriptor."""
@@ -66,7 +67,7 @@ def load_pybullet() -> ModuleType:
         except ModuleNotFoundError as error:
             raise MissingDependency(
                 "the simulation needs PyBullet",
-                expected="pip install pybullet; from Python 3.12 on that compiles it, with g++ and python3-dev",
+                expected=f"{pip_install('pybullet')}; from Python 3.12 on that compiles it, with g++ and python3-dev",
             ) from error
     return pybullet
 

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 from solfer.cli.options import Number, rate_number
 from solfer.errors import ConfigError, MissingDependency, SolferError, UnknownName, raise_all, singles
+from solfer.installation import pip_install
 
 SWITCHES = ("control", "gui", "lockstep", "rviz", "view")
 """Arguments that are read without regard to case, as roslaunch does."""
@@ -57,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
         raise MissingDependency(
             "there is no module 'viser'",
             where=page,
-            expected="pip install -r requirements-view.txt, or view:=false",
+            expected=f"{pip_install('viser', file='requirements-view.txt')}, or view:=false",
         )
     given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file)))
     known = known_to(options.file)

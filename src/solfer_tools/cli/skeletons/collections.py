@@ -7,6 +7,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from solfer.errors import MissingDependency, ModelError, UnknownName
+from solfer.installation import pip_install
 
 EXAMPLES = "example-robot-data"
 PYBULLET = "pybullet_data"
@@ -86,4 +87,4 @@ def _described(name: str, source: str) -> Path:
 
 
 def _missing(collection: str) -> MissingDependency:
-    return MissingDependency(f"{collection} is not installed", expected=f"pip install {collection}")
+    return MissingDependency(f"{collection} is not installed", expected=pip_install(collection))
