@@ -83,6 +83,8 @@ def test_what_a_launch_file_has_set_stays(server, caplog):
     with caplog.at_level(logging.WARNING):
         server.node().provide(NAME, URDF)
         assert not caplog.messages and server.values[NAME] == f"{URDF}\n"
+        server.node().provide(NAME, "<robot name='floating'/>", original=URDF)
+        assert not caplog.messages
         server.node().provide(NAME, "<robot name='other'/>")
     assert "differs from what this node would set" in caplog.text
     assert server.node().parameter(NAME) == f"{URDF}\n"

@@ -143,10 +143,15 @@ class RosMiddleware(Middleware):
         """See `Middleware.resolve`: with the namespace and the remappings of the node."""
         return rospy.resolve_name(topic)
 
-    def provide(self, name: str, text: str) -> None:
+    def provide(self, name: str, text: str, original: str = "") -> None:
         """Set a parameter of this node's namespace, which lasts as long as this node.
 
         One that a launch file or an operator has set stays, with a warning if it differs.
+
+        Args:
+            name: The parameter.
+            text: Its value.
+            original: What the text was made of, which a launch file may have set as well.
         """
         key = rospy.resolve_name(name.lstrip("/"))
         present = rospy.get_param(key, None)
@@ -156,7 +161,7 @@ class RosMiddleware(Middleware):
                 rospy.delete_param(key)
             mark = "\n<!-- {} -->" if text.lstrip().startswith("<") else " # {}"
             rospy.set_param(key, text + mark.format(f"set by process {os.getpid()} of {rospy.get_node_uri()}"))
-        elif str(living).strip() != text.strip():
+        elif str(living).strip() not in (text.strip(), original.strip()):
             logger.warning(
                 "parameter %s was there already, stays, and differs from what this node would set; "
                 "after another robot: rosparam delete %s, and start again",
