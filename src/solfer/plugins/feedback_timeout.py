@@ -297,12 +297,13 @@ class FeedbackTimeouts:
         timeouts: One for each feedback.
 
     Attributes:
+        timeouts: See above.
         feedbacks: The feedbacks.
         complete: Whether nothing was missing or late when they were read last.
     """
 
     def __init__(self, timeouts: Sequence[FeedbackTimeout]):
-        self._timeouts = tuple(timeouts)
+        self.timeouts = tuple(timeouts)
         self.feedbacks = tuple(each.feedback for each in timeouts)
         self.complete = False
 
@@ -314,7 +315,7 @@ class FeedbackTimeouts:
             distance: How far joints have been commanded to move so far [rad, m].
         """
         complete = True
-        for each in self._timeouts:
+        for each in self.timeouts:
             feedback = each.feedback
             status = feedback.run()
             arrival = feedback.arrival
@@ -334,7 +335,7 @@ class FeedbackTimeouts:
 
     def serve(self, running: bool) -> bool:
         """Return whether a plugin that is `running` or not can work with what was read, and has been received."""
-        return self.complete or all(each.serves(running) for each in self._timeouts)
+        return self.complete or all(each.serves(running) for each in self.timeouts)
 
     def begins(self, now: float) -> bool:
         """Return whether a plugin may start at the time `now` [s] with what was read.
@@ -343,53 +344,53 @@ class FeedbackTimeouts:
             OutOfLimits: It would start with a joint outside of its limits.
         """
         ready = self.serve(False)
-        for each in self._timeouts:
+        for each in self.timeouts:
             each.unsettled = each.feedback.unsettled(now) if ready else ""
-        if not ready or any(each.unsettled for each in self._timeouts):
+        if not ready or any(each.unsettled for each in self.timeouts):
             return False
-        for each in self._timeouts:
+        for each in self.timeouts:
             each.feedback.check_start()
         return True
 
     @property
     def shortest_timeout(self) -> float:
         """Shortest timeout of a feedback [s]."""
-        return min((each.timeout for each in self._timeouts), default=math.inf)
+        return min((each.timeout for each in self.timeouts), default=math.inf)
 
     def restart(self) -> None:
         """Begin again: discard all that was received so far."""
-        for each in self._timeouts:
+        for each in self.timeouts:
             each.restart()
 
     def lacks(self, running: bool) -> str:
         """Return the feedbacks that a plugin, which is `running` or not, waits for; empty: there is none."""
         return ", ".join(
             each.unsettled or each.lacks
-            for each in self._timeouts
+            for each in self.timeouts
             if each.unsettled or each.missed(running) or (each.feedback.required and not each.feedback.received)
         )
 
     def action(self) -> str:
         """Return the gravest action of the feedbacks that have timed out; `keep` if there is none."""
-        return max((each.action for each in self._timeouts if each.timed_out), key=SEVERITY.index, default="keep")
+        return max((each.action for each in self.timeouts if each.timed_out), key=SEVERITY.index, default="keep")
 
     def conflicts(self, now: float) -> str:
         """Return feedbacks with several publishers at the time `now` [s], and their names; empty: there is none."""
-        return ", ".join(filter(None, (each.feedback.conflict(now) for each in self._timeouts)))
+        return ", ".join(filter(None, (each.feedback.conflict(now) for each in self.timeouts)))
 
     def refusals(self, now: float) -> str:
         """Return feedbacks that refused messages lately, before the time `now` [s], and why; empty: there is none."""
-        return ", ".join(filter(None, [each.refusal(now) for each in self._timeouts]))
+        return ", ".join(filter(None, [each.refusal(now) for each in self.timeouts]))
 
     def kept(self) -> str:
         """Return feedbacks that have timed out, but keep their last message; empty: there is none."""
-        return ", ".join(each.feedback.lacks for each in self._timeouts if each.timed_out and each.action == "keep")
+        return ", ".join(each.feedback.lacks for each in self.timeouts if each.timed_out and each.action == "keep")
 
     def reports(self, now: float) -> Iterator[tuple[str, HealthReport]]:
         """Yield the name and the health of each feedback at the time `now` [s]."""
-        for each in self._timeouts:
+        for each in self.timeouts:
             yield each.feedback.name, each.report(now)
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
-        return {key: value for each in self._timeouts for key, value in each.figures(now).items()}
+        return {key: value for each in self.timeouts for key, value in each.figures(now).items()}

@@ -152,6 +152,11 @@ class Plugin:
         return self._readiness.feedbacks.feedbacks
 
     @property
+    def watches(self) -> tuple[FeedbackTimeout, ...]:
+        """Pipes in with their timeouts, in the order of the configuration."""
+        return self._readiness.feedbacks.timeouts
+
+    @property
     def name(self) -> str:
         """Name of the plugin's configuration."""
         return self.component.name

@@ -47,6 +47,21 @@ def test_the_values_are_the_same_without_origins(capsys):
     assert yaml.safe_load(plain) == yaml.safe_load(shown(capsys, "-n", "joint_states", "--origin"))
 
 
+def test_the_plan_is_that_of_the_page(repository, capsys):
+    page = (repository / "docs/explanation/how_solfer_works.md").read_text()
+    assert f"```text\n{shown(capsys, '-n', 'wheeled_motion', '--plan')}```" in page
+
+
+@pytest.mark.parametrize("name", ["odometry", "ground_forces", "manipulation"])
+def test_a_plan_has_every_pipe(name, capsys):
+    """Also those of bodies, Points and contacts, and the topics that a component declares."""
+    configuration = load(CENTAURO, name)
+    rows = [line.split() for line in shown(capsys, "-n", name, "--plan").splitlines()[1:]]
+    assert {row[1] for row in rows if row[0] == "read"} >= {each.name for each in configuration.feedbacks}
+    assert [row[1] for row in rows if row[0] == "write"] == [each.name for each in configuration.controllers]
+    assert any(row[0] == "publish" for row in rows)
+
+
 def test_the_system_may_be_another_one(capsys):
     text = shown(capsys, "-n", "joint_states", "--system", "HW", "--no-origin")
     assert yaml.safe_load(text)["mwoibn"]["feedback"]["link_side_online"]["calibration"] == "encoders"

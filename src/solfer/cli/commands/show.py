@@ -2,6 +2,8 @@
 
 Each line ends with a comment with the file, line and column of its value. The text is YAML, and a main configuration
 of its own. Comments at the end list what its component declares: services, topics, actions and parameters.
+
+With --plan it prints instead what each control cycle of the plugin does, in the order in which it does it.
 """
 
 import argparse
@@ -19,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="whether each line ends with the place of its value, and declarations are listed",
     )
+    parser.add_argument("--plan", action="store_true", help="print the steps of a control cycle instead")
     add_search_paths(parser)
     add_system(parser)
 
@@ -34,6 +37,13 @@ def run(options: argparse.Namespace) -> int:
     from solfer.config import load
 
     configuration = load(options.file, options.name, system=options.system, search_paths=options.search_paths)
+    if options.plan:
+        from solfer.cli.plan import plan_of
+
+        print(f"{configuration.module.name}, {configuration.rate:g} cycles per second")
+        for line in aligned(plan_of(configuration), indent="  "):
+            print(line)
+        return 0
     print(configuration.text(options.origin), end="")
     if not options.origin:
         return 0
