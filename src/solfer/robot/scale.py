@@ -88,7 +88,7 @@ def _largest(values: list[float | None]) -> float:
 
 
 def _span(description: Description) -> float:
-    """Return the length of the longest way from one link to another [m]."""
+    """Return the length of the longest path between two links [m]."""
     longest = 0.0
     depths = dict.fromkeys(description.links, 0.0)  # length of the longest way from a link to one that it carries
     for name in reversed(description.subtree(description.root)):

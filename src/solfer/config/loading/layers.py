@@ -216,7 +216,7 @@ def _modules(main: YamlNode) -> YamlNode:
 
 def _chosen(kind: str, folder: YamlNode | None, choice: YamlNode | None, problems: Problems) -> YamlNode | None:
     """Return the Node that names the file of a system or layer."""
-    if folder is None or choice is None or not isinstance(choice.value, str):
+    if folder is None or choice is None:
         return None  # either nothing to merge, or reported with the skeleton or the module
     choices = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}
     if choice.value not in choices[kind]:  # reported with its record; without a file there would be other mistakes

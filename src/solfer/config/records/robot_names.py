@@ -102,7 +102,7 @@ def _numbers(
 
 
 def _compared_with(field: FieldInfo) -> str:
-    """Return what numbers of a field are compared with, also where they are one of its types; empty: no mark says."""
+    """Return the size in the mark of a field, or of one of its types; empty: there is no mark."""
     marks = (*field.metadata, *_marks(field.annotation))
     return next((mark.size for mark in marks if isinstance(mark, ComparedWith)), "")
 
