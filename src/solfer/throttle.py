@@ -2,6 +2,8 @@
 
 import logging
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 KEYS = 64
 """Number of keys that are distinguished."""
@@ -43,3 +45,26 @@ class Throttle:
                 self._last.pop(key, None)
                 self._held.pop(key, None)
         return len(self._last) < KEYS
+
+
+@contextmanager
+def logged_once() -> Iterator[None]:
+    """Pass each text to the handlers of the root logger once, however often it is logged within."""
+    seen = set[tuple[logging.Handler, str]]()
+    handlers = [each for each in (*logging.getLogger().handlers, logging.lastResort) if each is not None]
+    filters = []
+    for handler in handlers:
+
+        def is_new(record: logging.LogRecord, handler: logging.Handler = handler) -> bool:
+            key = handler, record.getMessage()
+            known = key in seen
+            seen.add(key)
+            return not known
+
+        handler.addFilter(is_new)
+        filters.append((handler, is_new))
+    try:
+        yield
+    finally:
+        for handler, each in filters:
+            handler.removeFilter(each)

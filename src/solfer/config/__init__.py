@@ -23,7 +23,7 @@ from solfer.config.records.pipes import (
     PipeRecord,
 )
 from solfer.config.records.record import Record, read
-from solfer.config.records.robot_names import NameOf
+from solfer.config.records.robot_names import ComparedWith, NameOf
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
 from solfer.config.yaml.files import opened
 from solfer.config.yaml.problems import Notice, Problems
@@ -31,6 +31,7 @@ from solfer.config.yaml.problems import Notice, Problems
 __all__ = [
     "AnyPipeRecord",
     "CalibrationRecord",
+    "ComparedWith",
     "Configuration",
     "ControllerRecord",
     "DofsRecord",

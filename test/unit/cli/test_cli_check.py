@@ -118,6 +118,66 @@ def test_warnings_leave_the_exit_code_at_zero(copy, capsys):
     assert warning["severity"] == "warning" and warning["line"] == line_of(file, "colour")
 
 
+MAGNITUDES = [
+    ("minor_axis: 0.068 ", "minor_axis: 68 ", "wheeled_motion", "wheels have a radius of 0.078 m; 68 mm are 0.068 m"),
+    ("slip: 0.03 ", "slip: 30 ", "odometry", "30 cm/s are 0.3 m/s"),
+    ("stall: 0.5 ", "stall: 500 ", "odometry", "500 ms are 0.5 s"),
+    ("delay: 0.01}", "delay: 10}", "ground_forces", "10 s is 1000 times the default, 0.01 s"),
+    ("above: 10,", "above: 10000,", "ground_forces", "more than the robot weighs, 932 N"),
+    (
+        "      CASTER: 1.5",
+        "      CASTER: 500",
+        "wheeled_motion",
+        "2.5 times the error in each cycle, so that it div",
+    ),
+    ("speed: 0.5 ", "speed: 30 ", "joint_states", "up to 20.35 rad/s; 30 deg/s are 0.5236 rad/s"),
+    ("arm2_7, nearest: 0.06}", "arm2_7, nearest: 6}", "inverse_kinematics", "which spans 2.6 m; 6 mm are 0.006 m"),
+]
+"""What is written, what stands there instead, the configuration that has it, and words of the warning."""
+
+
+@pytest.mark.parametrize("written, instead, name, words", MAGNITUDES)
+def test_a_number_of_another_unit_is_a_warning(written, instead, name, words, copy, capsys):
+    file = copy((written, instead))
+    assert main(["check", str(file), "-n", name]) == 0
+    err = capsys.readouterr().err
+    assert err.startswith(f"warning: {file}:{line_of(file, instead)}:") and words in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "file, kind",
+    [
+        ("robots/centauro/robot.yaml", "the bundle of a robot"),
+        ("robots/centauro/contacts.yaml", "the file of the contacts of a robot"),
+        ("studies/hundred.yaml", "a study"),
+        ("scenarios/base.yaml", "a scenario"),
+        ("worlds/gate.yaml", "a world"),
+        ("transport/busy.yaml", "the faults of a transport"),
+        ("support/NRT.yaml", "laid over a main configuration"),
+    ],
+)
+def test_a_file_of_another_kind_is_named(file, kind, capsys):
+    assert main(["check", str(CENTAURO.parent / file)]) == 2
+    err = capsys.readouterr().err
+    assert f"this is no main configuration: it is {kind}\n  expected: a main configuration; `" in err
+
+
+def test_publishers_come_before_their_readers(copy, capsys):
+    first = "plugins: [odometry3::odometry, ground_forces, wheeled_motion::locomotion, gravity"
+    last = "plugins: [ground_forces, wheeled_motion::locomotion, odometry3::odometry, gravity"
+    file = copy((first, last))
+    assert main(["check", str(file), "-n", "full_control"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    late = "reads 'base_odometry' before 'odometry' publishes it in the same cycle: list it later"
+    early = ("ground_forces", "locomotion")
+    assert [line.split(": ", 2)[2] for line in lines] == [f"'{name}' {late}" for name in early]
+
+
+def test_what_is_logged_twice_is_shown_once(capsys, caplog):
+    assert main(["check", str(CENTAURO), "-n", "upper_body_ik"]) == 0
+    assert caplog.text.count("disturb.ratio: has no effect") == 1
+
+
 @pytest.mark.slow
 def test_the_shipped_file_needs_no_word(capsys):
     assert main(["check", str(CENTAURO)]) == 0

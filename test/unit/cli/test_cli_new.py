@@ -172,6 +172,7 @@ def test_a_robot_may_float(urdf, folder, capsys):
         (["cart", "--urdf", "none.urdf"], "none.urdf: the URDF cannot be read"),
         (["cart", "--urdf", "given/cart.urdf", "--srdf", "none.srdf"], "none.srdf: the SRDF cannot be read"),
         (["cart", "--urdf", "given/cart.urdf", "--srdf", "given/other.srdf"], "did you mean: slide?"),
+        (["centauro", "--urdf", "given/cart.urdf"], "'centauro' is a robot that solfer ships"),
         (["Cart", "--urdf", "given/cart.urdf"], "'Cart' cannot be the name of a robot"),
         (["given", "--urdf", "given/cart.urdf"], "given: this exists already"),
     ],

@@ -311,8 +311,9 @@ def test_an_interface_close_to_a_known_one_is_suggested():
     replace("centauro.yaml", ("velocity: true\n        effort: true", "velocty: true\n        effort: true"))
     report = check_file("centauro.yaml", ["joint_states"])
     (error,) = report.errors
-    assert "sensor_msgs/JointState carries no 'velocty'" in str(error)
     line = line_of("centauro.yaml", "velocty: true")
+    assert str(error).startswith(f"centauro.yaml:{line}:")
+    assert str(error).endswith("unknown interface 'velocty'\n  did you mean: velocity?")
     assert any(
         notice.mark.line == line and "has to add to the State; did you mean velocity?" in str(notice)
         for notice in report.warnings

@@ -9,7 +9,9 @@ from solfer.errors import ConfigError
 TEXTS = {
     "a: {b: 1\nc: 2\n": ("2:2", "the map that begins with '{' in line 1"),
     "a: [1, 2\nb: 3\n": ("2:2", "the list that begins with '[' in line 1"),
-    "a:\n  b 1\n  c: 2\n": ("3:4", "a colon where no key can be"),
+    "a:\n  b 1\n  c: 2\n": ("2:3", "the key 'b' is not apart from its value, '1'"),
+    "a: 1\nb 2\nc: 3\n": ("2:1", "the key 'b' is not apart from its value, '2'"),
+    "a: 1\nb:2\nc: 3\n": ("2:1", "the key 'b' is not apart from its value, '2'"),
     "a: b: c\n": ("1:5", "a colon where no key can be"),
     'a: "abc\nb: 2\n': ("3:1", "the quote in line 1"),
     "a:\n    b: 1\n  c: 2\n": ("3:3", "the map that begins in line 1"),

@@ -75,3 +75,17 @@ def test_an_angle_in_a_tag_is_a_warning(configuration, capsys):
     assert found.endswith(
         "sine.amplitude.elbow: the angle looks like degrees: 20 rad is more than a turn, 20 degrees are 0.3491 rad"
     )
+
+
+@pytest.mark.parametrize(
+    "written, instead, words",
+    [
+        ('<mass value="1"/>', '<mass value="9000"/>', "link 'a' has a mass of 9000 kg: are these grams?"),
+        ('<child link="b"/>', '<child link="b"/><origin xyz="0 0 300"/>', "'elbow' is 300 m from the one before"),
+        ('lower="-90" upper="1.5" velocity="1"', 'lower="-1" upper="1" velocity="900"', "velocity limit of 900 rad/s"),
+    ],
+)
+def test_a_robot_in_other_units_is_a_warning(written, instead, words, configuration, capsys):
+    (configuration.parents[2] / "cart.urdf").write_text(URDF.replace(written, instead, 1))
+    assert main(["check", str(configuration)]) == 0
+    assert words in capsys.readouterr().err

@@ -172,6 +172,13 @@ def test_a_name_is_declared_once():
         bind("base", topics, MemoryWire().middleware, Inbox(), rate=100.0)
 
 
+@pytest.mark.parametrize("rate", [0.0, -5.0, float("nan"), float("inf")])
+def test_a_rate_is_positive(rate):
+    topic = TopicOut("twist", "geometry_msgs/TwistStamped", TwistStamped, print, rate=rate)
+    with pytest.raises(ComponentError, match="'base' declares the topic 'base/twist' with a rate of"):
+        bind("base", (topic,), MemoryWire().middleware, Inbox(), rate=100.0)
+
+
 def test_topics_with_a_rate_share_no_cycle():
     """Of three topics at 50 Hz in a loop of 200 Hz each is published every fourth cycle, one that has none in each."""
     publications = Publications()

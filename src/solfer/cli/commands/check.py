@@ -48,17 +48,19 @@ def run(options: argparse.Namespace) -> int:
     from solfer.cli.robots import given_robot
     from solfer.config.loading.rt_layer import is_layer, read_once
     from solfer.plugins.generation.check import check_file, check_layer
+    from solfer.throttle import logged_once
 
     file = read_once(options.file)
-    report = (check_layer if is_layer(file) else check_file)(
-        file,
-        options.names,
-        search_paths=options.search_paths,
-        system=options.system,
-        robot=given_robot(options),
-    )
-    if not report.errors:
-        _simulate_robots(report)
+    with logged_once():
+        report = (check_layer if is_layer(file) else check_file)(
+            file,
+            options.names,
+            search_paths=options.search_paths,
+            system=options.system,
+            robot=given_robot(options),
+        )
+        if not report.errors:
+            _simulate_robots(report)
     findings = findings_of(report)
     if options.json:
         import json

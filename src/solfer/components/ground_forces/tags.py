@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from solfer.components.filter_tags import FilterTags
-from solfer.config import LIVE, NameOf, Record
+from solfer.config import LIVE, ComparedWith, NameOf, Record
 from solfer.config.records.bounds import DURATION, Bounds
 from solfer.config.records.sources import FileRecord
 
@@ -15,8 +15,8 @@ FORCE: Bounds = {"ge": 0.0, "le": 1e5}
 POSITIVE: Bounds = {"ge": 1e-6, "le": 1e6}
 """Bounds of deviations that weigh: their inverse has to be a number."""
 
-SPAN: Bounds = {"ge": 1e-3, "le": 1e6}
-"""Bounds of times that divide [s]."""
+Span = Annotated[float, Field(ge=1e-3, le=1e6), ComparedWith("nothing")]
+"""Times that divide, of any length [s]."""
 
 
 class FiltersTags(Record):
@@ -50,8 +50,8 @@ class OffsetTags(Record):
     largest_push: float = Field(
         50.0, **FORCE, description="a force that is larger pushes the base: it is not taken for offsets [N]"
     )
-    interval: float = Field(0.1, **SPAN, description="time after which errors of torques and pushes are others [s]")
-    memory: float = Field(300.0, **SPAN, description="time constant with which offsets are forgotten [s]")
+    interval: Span = Field(0.1, description="time after which errors of torques and pushes are others [s]")
+    memory: Span = Field(300.0, description="time constant with which offsets are forgotten [s]")
 
 
 class GroundForcesTags(Record):

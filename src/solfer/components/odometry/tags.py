@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from solfer.components.filter_tags import FilterTags
-from solfer.config import LIVE, NameOf, Record
+from solfer.config import LIVE, ComparedWith, NameOf, Record
 from solfer.config.records.bounds import DURATION, LENGTH, Bounds
 from solfer.throttle import Throttle
 
@@ -34,7 +34,7 @@ class OdometryTags(Record):
         "covariances; wheels that slip or are lifted are left out, the gyroscope's bias is estimated, the ground may "
         "rise",
     )
-    wheel_radius: float | None = Field(
+    wheel_radius: Annotated[float | None, ComparedWith("wheel")] = Field(
         None, **LENGTH, description="radius of the wheels [m]; default: ring and tube of their contacts"
     )
     filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU measures")
@@ -77,7 +77,7 @@ class OdometryTags(Record):
         0.003, ge=0.0, le=0.5, description="filter: deviation of the wheels' radii, as a share of them"
     )
     tilt_deviation: float = Field(0.3, ge=0.0, le=90.0, description="filter: deviation of the IMU's tilt [deg]")
-    imu_delay: float = Field(
+    imu_delay: Annotated[float, ComparedWith("nothing")] = Field(
         0.0, ge=-1.0, le=1.0, description="time by which stamps of the IMU are behind those of the joints [s]"
     )
     transform: bool = Field(

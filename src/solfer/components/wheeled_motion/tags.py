@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from solfer.config import LIVE, NameOf, Record
+from solfer.config import LIVE, ComparedWith, NameOf, Record
 from solfer.config.records.bounds import LENGTH
 from solfer.config.tasks.original import OriginalTaskTags, translated
 from solfer.config.tasks.stack import StackRecord, TaskRecord
@@ -78,10 +78,10 @@ class DrivingTags(OriginalTaskTags):
     base: Literal["link", "center_of_mass"] = Field(
         default="link", description="what x and y of the task `BASE` are those of: the base's link, or the whole robot"
     )
-    minor_axis: float | None = Field(
+    minor_axis: Annotated[float | None, ComparedWith("wheel")] = Field(
         default=None, **LENGTH, description="radius of a wheel's tube [m]; left out: as of its contact"
     )
-    major_axis: float | None = Field(
+    major_axis: Annotated[float | None, ComparedWith("wheel")] = Field(
         default=None, ge=0.0, le=LENGTH["le"], description="radius of a wheel's ring [m]; left out: as of its contact"
     )
     reference_axis: dict[str, AxisRecord] = Field(
@@ -95,7 +95,9 @@ class DrivingTags(OriginalTaskTags):
     steerings: dict[str, SteeringRecord] = Field(
         default_factory=lambda: {"reactif": SteeringRecord()}, description="how wheels steer, by name"
     )
-    base_speed: Limit = Field(default=0.5, **LIVE, description="largest speed of the base that messages ask for [m/s]")
+    base_speed: Annotated[Limit, ComparedWith("wheel")] = Field(
+        default=0.5, **LIVE, description="largest speed of the base that messages ask for [m/s]"
+    )
     turn_speed: Limit = Field(default=0.5, **LIVE, description="the same of turns [rad/s]")
     vertex_speed: Limit = Field(default=0.1, **LIVE, description="the same of vertices, as seen from the base [m/s]")
     correction: Limit = Field(

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from solfer.config.loading.file_kinds import other_kind
 from solfer.config.records.record import parse
 from solfer.config.records.sources import FileRecord, TextRecord
 from solfer.config.yaml.files import check_file, opened, read_node
@@ -62,7 +63,7 @@ class Layers:
         names: Names of its modules.
 
     Raises:
-        ConfigError: The main file is missing or not YAML, or has no modules.
+        ConfigError: The main file is missing, not YAML or of another kind, or has no modules.
     """
 
     def __init__(
@@ -77,6 +78,9 @@ class Layers:
     ):
         problems.reading(os.fspath(file))
         self._source = opened(file)
+        other = other_kind(os.fspath(file), self._source.node)
+        if other is not None:
+            raise other
         self.main = read_node(self._source, problems, ROOT)
         for key, value in (("system", system), ("middleware", middleware)):
             if value is not None:
@@ -212,11 +216,13 @@ def _modules(main: YamlNode) -> YamlNode:
 
 def _chosen(kind: str, folder: YamlNode | None, choice: YamlNode | None, problems: Problems) -> YamlNode | None:
     """Return the Node that names the file of a system or layer."""
-    if folder is None or choice is None or not isinstance(choice.value, str):
+    if folder is None or choice is None:
         return None  # either nothing to merge, or reported with the skeleton or the module
+    choices = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}
+    if choice.value not in choices[kind]:  # reported with its record; without a file there would be other mistakes
+        return next(iter(folder.entries().values()), None)
     named = folder.get(choice.value)
-    choices = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}  # other words are reported with their records
-    if named is None and choice.value in choices[kind]:
+    if named is None:
         problems.unknown(choice.mark, kind, choice.value, folder.entries())
     return named
 

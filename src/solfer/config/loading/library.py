@@ -53,7 +53,11 @@ class Library:
     def find_set(self, chosen: YamlNode) -> YamlNode | None:
         """Return the set that `chosen` names; None, with an error, if there is none."""
         known = self._tree.entries(self._sets)
-        if chosen.value not in known:
+        if chosen.value in self.names and chosen.value not in known:
+            key = "list: " if self._direction == FEEDBACK else ""
+            what = f"'{chosen.value}' is a {self._direction} pipe, and not a set of them"
+            self._problems.add(chosen.mark, what, f"a set, or a list of pipes: `{key}[{chosen.value}]`")
+        elif chosen.value not in known:
             self._problems.unknown(chosen.mark, f"{self._direction} set", str(chosen.value), known)
         return known.get(str(chosen.value))
 

@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from solfer.config.records.robot_names import ComparedWith
+
 Bounds = dict[str, Any]
 """Keyword arguments of `Field`."""
 
@@ -50,7 +52,9 @@ Name = Annotated[str, Field(min_length=1)]
 Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
 """A place on a link [m]."""
 
-Place = Annotated[tuple[Annotated[float, Field(**COORDINATE)], ...], Field(min_length=3, max_length=3)]
+Place = Annotated[
+    tuple[Annotated[float, Field(**COORDINATE)], ...], Field(min_length=3, max_length=3), ComparedWith("world")
+]
 """A place in a world [m]."""
 
 Direction = Annotated[tuple[Annotated[float, Field(**DIRECTION)], ...], Field(min_length=3, max_length=3)]

@@ -66,6 +66,13 @@ class Record(BaseModel):
         self._node = other._node
         return self
 
+    def unit_of(self, field: str) -> tuple[str, str]:
+        """Return unit of the numbers in a field and what they are compared with, where other fields decide that.
+
+        Both are empty where the field's description and its mark `ComparedWith` say it.
+        """
+        return "", ""
+
     def folder(self, *path: Key) -> str:
         """Return the folder of the file with the value at `path`; the working directory without a file."""
         return "" if self._node is None else os.path.dirname(self._node.nearest(path).mark.file)

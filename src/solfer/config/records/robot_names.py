@@ -1,10 +1,15 @@
-"""Fields of records that name parts of a robot, so that rooms that know the robot can check them all."""
+"""Marks of fields that only rooms that know the robot can check: names of its parts, and sizes."""
 
+import re
+import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from pydantic.fields import FieldInfo
 
 from solfer.config.records.record import Record
+from solfer.config.yaml.nodes import Key, Mark
 
 
 @dataclass(frozen=True)
@@ -16,6 +21,20 @@ class NameOf:
     """
 
     kind: Literal["group", "joint", "link", "state"]
+
+
+@dataclass(frozen=True)
+class ComparedWith:
+    """Marks what a number is compared with: `Annotated[float, ComparedWith("wheel")]`.
+
+    Without a mark, the unit in the field's description says it: lengths are compared with the whole robot, speeds with
+    its joints, gains and times with the control cycle.
+
+    Attributes:
+        size: `wheel`: the robot's wheels; `world`: distances that robots cover; `nothing`: any number can be meant.
+    """
+
+    size: Literal["wheel", "world", "nothing"]
 
 
 def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:
@@ -34,3 +53,61 @@ def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:
                 yield from names_in(item)
             elif kind and isinstance(item, str):
                 yield record, info.alias or field, kind, item
+
+
+@dataclass(frozen=True)
+class WrittenNumber:
+    """A number of a file.
+
+    Attributes:
+        mark: Its place.
+        value: The number.
+        units: The units that it may have, as in `[rad, m]`; empty: none is known.
+        compared: See `ComparedWith`; empty: its unit says it.
+        default: The default of its field; zero: it has none.
+    """
+
+    mark: Mark
+    value: float
+    units: tuple[str, ...]
+    compared: str
+    default: float
+
+
+def numbers_in(record: Record) -> Iterator[WrittenNumber]:
+    """Yield all numbers with a fraction that a file gives to a record and to those below it."""
+    for field, info in type(record).model_fields.items():
+        if field in record.model_fields_set:
+            unit, compared = record.unit_of(field)
+            units = (unit,) if unit else tuple(re.findall(r"\[([^\]]+)\]", info.description or ""))
+            mark = compared or _compared_with(info)
+            default = info.default if isinstance(info.default, float) else 0.0
+            yield from _numbers(
+                record, (info.alias or field,), record.__dict__[field], units=units, compared=mark, default=default
+            )
+
+
+def _numbers(
+    record: Record, path: tuple[Key, ...], value: Any, *, units: tuple[str, ...], compared: str, default: float
+) -> Iterator[WrittenNumber]:
+    if isinstance(value, Record):
+        yield from numbers_in(value)
+    elif isinstance(value, dict | tuple):
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _numbers(record, (*path, key), item, units=units, compared=compared, default=default)
+    elif isinstance(value, float):
+        mark = record.place(*path)
+        if mark is not None:
+            yield WrittenNumber(mark, value, units, compared=compared, default=default)
+
+
+def _compared_with(field: FieldInfo) -> str:
+    """Return the size in the mark of a field, or of one of its types; empty: there is no mark."""
+    marks = (*field.metadata, *_marks(field.annotation))
+    return next((mark.size for mark in marks if isinstance(mark, ComparedWith)), "")
+
+
+def _marks(annotation: Any) -> Iterator[Any]:
+    yield from getattr(annotation, "__metadata__", ())
+    for part in typing.get_args(annotation):
+        yield from _marks(part)

@@ -1,6 +1,7 @@
 """Errors of pydantic, reworded and with the place in the file."""
 
 import difflib
+import re
 import typing
 from collections.abc import Iterable
 from typing import Any
@@ -113,6 +114,11 @@ def _unknown_key(
         problems.add(place, f"the key '{key}' is no more: {replaced[key]}")
         return
     keys = [field.alias or name for name, field in model.model_fields.items() if not field.deprecated]
+    joined = re.fullmatch(r"(\w+)(?:: *|:? +)(\S.*)", key)
+    if joined is not None and joined[1] in keys:
+        what = f"the key '{joined[1]}' is not apart from its value, '{joined[2]}'"
+        problems.add(place, what, f"a colon and a blank: `{joined[1]}: {joined[2]}`")
+        return
     problems.unknown(place, "key", key, [*keys, *also])
 
 
@@ -133,8 +139,30 @@ def _note_at(
         expected = " or ".join(dict.fromkeys(_expected(each) for each in items))
         allowed = [name for each in items for name in _allowed(each)]
         names = nearest(str(place.value), allowed) if isinstance(place.value, str) else ()
+        if _lacks_brackets(record, path, items, place.value):
+            names = [f"[{place.value}]"]
         got = f"a list of {len(place.value)}" if isinstance(place.value, tuple) else place.kind
         problems.add(place.mark, f"expected {expected}, got {got}", names=names)
+
+
+def _lacks_brackets(record: type[BaseModel], path: tuple[Key, ...], items: list[ErrorDetails], value: Any) -> bool:
+    """Whether a number stands where a list of numbers, and no number, would have been right."""
+    kinds = [each["type"] for each in items]
+    if "tuple_type" not in kinds or isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    if any(kind.startswith(("float", "greater", "less")) for kind in kinds):
+        return False
+    location = items[0]["loc"]
+    key = path[-1]
+    model = _model_at(record, location[: location.index(key)])
+    return any(_lists_numbers(model.model_fields[name].annotation) for name in _fields(model, key))
+
+
+def _lists_numbers(annotation: Any) -> bool:
+    inner = typing.get_args(annotation)
+    if typing.get_origin(annotation) is tuple:
+        return float in (inner[0], *typing.get_args(inner[0]))
+    return any(_lists_numbers(part) for part in inner)
 
 
 def _expected(item: ErrorDetails) -> str:

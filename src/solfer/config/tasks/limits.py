@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from solfer.config.records.bounds import Name
 from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
+from solfer.config.records.robot_names import ComparedWith
 
 Weight = Annotated[float, Field(gt=0.0, le=1e9)]
 """Weight of a violation's square beside the tasks of the first level."""
@@ -32,13 +33,17 @@ class WorkspaceRecord(Record):
         description="link or frame that it is near to, a group of one for each, or `world`",
     )
     nearest: float = Field(default=0.0, ge=0.0, le=1e4, description="smallest distance [m]")
-    farthest: float = Field(default=1e4, gt=0.0, le=1e4, description="largest distance [m]")
+    farthest: Annotated[float, ComparedWith("world")] = Field(
+        default=1e4, gt=0.0, le=1e4, description="largest distance [m]"
+    )
     weight: Weight | None = Field(default=None, description=_WEIGHT_MEANING)
 
     @model_validator(mode="after")
     def _check(self) -> "WorkspaceRecord":
         if self.nearest > self.farthest:
             raise ValueError(f"'nearest' {self.nearest:g} is above 'farthest' {self.farthest:g}")
+        if self.link == self.relative:
+            raise ValueError(f"'{self.link}' is relative to itself; expected another link or frame as 'relative'")
         if not self.model_fields_set & {"nearest", "farthest"}:
             raise ValueError("a workspace without a distance; expected nearest, farthest or both")
         return self

@@ -6,11 +6,12 @@ from pydantic import Field, model_validator
 
 from solfer.config.records.bounds import COORDINATE, Direction, Name, Place
 from solfer.config.records.record import Record
+from solfer.config.records.robot_names import ComparedWith
 
 KINDS = ("circle", "line", "sine", "waypoints", "file")
 """Kinds of references."""
 
-Period = Annotated[float, Field(ge=0.05, le=3600.0)]
+Period = Annotated[float, Field(ge=0.05, le=3600.0), ComparedWith("nothing")]
 Quaternion = Annotated[tuple[Annotated[float, Field(ge=-1.0, le=1.0)], ...], Field(min_length=4, max_length=4)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
 
@@ -18,7 +19,7 @@ Coordinate = Annotated[float, Field(**COORDINATE)]
 class CircleReferenceRecord(Record):
     """A circle that begins where the reference is, and goes along the first axis of its plane's second."""
 
-    radius: float = Field(gt=0.0, le=100.0, description="radius [m]")
+    radius: Annotated[float, ComparedWith("world")] = Field(gt=0.0, le=100.0, description="radius [m]")
     period: Period = Field(description="time of a revolution [s]")
     plane: Literal["xy", "yx", "xz", "zx", "yz", "zy"] | None = Field(
         default=None, description="two axes: the centre is at minus the first, the motion begins along the second"
@@ -69,7 +70,9 @@ class SineReferenceRecord(Record):
 class WaypointReferenceRecord(Record):
     """A waypoint; what it leaves out is as at the one before."""
 
-    time: float = Field(ge=0.0, le=1e5, description="when it is there, from the beginning of the reference on [s]")
+    time: Annotated[float, ComparedWith("nothing")] = Field(
+        ge=0.0, le=1e5, description="when it is there, from the beginning of the reference on [s]"
+    )
     position: Place | None = Field(default=None, description="position [m]")
     orientation: Quaternion | None = Field(
         default=None, description="quaternion (x, y, z, w); a relative one turns in the axes of the reference"

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from solfer.config.records.bounds import COORDINATE, Direction, Name, Offset, Place
 from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
+from solfer.config.records.robot_names import ComparedWith
 from solfer.config.tasks.limits import StackLimitsRecord
 from solfer.config.tasks.references import ReferenceRecord
 
@@ -43,7 +44,9 @@ class FrameRecord(Record):
     orientation: Quaternion = Field(
         default=(0.0, 0.0, 0.0, 1.0), description="link: quaternion (x, y, z, w) from the frame to the link"
     )
-    height: float = Field(default=0.0, **COORDINATE, description="ground: its height in the world [m]")
+    height: Annotated[float, ComparedWith("world")] = Field(
+        default=0.0, **COORDINATE, description="ground: its height in the world [m]"
+    )
     axis: Direction = Field(default=(1.0, 0.0, 0.0), description="ground: axis of the link that shows forward")
 
     @model_validator(mode="after")
@@ -111,9 +114,19 @@ class TaskRecord(Record):
         movable = ("position", "orientation", "pose", "center_of_mass", "posture")
         if isinstance(self.reference, ReferenceRecord) and self.point not in movable:
             raise ValueError(f"a reference that moves, of '{self.point}'; expected one of {', '.join(movable)}")
+        if self.relative is not None and self.relative in self.links:
+            raise ValueError(f"'{self.relative}' is relative to itself; expected another link or frame as 'relative'")
         if "axes" in self.model_fields_set and self.relative is None:
             raise ValueError("'axes' without 'relative'; expected both")
         return self
+
+    def unit_of(self, field: str) -> tuple[str, str]:
+        """See `Record.unit_of`: what moves decides on the units of the reference and of its velocity."""
+        if field == "reference" and self.point in ("position", "center_of_mass"):
+            return "m", "world" if self.relative is None else ""
+        if field == "velocity" and self.point in ("position", "center_of_mass", "orientation"):
+            return "rad/s" if self.point == "orientation" else "m/s", ""
+        return "", ""
 
     @property
     def links(self) -> tuple[str, ...]:

@@ -47,6 +47,14 @@ def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
     odd = odd_blank(text, file, min(begin - 1, line), last=line)
     if odd is not None:
         return odd
+    joined = _joined(lines, error.context_mark.line if error.context_mark else max(line - 1, 0), line)
+    if joined is not None and ("expected ':'" in (error.problem or "") or "mapping values" in (error.problem or "")):
+        number, found = joined
+        return ConfigError(
+            f"not YAML: the key '{found[1]}' is not apart from its value, '{found[2]}'",
+            where=f"{file}:{number + 1}:{found.start(1) + 1}",
+            expected=f"a colon and a blank: `{found[1]}: {found[2]}`",
+        )
     character = written[column : column + 1]
     # parts of a problem and of its context, what that means, and what would have been right
     faults = (
@@ -76,3 +84,21 @@ def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
                 f"not YAML: {what.format(begin=begin, character=character)}", where=where, expected=expected
             )
     return ConfigError("not YAML: this cannot be read", where=where, expected="keys and values of YAML 1.2")
+
+
+def _joined(lines: list[str], first: int, last: int) -> tuple[int, re.Match[str]] | None:
+    """Find the first line with a key and a value that no colon and blank keeps apart, such as `speed 0.5`.
+
+    Args:
+        lines: The text.
+        first: The first line to search, from zero on.
+        last: The line behind the last one to search.
+
+    Returns:
+        Its number, from zero on, with the key and the value as groups; None: there is none.
+    """
+    for number in range(first, last):
+        found = re.fullmatch(r" *(?:- +)?(\w+)(?::|:? +)([^\s:#]\S*(?: +[^\s:#]+)*) *(?:#.*)?", lines[number])
+        if found is not None and not re.match(r" *(?:- +)?\w+: ", lines[number]):
+            return number, found
+    return None

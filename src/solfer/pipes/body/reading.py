@@ -147,7 +147,11 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        lacks = self._read_imu(message.orientation, message.angular, message.acceleration, self.values, self.force)
+        numbers = (message.orientation, message.angular, message.acceleration)
+        try:
+            lacks = self._read_imu(*numbers, self.values, self.force)
+        except TypeError:  # a message that was made in Python has other numbers than the kernel's
+            lacks = self._read_imu(*map(_doubles, numbers), self.values, self.force)
         self.lacks = LACKING[lacks]
         if "orientation" not in self.lacks:
             self._orient(message.orientation, message.sender)
@@ -193,6 +197,14 @@ class TwistReading(BodyReading):
         frame = self._twist_frame or ("body" if bare_frame(message.frame) == self._body else "world")
         self.own_axes = frame == "body"
         self._twist[:] = message.values
+
+
+def _doubles(numbers: object) -> np.ndarray:
+    """Return numbers of any type as an array; a PipeError if they are none."""
+    try:
+        return np.ascontiguousarray(numbers, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise PipeError(f"{numbers!r:.80} where numbers belong", expected="an array of float64") from None
 
 
 READINGS: dict[str, type[BodyReading]] = {

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, PipeRecord
-from solfer.errors import PipeError, UnknownName
+from solfer.errors import PipeError, UnknownName, nearest
 from solfer.model import BidirectionalMap, State
 from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import joint_map, select
@@ -99,6 +99,9 @@ def _carried(record: PipeRecord) -> tuple[tuple[str, ...], str]:
     message = message_of(record, JOINT_MESSAGES, "joints")
     for field in fields:
         if field not in JOINT_MESSAGES[message] and message != ANY_INTERFACE:
+            known = type(record.interface).model_fields
+            if field not in known and nearest(field, known, count=1, likeness=0.75):
+                raise UnknownName("interface", field, known, where=record.interface.where(field))
             raise PipeError(
                 f"{message} carries no '{field}'",
                 where=record.where("message"),

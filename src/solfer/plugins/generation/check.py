@@ -22,6 +22,7 @@ from solfer.plugins.generation.runners import note_runners
 from solfer.plugins.generation.sources import check_topics, sinks_of
 from solfer.plugins.generation.together import SharedGenerator, find_generator
 from solfer.plugins.generation.unbuilt import importable_beside
+from solfer.plugins.sharing.ends import early_readers
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.description.file_checks import check_actuators, checked_files
 from solfer.robot.description.shipped import RobotFiles
@@ -220,9 +221,7 @@ class _PluginCheck:
             names = files.names()
             check_names(configuration, names, found, tags=tags, dofs=part.dofs)
             check_calibrations(configuration.calibrations.values(), names, found)
-            used = {pipe.calibration for pipe in (*configuration.feedbacks, *configuration.controllers)}
-            calibrations = [record for name, record in configuration.calibrations.items() if name in used]
-            check_plausibility(files, (tags, *calibrations), found)
+            check_plausibility(files, configuration, tags, problems=found)
         check_contacts(configuration, found)
         check_topics(configuration, files, sinks, problems=found)
         if files is None:
@@ -256,6 +255,9 @@ class _PluginCheck:
                 known=lambda each: outside[each.module.name].configuration,
             )
             self._note(generation.check(whole, start), listed[0].configuration.tree.head, found)
+            for each, record, source in early_readers(listed, next(iter(outside.values())).resolve):
+                what = f"'{each.name}' reads '{record.source}' before '{source}' publishes it in the same cycle"
+                found.warn(Mark.read(each.where) or listed[0].configuration.tree.head, f"{what}: list it later")
         self._report.problems.absorb(found)
 
     def _generator(self, part: Part, plugin: str | None, found: Problems) -> type[Generator] | None:

@@ -2,14 +2,11 @@
 
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
-from functools import lru_cache
-from pathlib import Path
 
 from solfer.config import Configuration, Problems
-from solfer.errors import SolferError, nearest
-from solfer.model.contacts import read_contacts
+from solfer.errors import nearest
 from solfer.robot.description.shipped import RobotFiles
+from solfer.robot.scale import contacts_of
 
 COMMAND_TOPIC = "/command"
 """Topic of a lower-level controller, behind its name."""
@@ -88,16 +85,7 @@ def _listed(configuration: Configuration) -> Iterator[str]:
 
 def _robot(files: RobotFiles, configuration: Configuration) -> frozenset[str]:
     """Return the topics of the simulated robot and of its lower level's controllers."""
-    touching = (
-        () if files.contacts is None or not files.measured else _contacts(files.contacts, configuration.robot.name)
-    )
-    contacts = (f"contacts/{name}{axes}" for name in touching for axes in ("", "/link"))
+    touching = contacts_of(files.contacts, configuration.robot.name) if files.measured else ()
+    contacts = (f"contacts/{each.name}{axes}" for each in touching for axes in ("", "/link"))
     commands = (f"{controller.name}{COMMAND_TOPIC}" for controller in files.controllers)
     return frozenset((*files.measured, *contacts, *commands))
-
-
-@lru_cache(maxsize=8)
-def _contacts(file: Path, robot: str) -> tuple[str, ...]:
-    with suppress(SolferError):  # reported by the dry run
-        return tuple(record.name for record in read_contacts(file, robot))
-    return ()

@@ -175,7 +175,7 @@ def robot_named(name: str) -> RobotFiles:
     folders = tuple(_shipped())
     bundle = _bundle(name, folders)
     if bundle is None:
-        raise UnknownName("robot", name, _names_in(folders))
+        raise UnknownName("robot", name, shipped_robots())
     return bundle
 
 
@@ -193,6 +193,11 @@ def robot_of(robot: str) -> tuple[str, RobotFiles]:
 def robots_beside(main: str) -> tuple[str, ...]:
     """Return the names of the robots beside a main configuration and of those that solfer ships."""
     return _names_in(_folders(main))
+
+
+def shipped_robots() -> tuple[str, ...]:
+    """Return the names of the robots that solfer ships."""
+    return _names_in(_shipped())
 
 
 def _robot_name(configuration: Configuration) -> str:

@@ -1,5 +1,6 @@
 """Binds what a component declares to a middleware."""
 
+import math
 from collections.abc import Sequence
 
 from solfer.errors import ComponentError, SolferError, UnknownName
@@ -29,9 +30,11 @@ def bind(
         What it publishes.
 
     Raises:
-        SolferError: A parameter is wrong, a name is declared twice, or a dataclass does not fit its interface.
+        SolferError: A parameter or a rate is wrong, a name is declared twice, or a dataclass does not fit its
+            interface.
     """
     _require_unique(owner, declared)
+    _require_rates(owner, declared)
     middleware.serve(owner, [each for each in declared if isinstance(each, Service)], inbox.submit)
     publications = Publications()
     queues: list[Queue] = []
@@ -63,6 +66,14 @@ def _require_unique(owner: str, declared: Sequence[Declaration]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ComponentError(f"'{full_name(owner, name)}' is declared twice", expected="a name for each")
+
+
+def _require_rates(owner: str, declared: Sequence[Declaration]) -> None:
+    for each in declared:
+        if isinstance(each, TopicOut | Action) and each.rate is not None and not 0.0 < each.rate < math.inf:
+            kind = "topic" if isinstance(each, TopicOut) else "action"
+            what = f"'{owner}' declares the {kind} '{full_name(owner, each.name)}' with a rate of {each.rate:g} Hz"
+            raise ComponentError(what, expected="a positive rate")
 
 
 def _read(name: str, parameter: Parameter, middleware: Middleware) -> None:

@@ -4,12 +4,14 @@ import os
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+from solfer.errors import ConfigError
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 from solfer.model.srdf.semantics import Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
 from solfer.model.urdf.unfit import check_masses, warn_of_unfit
+from solfer.robot.description.shipped import shipped_robots
 from solfer_tools.cli.skeletons.skeleton import Skeleton, scalar
 
 BUNDLE = "config/robots/@NAME@"
@@ -111,6 +113,8 @@ class RobotSkeleton(Skeleton):
 
     def __init__(self, name: str, folder: Path, urdf: Path, srdf: Path | None, floating_base: bool | None):
         super().__init__("robot", name, folder)
+        if name in shipped_robots():
+            raise ConfigError(f"'{name}' is a robot that solfer ships", expected="another name")
         description = Description.from_file(urdf)
         warn_of_fixed_base(description, floating_base)
         kinematics = Kinematics(description, floating_base)
