@@ -28,8 +28,8 @@ class FakePage:
         self._connection, self._connect, self.is_alive = connection, connect, True
         self._life = None
         self.nodes, self.gui, self.scripts, self.modals = {}, {}, [], []
-        self.positions, self.turns = {}, {}
-        self.notes = []
+        self.positions, self.turns, self.visible, self.cameras = {}, {}, {}, []
+        self.notes, self.files = [], []
         self.send(
             _messages.ViewerCameraMessage(
                 (1.0, 0.0, 0.0, 0.0), (3.0, 3.0, 3.0), 1.0, 0.1, 100.0, 600, 800, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -103,8 +103,8 @@ class FakePage:
         self.send(_messages.GuiUpdateMessage(self.find(label), {"value": True}))
 
     def hold(self, label):
-        """Press a button for a tenth of a second."""
-        self.send(_messages.GuiButtonHoldMessage(self.find(label), 10.0))
+        """Press a button of the pad for a tenth of a second."""
+        self._life.send(label)
 
     def change(self, label, value):
         """Give an input a value."""
@@ -131,10 +131,16 @@ class FakePage:
             self.positions[message["name"]] = message["position"]
         elif kind == "SetOrientationMessage":
             self.turns[message["name"]] = message["wxyz"]
+        elif kind == "SetSceneNodeVisibilityMessage":
+            self.visible[message["name"]] = message["visible"]
+        elif kind == "SetCameraPositionMessage" and not message["initial"]:
+            self.cameras.append(message["position"])
         elif kind == "GuiUpdateMessage":
             self.gui.setdefault(message["uuid"], {}).update(message["updates"])
         elif kind == "GuiModalMessage":
             self.modals.append(message["title"])
+        elif kind == "FileTransferPart":
+            self.files.append(message["content"].decode())
         elif kind == "NotificationShowMessage":
             self.notes.append(message["props"]["body"])
         elif "props" in message and "uuid" in message:

@@ -25,7 +25,7 @@ GOAL = Pose(Vector(0.5, 0.2, 0.3), Turn(*Rotation.from_euler("z", 0.3).as_quat()
 class PageBench:
     """An upper body with a plugin `hands` on a bus, its page, and one that looks at it."""
 
-    def __init__(self, robot, control, foxglove=False):
+    def __init__(self, robot, control, foxglove=False, simulation=None):
         self.bus, self.robot = Bus(), robot
         self.node, self.inbox, self.asked = MemoryMiddleware(self.bus, "hands"), Inbox(), []
         self.is_publishing = True
@@ -38,11 +38,16 @@ class PageBench:
         self.offer("hands/get_parameters", GetParameters, ParametersReply, lambda _: self.parameters)
         self.offer("hands/set_parameters", SetParameters, Accepted, self.note)
         self.offer("lower_level/emergency_stop", NoFields, Answer, self.note)
+        self.offer(
+            "lower_level/reset_emergency_stop", NoFields, Answer, lambda _: self.asked.append("clear") or Answer()
+        )
         self.node.report("hands", Health.WARNING, "waits for <odometry>", {"cycle p99 [ms]": 1.25})
         viewer = MemoryMiddleware(self.bus, "view")
         self.scene = LiveScene(Robot.load(robot.description.text), viewer)
         self.server = PageServer(0)
-        self.page = Page(self.server, robot.description, viewer, control=control, foxglove=foxglove)
+        self.page = Page(self.server, robot.description, viewer, control=control, simulation=simulation)
+        if foxglove:
+            self.page.serve_foxglove(self.server)
         self.clients = []
 
     def offer(self, name, request, reply, handler):
@@ -63,6 +68,10 @@ class PageBench:
         if isinstance(request, SetParameters):
             self.gain = self.takes or request.values[0]
         return Answer() if isinstance(request, NoFields) else Accepted()
+
+    def clear(self, _):
+        self.asked.append("clear")
+        return Answer()
 
     def run(self, cycles=6):
         """Let cycles of the page pass."""

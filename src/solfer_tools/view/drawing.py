@@ -16,6 +16,9 @@ FORCE_SCALE = 1e-3
 
 FORCE_COLOR = (0.9, 0.3, 0.1)
 
+LARGEST_AGREEMENT = 2e-3
+"""Distance between a desired and a measured link up to which the desired one is not drawn [m]."""
+
 Color = tuple[float, float, float]
 
 
@@ -25,14 +28,20 @@ class SceneDrawing:
     Args:
         api: What is seen there.
         description: The robot.
+
+    Attributes:
+        base: The first link that is seen.
     """
 
     def __init__(self, api: SceneApi, description: Description):
         self._api = api
         visuals = visuals_of(description)
         api.add_grid("/ground", width=20.0, height=20.0, cell_size=0.5, section_size=1.0)
+        for group in ("/desired", "/center", "/support", "/path", "/forces", "/names"):  # a page may hide each
+            api.add_frame(group, show_axes=False)
+        self.base = next((link for link, surfaces in visuals.items() if surfaces), description.root)
         self._measured = _Links(api, "/measured", visuals)
-        self._desired = _Links(api, "/desired", visuals, color=(0.3, 0.55, 1.0), opacity=0.3)
+        self._desired = _Links(api, "/desired/links", visuals, color=(0.3, 0.55, 1.0), opacity=0.3)
         self._center = api.add_icosphere("/center/mass", 0.04, (0.1, 0.4, 0.9))
         self._projection = api.add_icosphere("/center/projection", 0.025, (0.9, 0.2, 0.2))
         self._polygon = _Line(api, "/support/polygon", (0.1, 0.7, 0.2))
@@ -45,7 +54,7 @@ class SceneDrawing:
     def update(self, state: SceneState) -> None:
         """Draw a scene."""
         self._measured.place(state.measured)
-        self._desired.place(state.desired)
+        self._desired.place(state.desired, unlike=state.measured)
         self._center.position = state.center
         self._projection.position = state.projection
         self._polygon.draw(_closed(state.polygon))
@@ -65,7 +74,9 @@ class SceneDrawing:
         if self._forces is not None:
             self._forces.points = arrows
         elif len(arrows):
-            self._forces = self._api.add_arrows("/forces", arrows, FORCE_COLOR, shaft_radius=0.012, head_radius=0.03)
+            self._forces = self._api.add_arrows(
+                "/forces/arrows", arrows, FORCE_COLOR, shaft_radius=0.012, head_radius=0.03
+            )
 
     def _draw_references(self, references: Sequence[ShownReference]) -> None:
         shown = {name_of(each): each for each in references}
@@ -90,13 +101,14 @@ class _Links:
     ):
         self._send = api._queue_scene_message
         self._root = api.add_frame(name, show_axes=False, visible=False)
+        self._frames: list[FrameHandle] = []
         self._links = [link for link, surfaces in visuals.items() if surfaces]
         self._names = [f"{name}/{link}" for link in self._links]
         self._positions = np.full((len(self._links), 3), np.nan)
         self._rotations = np.full((len(self._links), 3, 3), np.nan)
         for link in self._links:
             surfaces = visuals[link]
-            api.add_frame(f"{name}/{link}", show_axes=False)
+            self._frames.append(api.add_frame(f"{name}/{link}", show_axes=False))
             for index, surface in enumerate(surfaces):
                 seen = surface.color[3] * opacity
                 api.add_mesh_simple(
@@ -109,13 +121,18 @@ class _Links:
                     side="double",
                 )
 
-    def place(self, poses: Mapping[str, ScenePose]) -> None:
-        """Move the links to their poses; without any the robot is not seen."""
+    def place(self, poses: Mapping[str, ScenePose], unlike: Mapping[str, ScenePose] | None = None) -> None:
+        """Move the links to their poses; without any none is seen, nor is one that is where it is in `unlike`."""
         self._root.visible = bool(poses)
         if not poses:
             return
         positions = np.array([poses[link].position for link in self._links])
         rotations = np.array([poses[link].rotation for link in self._links])
+        if unlike is not None:
+            others = np.array([unlike[link].position for link in self._links])
+            differs = np.linalg.norm(positions - others, axis=1) > LARGEST_AGREEMENT
+            for frame, is_seen in zip(self._frames, differs.tolist(), strict=True):
+                frame.visible = is_seen
         change = 1e-4  # of a position [m], or of an entry of a rotation, below which the page is not informed
         # handles would compare each pose with the one before, which takes three times as long as to send it
         for index in np.flatnonzero(~(np.abs(positions - self._positions) < change).all(axis=1)):
@@ -148,12 +165,13 @@ class _Reference:
 
     def __init__(self, api: SceneApi, name: str):
         self._frame = api.add_frame(f"/references{name}", axes_length=0.12, axes_radius=0.006)
-        self._label = api.add_label(f"/references{name}/name", name)
+        self._label = api.add_label(f"/names{name}", name)
         self._goal = api.add_icosphere(f"/goals{name}", 0.02, (0.5, 0.5, 0.5))
 
     def place(self, reference: ShownReference) -> None:
         """Move it."""
         place(self._frame, reference.reference)
+        self._label.position = reference.reference.position
         self._goal.position = reference.desired.position
 
     def remove(self) -> None:

@@ -170,7 +170,7 @@ class FoxgloveServer(ServerListener):
         self._published.pop(changed.name, None)  # what is refused is published as it is
         if self._control is None or not self._control.is_free:
             return
-        self._parameters.change(self._requests, part, parameter, changed.get_value())
+        self._parameters.change(self._requests, part, {parameter: changed.get_value()})
 
     def _values(self) -> dict[str, Any]:
         """Return the values of all parameters, '<part>.<name>'."""

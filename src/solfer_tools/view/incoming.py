@@ -45,7 +45,6 @@ class IncomingMessages:
         types = (
             _messages.ViewerCameraMessage,
             _messages.GuiUpdateMessage,
-            _messages.GuiButtonHoldMessage,
             *DRAG_MESSAGES,
         )
         self._types = {each.__name__: each for each in types}

@@ -1,24 +1,27 @@
 """The page: what is seen of a robot, and what belongs to it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
 from solfer.model.urdf.description import Description
 from solfer.transport import Middleware
+from solfer.transport.middleware import HealthReport
 from solfer_tools.scene import SceneState
 from solfer_tools.view.columns import LiveColumns
-from solfer_tools.view.commands.control import PageControl
-from solfer_tools.view.commands.emergency_stop import EmergencyStopButton
+from solfer_tools.view.commands.control import ONLY_WATCHES, PageControl
+from solfer_tools.view.commands.emergency_stop import EmergencyStopButton, StopActions
+from solfer_tools.view.commands.own_view import CAMERA, TARGET, OwnViews
 from solfer_tools.view.commands.parameters import KnownParameters
 from solfer_tools.view.commands.plugin_tabs import PluginTabs
 from solfer_tools.view.commands.requests import PageRequests
+from solfer_tools.view.commands.simulation_controls import PacedSimulation, SimulationControls
 from solfer_tools.view.drawing import SceneDrawing
-from solfer_tools.view.freshness import Freshness
 from solfer_tools.view.playback import Playback
 from solfer_tools.view.plots import Plots
 from solfer_tools.view.server import PageServer
+from solfer_tools.view.status_bar import StatusBar, status_of
 from solfer_tools.view.time_line import TimeLine
 
 if TYPE_CHECKING:
@@ -35,17 +38,11 @@ class Page:
         stop: The emergency stop; None: the service of the lower level.
         control: Whether pages may command.
         playback: The recording that is shown; None: what is shown is live.
-        foxglove: Whether Foxglove gets the same.
+        simulation: The simulation in this process; None: there is none.
 
     Attributes:
         foxglove: Its server; None: there is none.
     """
-
-    CAMERA = (2.1, -1.8, 1.4)
-    """Where it looks from at first [m]."""
-
-    TARGET = (0.0, 0.0, 0.6)
-    """Where it looks to at first [m]."""
 
     FIELD_OF_VIEW = math.radians(40.0)
     """Vertical field of view [rad]."""
@@ -59,38 +56,51 @@ class Page:
         control: bool = False,
         *,
         playback: Playback | None = None,
-        foxglove: bool = False,
+        simulation: PacedSimulation | None = None,
     ):
         self._viser = server.viser
         self._middleware = middleware
         self._playback = playback
         gui = self._viser.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
-        self._viser.initial_camera.position = self.CAMERA
-        self._viser.initial_camera.look_at = self.TARGET
+        gui.main_panel.dock_right()  # beside the picture, not above it
+        self._viser.initial_camera.position = CAMERA
+        self._viser.initial_camera.look_at = TARGET
         self._viser.initial_camera.fov = self.FIELD_OF_VIEW
-        self._freshness = Freshness(server)
+        self._status = StatusBar(server, description.name, simulation)
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)
+        self._views = OwnViews(self._viser, self._requests)
         self._control: PageControl | None = None
         self.foxglove: FoxgloveServer | None = None
         if playback is not None:
             self._time_line = TimeLine(server, self._requests, playback)
             self._plots = Plots(gui, self._requests, playback, incoming=server.incoming)
             return
-        EmergencyStopButton(self._viser, self._requests, stop)
         self._columns = LiveColumns(middleware)
         self._plots = Plots(gui, self._requests, self._columns, incoming=server.incoming)
-        self._control = PageControl(server, self._requests, middleware) if control else None
+        now = middleware.now if simulation is None else simulation.now
+        self._control = PageControl(server, self._requests, middleware, now=now) if control else None
+        may_command = (lambda _: False) if self._control is None else self._control.may_command
+        actions = StopActions.of_lower_level(self._requests)
+        if stop is not None:
+            actions = StopActions.of_layer(self._requests, stop)
+        self._stop = EmergencyStopButton(self._viser, self._requests, actions, may_command=may_command)
+        if simulation is not None and control:
+            link = self._drawing.base
+            SimulationControls(self._viser, self._requests, simulation, may_command=may_command, link=link)
         self._parameters = KnownParameters(middleware)
-        self._tabs = PluginTabs(gui, self._requests, self._parameters, control=self._control)
-        if foxglove:
-            self.foxglove = self._make_foxglove(server)
+        self._tabs = PluginTabs(
+            gui, self._requests, self._parameters, control=self._control, display=server.incoming.display
+        )
 
-    def _make_foxglove(self, server: PageServer) -> "FoxgloveServer":
+    def serve_foxglove(self, server: PageServer) -> None:
+        """Let Foxglove get the same as the pages of a server."""
         from solfer_tools.view.foxglove_server import FoxgloveServer  # 54 MB, which most do without
 
-        return FoxgloveServer(server, self._requests, self._columns, parameters=self._parameters, control=self._control)
+        self.foxglove = FoxgloveServer(
+            server, self._requests, self._columns, parameters=self._parameters, control=self._control
+        )
 
     def update(self, state: SceneState | None) -> None:
         """Show a scene; None: nothing new is known."""
@@ -103,6 +113,7 @@ class Page:
             reports = dict(self._middleware.reports())
             carry_out("the list of parameters", partial(self._parameters.update, reports))
             carry_out("the tabs", partial(self._tabs.update, reports))
+            carry_out("the status", partial(self._show_status, reports))
             carry_out("what is plotted", partial(self._columns.update, state, reports))
             now = self._middleware.now()
             if self.foxglove is not None:
@@ -113,8 +124,15 @@ class Page:
             return
         carry_out("the plot", partial(self._plots.update, now))
         carry_out("the drawing", partial(self._draw, state))
+        carry_out("the views", partial(self._views.update, state.measured[self._drawing.base]))
+
+    def _show_status(self, reports: Mapping[str, HealthReport]) -> None:
+        status = status_of(reports)
+        self._stop.show(bool(status.stop) and self._control is not None)
+        state = (lambda _: ONLY_WATCHES) if self._control is None else self._control.state
+        self._status.show(status, state, reports)
 
     def _draw(self, state: SceneState) -> None:
         with self._viser.atomic():
             self._drawing.update(state)
-        self._freshness.beat()
+        self._status.beat()

@@ -75,7 +75,7 @@ class PageServer:
         address: Address of the page.
         incoming: Checks what pages send.
         routes: What serves websockets of other programs, by the path below the token.
-        lives: What notes a sign of life, in the server's thread, by the random key of a page.
+        lives: What gets each sign of life, in the server's thread, by the random key of a page.
 
     Raises:
         MiddlewareError: It cannot be served.
@@ -85,7 +85,7 @@ class PageServer:
         rich.get_console().quiet = True  # viser prints addresses without the token
         self._token = secrets.token_urlsafe(24)
         self._is_guarded = False
-        self.lives: dict[str, Callable[[], None]] = {}
+        self.lives: dict[str, Callable[[str | bytes], None]] = {}
         self.routes: dict[str, Handler] = {}
         # viser has no hook for requests
         with patch.object(websockets.asyncio.server, "serve", self._guarded(websockets.asyncio.server.serve)):
@@ -145,10 +145,10 @@ class PageServer:
                     connection.recv = receive  # type: ignore[method-assign, assignment]
                     return await handler(connection)
                 with suppress(ConnectionClosed):
-                    async for _ in connection:
+                    async for sign in connection:
                         if key not in self.lives:
                             return
-                        self.lives[key]()
+                        self.lives[key](sign)
                         await asyncio.sleep(0.0)  # as for other messages: a flood leaves their turn to others
 
             asyncio.get_running_loop().set_exception_handler(

@@ -4,7 +4,6 @@ import base64
 import itertools
 import json
 import os
-import re
 import shutil
 import subprocess
 import time
@@ -25,6 +24,7 @@ from solfer.robot.description.shipped import robot_of  # noqa: E402
 from solfer_tools.scene import LiveScene  # noqa: E402
 from solfer_tools.study import SimulatedRun, read_study  # noqa: E402
 from solfer_tools.view import Page, PageServer  # noqa: E402
+from solfer_tools.view.commands.own_view import CAMERA, TARGET  # noqa: E402
 
 CHROMIUM = shutil.which("chromium")
 FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -210,16 +210,20 @@ class Shown:
         reply = self.ask("manipulation/get_parameters")
         return float(dict(zip(reply.names, reply.values, strict=True))[GAIN])
 
-    def pixel(self, point):
-        """Return the pixel of a point [m] for the camera with which a page begins."""
-        width, height = self.browser.evaluate(
+    def canvas(self):
+        """Return width and height of the picture [px]."""
+        return self.browser.evaluate(
             "(r => [r.width, r.height])(document.querySelector('canvas').getBoundingClientRect())"
         )
-        back = np.subtract(Page.CAMERA, Page.TARGET)
+
+    def pixel(self, point):
+        """Return the pixel of a point [m] for the first camera, which follows a base that heads ahead."""
+        width, height = self.canvas()
+        back = np.subtract(CAMERA, TARGET)
         back /= np.linalg.norm(back)
         right = np.cross((0.0, 0.0, 1.0), back)
         right /= np.linalg.norm(right)
-        seen = np.array((right, np.cross(back, right), back)) @ np.subtract(point, Page.CAMERA)
+        seen = np.array((right, np.cross(back, right), back)) @ (point - CAMERA - (*self.position("pelvis")[:2], 0.0))
         scale = 0.5 * height / np.tan(0.5 * Page.FIELD_OF_VIEW) / -seen[2]
         return 0.5 * width + scale * seen[0], 0.5 * height - scale * seen[1]
 
@@ -241,14 +245,13 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
     with closing(Shown(tmp_path)) as shown, browser(tmp_path / "profile", shown.server.address) as seen:
         shown.browser = seen
         shown.until(lambda: shown.beats > 3, "a page that is drawn")
-        seen.click("take control")
-        shown.until(lambda: re.search(r"page \d+ commands", shown.text), "control")
         shown.until(lambda: "wheeled_motion" in shown.text, "a base to drive")
         shown.until(lambda: "manipulation" in shown.text, "plugins that report")
 
         begin = shown.position("pelvis")
-        with seen.pressed(seen.place(element("back"))):
+        with seen.pressed(seen.place("document.querySelector('[data-solfer-drive=back]')")):
             shown.step(2.0)
+        shown.until(lambda: "you have control" in shown.text, "control")
         shown.step(2.0, 0.5)
         rest = shown.position("pelvis")
         assert rest[0] - begin[0] < -0.1 and abs(rest[1] - begin[1]) < 0.01, "the base does not drive back"
@@ -273,6 +276,7 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
                 seen.evaluate(TIDY)
                 shown.step(3.0 * PERIOD)
                 seen.picture(Path(os.environ[PICTURE]))
+                seen.evaluate("document.getElementById('solfer-banner').style.visibility = ''")
         shown.step(1.0, 0.5)
         np.testing.assert_allclose(shown.position(HAND) - hand, moved, atol=2e-3)
 
@@ -294,16 +298,33 @@ def test_a_person_watches_drags_tunes_and_stops(tmp_path):
         seen.click("stop the robot now")
         emergency = shown.run.simulation.lower_level.emergency
         shown.until(lambda: emergency.reason, "a robot that is stopped")
+        shown.until(lambda: "STOPPED: emergency stop: asked for by service" in shown.text, "the reason")
         shown.run.step(16.0)  # its arms slide over the ground for 13 s
         assert np.abs(shown.run.simulation.v[:6]).max() < 0.01, "the base does not rest"
         command = shown.run.plugins["manipulation"].robot.command.position.copy()
         shown.run.step(0.5)
         assert (shown.run.plugins["manipulation"].robot.command.position == command).all()
 
+        shown.step()
+        seen.click("clear the stop")
+        seen.click("clear the stop now")
+        shown.until(lambda: not emergency.reason, "a stop that is cleared")
+        shown.ask("simulator/reset", state="", seed=0, x=0.0, y=0.0, yaw=0.0, height=0.0)
+        shown.until(lambda: "running" in shown.text and "STOPPED" not in shown.text, "a robot that runs again")
+        shown.step(3.0, 0.5)
+        begin = shown.position("pelvis")
+        seen.ask("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW")
+        shown.step(10.0)
+        seen.ask("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
+        moved = shown.position("pelvis") - begin
+        assert moved[0] > 0.5 and abs(moved[1]) < 0.1, "it does not drive by a key"
+        (left, top), (width, height) = shown.pixel(shown.position("pelvis")), shown.canvas()
+        assert 0.2 * width < left < 0.8 * width and 0.2 * height < top < 0.8 * height, "it leaves the picture"
+
 
 def test_control_is_kept_however_slowly_it_draws(tmp_path):
     """A process at the pace of the clock; without a graphics card the browser draws about one picture a second."""
-    commands = r"/page \d+ commands/.test(document.body.innerText)"
+    commands = "document.body.innerText.includes('you have control')"
     with view("--run", "config/studies/robustness.yaml", "--control") as address:
         with browser(tmp_path / "profile", address) as seen:
             seen.wait(f"{BEATS} > 20")

@@ -31,7 +31,7 @@ executor: {{rate: 100, start: [joint_states], blend: 0.2}}
             page.until(lambda: any("[rad/s2]" in str(each) for each in page.labels), "parameters")
             assert "GOOD</b> RUNNING" in page.content and "cycles" in page.content
             page.click("take control")
-            page.until(lambda: "commands" in page.content and "no page" not in page.content, "control")
+            page.until(lambda: "you have control" in page.content, "control")
             page.change("life", "stop")
             until(lambda: page.receive(0.05) or layer.state() is PluginState.STOPPED, "a plugin that is stopped")
             page.click("EMERGENCY STOP")
@@ -40,3 +40,7 @@ executor: {{rate: 100, start: [joint_states], blend: 0.2}}
             latch = EmergencyStopLatch(layer.namespace.folder)
             page.until(lambda: latch.reason.startswith("by the page"), "the emergency stop")
             page.until(lambda: "emergency stop: by the page" in page.content, "the reason")
+            page.click("clear the stop")
+            page.until(lambda: "clear the stop now" in page.labels, "the question")
+            page.click("clear the stop now")
+            page.until(lambda: not latch and "STOPPED: emergency" not in page.content, "a stop that is cleared")

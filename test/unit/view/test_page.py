@@ -1,6 +1,8 @@
 """The page of a robot on a bus, by a page without a browser."""
 
+import re
 import socket
+import time
 from contextlib import closing
 from dataclasses import replace
 
@@ -18,11 +20,16 @@ from support.unit.upper_body import upper_body  # noqa: E402
 from viser import _messages  # noqa: E402
 
 from solfer import Robot  # noqa: E402
+from solfer.simulation.server.services import PushRequest, ResetRequest  # noqa: E402
 from solfer.transport.health import Health  # noqa: E402
-from solfer.transport.middleware import NoFields  # noqa: E402
+from solfer.transport.lower_level import Answer  # noqa: E402
+from solfer.transport.middleware import Flag, NoFields  # noqa: E402
 from solfer.transport.parameters import GetParameters, ParametersReply, SetParameters  # noqa: E402
+from solfer_tools.scene import ScenePose  # noqa: E402
 
 pytestmark = pytest.mark.slow
+
+DRAG = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4))
 
 
 @pytest.fixture
@@ -42,13 +49,13 @@ def has(bench, label):
 
 def until_it_may_drive(bench):
     """Wait until it is known who drives, and what has a reference."""
-    bench.until(lambda: has(bench, "ahead") and has(bench, "gain [1/s]"))
+    bench.until(lambda: "ahead" in bench.content and has(bench, "gain [1/s]"))
 
 
 def command(bench):
     """Let the first page command."""
     bench.clients[0].click("take control")
-    bench.until(lambda: "commands" in bench.content and "no page" not in bench.content)
+    bench.until(lambda: "you have control" in bench.content)
 
 
 def test_links_are_where_the_robot_measures_them(bench):
@@ -66,6 +73,43 @@ def test_links_are_where_the_robot_measures_them(bench):
     assert_allclose(seen["/references/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
 
 
+def test_each_page_has_its_own_view(bench):
+    """It follows the base or not, looks from a side of the robot's own heading, and hides what others see."""
+    client, other = bench.clients
+    bench.until(lambda: client.cameras and other.cameras)
+    turned = ScenePose(np.array((1.0, 2.0, 0.7)), Rotation.from_euler("z", 90, degrees=True).as_matrix())
+    client.change("camera follows the base", False)
+    bench.run(3)
+    before = client.positions[""]
+    bench.page._views.update(turned)
+    client.change("look at", "front")
+    client.change("names", False)
+    bench.page._views.update(turned)
+    for page in bench.clients:
+        page.receive(0.3)
+    bench.page._requests.update()
+    client.receive(0.3)
+    other.receive(0.3)
+    assert_allclose(other.positions[""], (-1.0, 0.0, 2.0))
+    assert_allclose(client.positions[""], before)
+    assert_allclose(client.cameras[-1], (1.0, 5.6, 0.9))
+    assert len(other.cameras) == 1 and client.visible["/names"] is False and other.visible["/names"]
+
+
+def test_a_desired_link_is_drawn_where_it_differs(bench):
+    measured = bench.state.measured
+    offsets = {"arm1_7": 3e-3, "arm1_6": 1e-3}  # [m]
+    moved = {
+        name: replace(pose, position=pose.position + (offsets.get(name, 0.0), 0.0, 0.0))
+        for name, pose in measured.items()
+    }
+    bench.page._drawing.update(replace(bench.state, desired=moved))
+    client = bench.clients[0]
+    client.receive(0.3)
+    links = {name: shown for name, shown in client.visible.items() if re.fullmatch("/desired/links/[^/]+", name)}
+    assert links.pop("/desired/links/arm1_7", True) and len(links) > 5 and not any(links.values())
+
+
 def test_the_beat_of_the_banner_stops_with_what_is_published(bench):
     assert "what you see is" in bench.clients[0].scripts[0] and "0.5" in bench.clients[0].scripts[0]
     before = bench.beat
@@ -80,18 +124,43 @@ def test_the_beat_of_the_banner_stops_with_what_is_published(bench):
 
 def test_a_tab_has_health_with_reason_and_figures(bench):
     assert "waits for &lt;odometry&gt;" in bench.content and "WARNING" in bench.content
+    assert any("alert-triangle" in str(props.get("_tab_icons_html")) for props in bench.clients[0].gui.values())
     assert "cycle p99 [ms]" in bench.content and "1.25" in bench.content
 
 
 @pytest.mark.parametrize("bench", [False], indirect=True)
 def test_the_emergency_stop_asks_once_and_needs_no_control(bench):
     client = bench.clients[0]
+    assert "`solfer view --control` also drives" in client.content
     client.click("EMERGENCY STOP")
     bench.until(lambda: has(bench, "stop the robot now"))
-    assert client.modals and not bench.asked
+    assert client.modals and "sinks to the ground" in client.content and not bench.asked
     client.click("stop the robot now")
     bench.until(lambda: bench.asked)
     assert bench.asked == [NoFields()]
+
+
+def test_a_page_shows_the_stop_and_clears_it(bench):
+    """Only while it is stopped, by the page with control, after a question that says what the robot will do."""
+    bench.until(lambda: has(bench, "clear the stop"))
+    client, other = bench.clients
+    clear = client.find("clear the stop")
+    client.click("clear the stop")
+    bench.run(3)
+    assert not client.modals and "WARNING hands" in client.content
+    bench.node.report("lower_level", Health.ERROR, "emergency stop: asked for by service", {})
+    bench.until(lambda: "STOPPED: emergency stop: asked for by service" in client.content)
+    assert client.gui[clear]["visible"]
+    command(bench)
+    for page, asked in ((other, []), (client, ["clear"])):
+        page.click("clear the stop")
+        bench.until(lambda: "clear the stop now" in page.labels)  # noqa: B023
+        assert "holds the posture that it has now" in page.content
+        page.click("clear the stop now")
+        bench.run(6)
+        assert bench.asked == asked
+    bench.node.report("lower_level", Health.GOOD, "running", {})
+    bench.until(lambda: not client.gui[clear]["visible"] and "STOPPED" not in client.content)
 
 
 @pytest.mark.parametrize("bench", [False], indirect=True)
@@ -105,13 +174,54 @@ def test_without_control_nothing_is_commanded(bench):
 
 def test_parameters_change_from_the_page_that_commands(bench):
     bench.until(lambda: has(bench, "gain [1/s]"))
-    bench.clients[0].change("gain [1/s]", 3.0)
-    bench.run(6)
-    assert not bench.asked and any("take control first" in note for note in bench.clients[0].notes)
+    client, other = bench.clients
     command(bench)
-    bench.clients[0].change("gain [1/s]", 4.0)
+    other.change("gain [1/s]", 3.0)
+    bench.until(lambda: any("has control since" in note for note in other.notes))
+    assert not bench.asked and "has control since" in other.content
+    client.change("gain [1/s]", 4.0)
     bench.until(lambda: bench.asked)
     assert bench.asked == [SetParameters(("gain",), ("4.0",))]
+
+
+FIRST_ACTS = {
+    "press": lambda client: client.hold("ahead"),
+    "drag": lambda client: client.send(DRAG),
+    "change": lambda client: client.change("speed [m/s]", 0.2),
+    "life": lambda client: client.change("life", "start"),
+}
+
+
+@pytest.mark.parametrize("act", FIRST_ACTS.values(), ids=FIRST_ACTS)
+def test_the_first_act_takes_control_where_nobody_has_it(bench, act):
+    until_it_may_drive(bench)
+    client, other = bench.clients
+    act(client)
+    bench.until(lambda: "you have control" in client.content)
+    assert client.notes[0] == "you have control now" not in other.notes
+
+
+def test_parameters_are_searched_saved_and_reset(bench):
+    """What is changed is listed with its configured value; a search hides the others; counts are whole numbers."""
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    client, other = bench.clients
+    command(bench)
+    assert "nothing is changed" in client.content and "(default: 2)" in str(client.gui[client.find("gain [1/s]")])
+    client.change("gain [1/s]", 3.0)
+    bench.until(lambda: "gain: 3.0, configured 2" in client.content)
+    other.click("save")
+    bench.until(lambda: other.files)
+    assert "hands:" in other.files[0] and "gain: 3.0" in other.files[0] and not client.files
+    for part, is_seen in (("speed", False), ("GAI", True)):
+        client.change("search", part)
+        bench.until(lambda: client.gui[client.find("gain [1/s]")]["visible"] is is_seen)  # noqa: B023
+    other.click("reset")
+    bench.run(4)
+    client.click("reset")
+    bench.until(lambda: "nothing is changed" in client.content)
+    assert bench.asked[1:] == [SetParameters(("gain",), ("2",))]
+    bench.node.report("hands", Health.GOOD, "running", {"computed": 21798.0, "age [ms]": 1.2345678})
+    bench.until(lambda: ">21798<" in client.content and ">1.235<" in client.content)
 
 
 def test_a_slider_goes_back_where_its_number_is_refused(bench):
@@ -120,8 +230,8 @@ def test_a_slider_goes_back_where_its_number_is_refused(bench):
     bench.refusal = "too fast"
     client = bench.clients[0]
     client.change("gain [1/s]", 4.0)
-    bench.until(lambda: client.gui[client.find("gain [1/s]")].get("value") == 2.0 and client.notes)
-    assert "too fast" in client.notes[-1]
+    bench.until(lambda: client.gui[client.find("gain [1/s]")].get("value") == 2.0)
+    bench.until(lambda: any("too fast" in note for note in client.notes))
 
 
 def test_a_slider_shows_what_counts(bench):
@@ -136,10 +246,10 @@ def test_a_slider_shows_what_counts(bench):
 
 def test_the_pad_drives_while_it_is_pressed(bench):
     until_it_may_drive(bench)
-    bench.clients[0].hold("ahead")
+    for other in ("up", b"ahead", "", 60_000 * "x"):
+        bench.clients[0].hold(other)
     bench.run(6)
-    assert not bench.driven.drain()
-    command(bench)
+    assert not bench.driven.drain() and "no page has control" in bench.content
     for _ in range(4):
         bench.clients[0].hold("ahead")
         bench.clients[1].hold("back")
@@ -151,13 +261,13 @@ def test_the_pad_drives_while_it_is_pressed(bench):
     assert xs[-1] == 0.0 and xs.count(0.0) == 1
 
 
-@pytest.mark.parametrize("way", ["silent", "closed", "half closed", "presses on", "without its life"])
+@pytest.mark.parametrize("way", ["silent", "closed", "half closed", "without its life"])
 def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
     """Whatever way a page ends, base and hand get a last command at rest within 0.7 s, and control is free again."""
     until_it_may_drive(bench)
     command(bench)
     client = bench.clients[0]
-    client.send(_messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4)))
+    client.send(DRAG)
     client.hold("ahead")
     bench.run(5)
     assert bench.moved.drain() and bench.driven.drain()
@@ -171,7 +281,7 @@ def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
         client._life.close()
     client.is_alive = False
     since = bench.bus.time
-    bench.until(lambda: way == "presses on" and client.hold("ahead") or "no page commands" in bench.content)
+    bench.until(lambda: "no page has control" in bench.content)
     assert bench.bus.time - since < 0.7
     rest = bench.moved.drain()[-1].values
     assert_allclose(rest, [0.5, 0.2, 0.3, *Rotation.from_euler("z", 0.3).as_quat()], atol=1e-9)
@@ -179,7 +289,7 @@ def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
     bench.run(10)
     assert not bench.moved.drain() and not bench.driven.drain()
     bench.clients[-1].click("take control")
-    bench.until(lambda: "no page commands" not in bench.content)
+    bench.until(lambda: "no page has control" not in bench.content)
 
 
 def test_a_page_that_reloads_commands_no_more(bench):
@@ -188,13 +298,11 @@ def test_a_page_that_reloads_commands_no_more(bench):
     for _ in range(8):
         with opened_page(bench.server.address) as client:
             bench.clients.insert(0, client)
-            bench.until(lambda: client.is_known and has(bench, "ahead"))  # noqa: B023
-            client.hold("ahead")
-            client.click("take control")
+            bench.until(lambda: client.is_known and "ahead" in bench.content)  # noqa: B023
             client.hold("ahead")
             bench.run(2)
         bench.clients.pop(0)
-    bench.until(lambda: "no page commands" in bench.content)
+    bench.until(lambda: "no page has control" in bench.content)
     bench.run(4)
     assert bench.driven.drain()[-1].fields["linear"]["x"] == 0.0
     command(bench)
@@ -203,15 +311,11 @@ def test_a_page_that_reloads_commands_no_more(bench):
 def test_a_reference_is_dragged_in_the_frame_of_its_task(bench):
     """Only the page in control drags; the reference is sent relative to the torso until the drag ends."""
     client, other = bench.clients
-    dragged = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4))
-    client.send(dragged)
-    bench.run(6)
-    assert not bench.moved.drain()
     command(bench)
-    other.send(dragged)
+    other.send(DRAG)
     bench.run(6)
     assert not bench.moved.drain()
-    client.send(dragged)
+    client.send(DRAG)
     bench.run(30)  # it is dragged as long as the page answers, also where it does not move
     messages = bench.moved.drain()
     assert len(messages) > 20
@@ -234,33 +338,74 @@ def test_a_page_without_control_changes_nothing_of_others(bench):
     """Inputs and handles that all pages share keep what they have, and the page shows that again."""
     client, other = bench.clients
     until_it_may_drive(bench)
-    for has_holder in (False, True):
-        if has_holder:
-            command(bench)
-        for label, number in (("speed [m/s]", 0.4), ("gain [1/s]", 5.0)):
-            before = value(client, label)
-            other.gui[other.find(label)]["value"] = number
-            other.change(label, number)
-            bench.until(lambda: value(other, label) == before)  # noqa: B023
-            assert value(client, label) == before
-        other.positions.pop("/drag/hands/left", None)
-        before = client.positions.get("/drag/hands/left")
-        message = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.9, 0.1, 0.4))
-        other.send(message)
-        bench.until(lambda: "/drag/hands/left" in other.positions)
-        assert client.positions.get("/drag/hands/left") == before
-        assert_allclose(other.positions["/drag/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
-        for label, content in (("life", "abort"), ("life", "stop"), ("base", ""), ("give it back", True)):
-            other.change(label, content)
-        for label in ("EMERGENCY STOP", "speed [m/s]", "life", "give it back", "ahead"):
-            for frequency in (10.0, 0.0, -1.0, 1e308):
-                other.send(_messages.GuiButtonHoldMessage(other.find(label), frequency))
-        for kind in (_messages.TransformControlsDragStartMessage, _messages.TransformControlsDragEndMessage):
-            other.send(kind("/drag/hands/left"))
+    command(bench)
+    for label, number in (("speed [m/s]", 0.4), ("gain [1/s]", 5.0)):
+        before = value(client, label)
+        other.gui[other.find(label)]["value"] = number
+        other.change(label, number)
+        bench.until(lambda: value(other, label) == before)  # noqa: B023
+        assert value(client, label) == before
+    other.positions.pop("/drag/hands/left", None)
+    before = client.positions.get("/drag/hands/left")
+    message = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.9, 0.1, 0.4))
+    other.send(message)
+    bench.until(lambda: "/drag/hands/left" in other.positions)
+    assert client.positions.get("/drag/hands/left") == before
+    assert_allclose(other.positions["/drag/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
+    for label, content in (("life", "abort"), ("life", "stop"), ("base", ""), ("give it back", True)):
+        other.change(label, content)
+    for label in ("EMERGENCY STOP", "speed [m/s]", "life", "give it back"):
+        for frequency in (10.0, 0.0, -1.0, 1e308):
+            other.send(_messages.GuiButtonHoldMessage(other.find(label), frequency))
+    for kind in (_messages.TransformControlsDragStartMessage, _messages.TransformControlsDragEndMessage):
+        other.send(kind("/drag/hands/left"))
     client.hold("ahead")
     bench.run(4)
     assert {message.fields["linear"]["x"] for message in bench.driven.drain()} == {0.1}
     assert not bench.asked and not bench.moved.drain()
+
+
+class Pace:
+    """That of a bench, which tests set."""
+
+    def __init__(self):
+        self.speed, self.measured = 1.0, 0.5
+
+    def now(self):
+        return time.monotonic()
+
+
+def test_a_simulation_is_paused_pushed_reset_and_slowed_down(repository):
+    """By the page with control alone, within the bounds of its sliders; its pace is in the status."""
+    pace = Pace()
+    bench = PageBench(upper_body(repository), control=True, simulation=pace)
+    pace.call = bench.bus.call
+    requests = {"pause": Flag, "reset": ResetRequest, "push": PushRequest}
+    for name, kind in requests.items():
+        bench.offer(f"simulator/{name}", kind, Answer, lambda request: bench.asked.append(request) or Answer())
+    with (
+        closing(bench.server),
+        opened_page(bench.server.address) as client,
+        opened_page(bench.server.address) as other,
+    ):
+        bench.clients = [client, other]
+        bench.until(lambda: "0.50 x real time" in client.content and client.is_known and other.is_known)
+        command(bench)
+        other.click("pause")
+        other.change("speed", 3.0)
+        bench.run(6)
+        assert not bench.asked and pace.speed == 1.0
+        for act in (
+            lambda: client.click("pause"),
+            lambda: client.click("go on"),
+            lambda: client.click("reset"),
+            lambda: client.change("force [N]", 1e9) or client.change("push", "left"),
+            lambda: client.change("speed", -1.0),
+        ):
+            act()
+            bench.run(6)
+        push = PushRequest("torso_2", (0.0, 1000.0, 0.0), (0.0, 0.0, 0.0), 0.2)
+        assert bench.asked == [Flag(True), Flag(False), ResetRequest(), push] and pace.speed == 0.1
 
 
 def test_numbers_of_a_page_stay_in_the_range_of_their_slider(bench):

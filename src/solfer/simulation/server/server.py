@@ -256,14 +256,15 @@ class SimulationServer:
         pace = self.pace
         level, news = self._losses.since_last()
         life = "paused" if self.paused else "running"
+        # in memory others let time pass
+        paced = {"real-time factor": pace.measured, "time lost [s]": pace.lost} if pace.measured else {}
         self.middleware.report(
             self._name,
             level,
             news or life,
             {
                 "time [s]": self.simulation.time,
-                "real-time factor": pace.measured,
-                "time lost [s]": pace.lost,
+                **paced,
                 "commands refused": self.simulation.lower_level.refused,
                 "commands dropped": self._lower_level.dropped,
                 "contacts": " ".join(self.simulation.contact_links()),

@@ -11,12 +11,15 @@ from solfer.robot import Robot
 from solfer.robot.description.shipped import robot_of
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
-from solfer_tools.cli.view.paced import PacedMiddleware
+from solfer_tools.cli.view.paced import PacedClock
 from solfer_tools.scene import LiveScene
 from solfer_tools.view import Page, PageServer, Playback
 
 ROBOT = "centauro"
 NODE = "view"
+
+RATE = 20.0
+"""Pictures a second [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,14 @@ class ShownSource:
         middleware: Carries its topics.
         stop: The emergency stop; None: the service of the lower level.
         playback: The recording; None: it is live.
+        pace: Its pace in memory; None: others set it.
     """
 
     robot: Robot
     middleware: Middleware
     stop: Callable[[], None] | None = None
     playback: Playback | None = None
+    pace: PacedClock | None = None
 
 
 def show(options: argparse.Namespace) -> int:
@@ -47,12 +52,15 @@ def show(options: argparse.Namespace) -> int:
             stop=source.stop,
             control=options.control,
             playback=source.playback,
-            foxglove=options.foxglove,
+            simulation=None if source.playback is not None else source.pace,
         )
+        if options.foxglove:
+            page.serve_foxglove(server)
         print(server.address, flush=True)  # after errors of the source
         if page.foxglove is not None:
             print(page.foxglove.address, flush=True)
-        FixedRateLoop(source.middleware, 20.0).run(lambda *_: page.update(scene.update()), source.middleware.running)
+        loop = FixedRateLoop(source.pace or source.middleware, RATE)
+        loop.run(lambda *_: page.update(scene.update()), source.middleware.running)
     return 0
 
 
@@ -90,7 +98,9 @@ def _recording(options: argparse.Namespace) -> ShownSource:
         bus.run_until(bus.time + duration)
         playback.advance(duration)
 
-    return ShownSource(robot, PacedMiddleware(bus, NODE, step), playback=playback)
+    return ShownSource(
+        robot, MemoryMiddleware(bus, NODE), playback=playback, pace=PacedClock(step, 1.0 / RATE, bus.call)
+    )
 
 
 def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
@@ -99,7 +109,8 @@ def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
     record = read_study(options.study).record
     run = stack.enter_context(SimulatedRun(record))
     run.attend()
-    return ShownSource(_named(options.robot or record.simulation.robot), PacedMiddleware(run.bus, NODE, run.step))
+    robot = _named(options.robot or record.simulation.robot)
+    return ShownSource(robot, run.node(NODE), pace=PacedClock(run.step, 1.0 / RATE, run.bus.call))
 
 
 def _layer(options: argparse.Namespace) -> ShownSource:

@@ -1,30 +1,48 @@
-"""A simulation or a recording in memory, at the pace of the clock."""
+"""The pace of a simulation or a recording in memory."""
 
+import math
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
 
-from solfer.middleware.memory import Bus, MemoryMiddleware
 
-
-class PacedMiddleware(MemoryMiddleware):
-    """A node on a bus whose time passes as fast as that of the clock, or more slowly.
+class PacedClock:
+    """The clock, on which a simulation or a recording goes on while others sleep; a lag is not made up for.
 
     Args:
-        bus: The bus.
-        name: Name of the node.
-        step: Lets a time pass on the bus [s].
+        step: Lets a time pass in memory [s].
+        longest: Longest time that passes at once [s].
+        call: Calls a service in memory.
+
+    Attributes:
+        call: See above.
+        speed: Seconds that pass in memory for each second of the clock.
+        measured: Those of about the newest second; NaN: it is not over.
     """
 
-    def __init__(self, bus: Bus, name: str, step: Callable[[float], None]):
-        super().__init__(bus, name)
+    def __init__(self, step: Callable[[float], None], longest: float, call: Callable[..., Future[Any]]):
         self._step = step
-        self._begin = time.monotonic() - bus.time
+        self._longest = longest
+        self.call = call
+        self.speed = 1.0
+        self.measured = math.nan
+        self._newest = self._begin = self.now()
+        self._passed = 0.0
+
+    def now(self) -> float:
+        """See `Clock.now`."""
+        return time.monotonic()
 
     def sleep_until(self, deadline: float) -> None:
-        """Let the others work until `deadline`, and wait until it has come by the clock."""
-        self._step(max(deadline - self.bus.time, 0.0))
-        early = self._begin + deadline - time.monotonic()
-        if early > 0.0:
-            time.sleep(early)
-        elif early < -0.2:  # a greater lag is not made up for
-            self._begin -= early
+        """See `Clock.sleep_until`."""
+        duration = self.speed * min(max(deadline - self._newest, 0.0), self._longest)
+        self._newest = deadline
+        self._step(duration)
+        self._passed += duration
+        now = self.now()
+        if now - self._begin >= 1.0:  # [s]
+            self.measured = self._passed / (now - self._begin)
+            self._begin = now
+            self._passed = 0.0
+        time.sleep(max(deadline - now, 0.0))

@@ -1,8 +1,11 @@
 """Commands of pages: one page at a time drags references and drives the base."""
 
 import logging
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from functools import partial
+from threading import Lock
+from typing import Literal
 
 import numpy as np
 from viser import ClientHandle, GuiButtonHandle, GuiEvent, TransformControlsEvent, TransformControlsHandle
@@ -21,7 +24,7 @@ from solfer_tools.view.server import PageServer
 SILENCE_TIMEOUT = 0.5
 """Time without a sign of life of the page that commands after which everything comes to rest [s]."""
 
-NO_PAGE_COMMANDS = "no page commands"
+ONLY_WATCHES = "this page only watches: `solfer view --control` also drives"
 
 logger = logging.getLogger(__name__)
 
@@ -29,39 +32,43 @@ logger = logging.getLogger(__name__)
 class PageControl:
     """Lets one page command, as long as it shows life.
 
-    Without a sign of it for `SILENCE_TIMEOUT`, or closed, the velocity is zero, references stay where they are, and
-    others may command.
+    The first page that presses, drags or changes something takes control, where no page has it. Without a sign of life
+    for `SILENCE_TIMEOUT`, or closed, the velocity is zero, references stay where they are, and others may command. A
+    page that was silent takes control by its button alone: what it pressed before must not go on.
 
     Args:
         server: The pages.
         requests: Carries out what they request.
         middleware: Carries the commands.
+        now: Time of the pages [s]; any thread may request it.
     """
 
-    def __init__(self, server: PageServer, requests: PageRequests, middleware: Middleware):
+    def __init__(self, server: PageServer, requests: PageRequests, middleware: Middleware, now: Callable[[], float]):
         viser = server.viser
         server.incoming.may_command = self.may_command
         server.incoming.is_free = lambda: self.is_free
         self._viser = viser
-        self._throttle = Throttle(logger)
-        self._lives = PageLives(server, middleware.now)
+        self._throttle = Throttle(logger, 3.0)
         self._requests = requests
         self._dragged = DraggedReferences(middleware)
+        self._lock = Lock()
         self._holder: int | None = None
+        self._since = ""
+        self._silent: set[int] = set()
         self._handles: dict[str, TransformControlsHandle] = {}
         self._shown: dict[str, ShownReference] = {}
         self._frames: Mapping[str, ScenePose] = {}
         self._moved: set[str] = set()
         gui = viser.gui
         with gui.add_folder("control"):
-            self._state = gui.add_markdown(NO_PAGE_COMMANDS)
+            self._pad = DrivingPad(gui, requests, middleware, is_pressed_by=self.may_command, now=now)
+            self._lives = PageLives(server, now, press=self._pad.press)
             take = gui.add_button("take control")
             give = gui.add_button("give it back")
-            self._pad = DrivingPad(gui, requests, middleware, is_pressed_by=self._is_holder)
 
         @take.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
-            requests.submit(("control", event.client_id), partial(self._take, event.client_id))
+            requests.submit(("control", event.client_id), partial(self._take_by_button, event.client_id))
 
         @give.on_click
         async def _(event: GuiEvent[GuiButtonHandle]) -> None:
@@ -69,12 +76,13 @@ class PageControl:
 
         @viser.on_client_disconnect
         async def _(client: ClientHandle) -> None:
-            requests.submit(("control", client.client_id), partial(self._give, client.client_id))
+            requests.submit(("control", client.client_id), partial(self._end, client.client_id))
 
     def update(self, state: SceneState | None) -> None:
         """Publish what is commanded; without a scene, None, nothing is."""
         self._pad.find_modules()
         if self._holder is not None and (state is None or self._lives.age(self._holder) > SILENCE_TIMEOUT):
+            self._silent.add(self._holder)
             self._rest()
         if state is not None:
             self._show(state)
@@ -84,10 +92,18 @@ class PageControl:
         self._dragged.publish()
 
     def may_command(self, client: int | None) -> bool:
-        """Return whether a page commands; another one is informed that it does not."""
-        if client is not None and not self._is_holder(client):
-            self._refuse(client, "another page, or none, commands: take control first")
+        """Return whether a page commands, from any thread; it takes control if no page has it, else gets the reason."""
+        if client is None:
+            return False
+        if not self._is_holder(client):
+            self._take(client)
         return self._is_holder(client)
+
+    def state(self, client: int) -> str:
+        """Return which page has control, for a page that reads it."""
+        if self._holder is None:
+            return "no page has control"
+        return "you have control" if self._is_holder(client) else self._holding
 
     @property
     def is_free(self) -> bool:
@@ -99,28 +115,53 @@ class PageControl:
         """Name of the page that commands; empty: none does."""
         return "" if self._holder is None else str(self._holder)
 
+    @property
+    def _holding(self) -> str:
+        return f"page {self._holder} has control since {self._since}"
+
     def _is_holder(self, client: int | None) -> bool:
         return self._holder is not None and client == self._holder
 
-    def _take(self, client: int | None) -> None:
-        if client is None or self._is_holder(client):
-            return
-        if self._holder is not None:
-            self._refuse(client, "another page commands")
-        elif self._lives.age(client) > SILENCE_TIMEOUT:
-            self._refuse(client, "this page does not answer in time to command")
+    def _take_by_button(self, client: int | None) -> None:
+        if client is not None and not self._is_holder(client):
+            self._silent.discard(client)
+            self._take(client)
+
+    def _take(self, client: int) -> None:
+        """Let a page command, or notify it of the reason why not."""
+        with self._lock:
+            is_taken = self._holder is not None
+            refusal = ""
+            if is_taken:
+                refusal = self._holding
+            elif self._lives.age(client) > SILENCE_TIMEOUT:
+                refusal = "this page does not answer in time to command"
+            elif client in self._silent:
+                refusal = "this page lost control, since it did not answer in time: press 'take control'"
+            else:
+                self._since = time.strftime("%H:%M")
+                self._holder = client
+        if refusal:
+            self._refuse(client, refusal)
         else:
-            self._holder = client
-            self._state.content = f"page {client} commands"
+            self._notify(client, "you have control now", "green")
 
     def _refuse(self, client: int, reason: str) -> None:
+        if self._throttle.warning(f"{client} {reason}", "page %d: %s", client, reason):
+            self._notify(client, reason, "red")
+
+    def _notify(self, client: int, text: str, color: Literal["red", "green"]) -> None:
         page = self._viser.get_clients().get(client)
-        if self._throttle.warning(f"{client} {reason}", "page %d: %s", client, reason) and page is not None:
-            page.add_notification("solfer", reason, color="red", auto_close_seconds=5.0)
+        if page is not None:
+            page.add_notification("solfer", text, color=color, auto_close_seconds=5.0)
 
     def _give(self, client: int | None) -> None:
         if self._is_holder(client):
             self._rest()
+
+    def _end(self, client: int) -> None:
+        self._silent.discard(client)
+        self._give(client)
 
     def _rest(self) -> None:
         """Let everything come to rest, and others command."""
@@ -133,7 +174,6 @@ class PageControl:
         self._moved.clear()
         self._pad.release()
         self._holder = None
-        self._state.content = NO_PAGE_COMMANDS
 
     def _show(self, state: SceneState) -> None:
         """Keep the handles where the references are, but for those that are dragged."""
@@ -170,7 +210,7 @@ class PageControl:
 
     def _drag(self, name: str, client: int | None, phase: str, position: np.ndarray, quaternion: np.ndarray) -> None:
         shown = self._shown.get(name)
-        if shown is None or not self._is_holder(client):
+        if shown is None or not self.may_command(client):
             return
         if phase == "end":
             self._moved.discard(name)

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
@@ -59,10 +59,10 @@ class KnownParameters:
         self._left[part] = ATTEMPTS
         self._next[part] = -math.inf
 
-    def change(self, requests: PageRequests, part: str, name: str, value: Any) -> None:
-        """Change a parameter of a part; other values than texts are written as JSON."""
-        text = value if isinstance(value, str) else json.dumps(value)
-        request = SetParameters((name,), (text,))
+    def change(self, requests: PageRequests, part: str, values: Mapping[str, Any]) -> None:
+        """Change parameters of a part, all or none; other values than texts are written as JSON."""
+        texts = (value if isinstance(value, str) else json.dumps(value) for value in values.values())
+        request = SetParameters(tuple(values), tuple(texts))
         requests.call(f"{part}/{SET_PARAMETERS}", SET_INTERFACE, request, Accepted, lambda _: self.forget(part))
 
     def _take(self, part: str) -> None:

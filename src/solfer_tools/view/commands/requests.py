@@ -47,6 +47,10 @@ class PageRequests:
         """Call a service, from the loop alone; a refusal is shown. `done` gets the reply, or None, in the loop."""
         timeout = 2.0  # [s]
         answer = self.middleware.request(self.middleware.resolve(service), interface, request, reply, timeout)
+        self.follow(answer, service, done)
+
+    def follow(self, answer: Future[Any], service: str, done: Callable[[Any], None]) -> None:
+        """Wait for the reply of a service that was called, as `call` does; from the loop alone."""
         self._answers.append((answer, service, done))
 
     def update(self) -> None:
