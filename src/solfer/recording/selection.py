@@ -3,7 +3,7 @@
 import dataclasses
 import fnmatch
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -30,12 +30,7 @@ def select(recording: Recording, patterns: Sequence[str], where: str = "") -> Re
         return recording
     chosen: dict[str, set[int]] = {}
     for pattern in patterns:
-        hits = [
-            (channel.name, place)
-            for channel in recording.channels.values()
-            for place, column in enumerate(channel.columns)
-            if any(fnmatch.fnmatchcase(name, pattern) for name in (channel.name, column, f"{channel.name}/{column}"))
-        ]
+        hits = [(channel.name, place) for channel in recording.channels.values() for place in _hits(channel, pattern)]
         if not hits:
             columns = dict.fromkeys(column for channel in recording.channels.values() for column in channel.columns)
             raise UnknownName("column", pattern, [*recording.channels, *columns], where=where)
@@ -45,6 +40,20 @@ def select(recording: Recording, patterns: Sequence[str], where: str = "") -> Re
         name: _narrowed(channel, sorted(chosen[name])) for name, channel in recording.channels.items() if name in chosen
     }
     return dataclasses.replace(recording, channels=channels)
+
+
+def chooses(patterns: Sequence[str]) -> Callable[[Channel], bool]:
+    """Return whether `select` needs a channel's numbers."""
+    return lambda channel: not patterns or any(_hits(channel, pattern) for pattern in patterns)
+
+
+def _hits(channel: Channel, pattern: str) -> list[int]:
+    """Return the places of the columns that a pattern fits."""
+    return [
+        place
+        for place, column in enumerate(channel.columns)
+        if any(fnmatch.fnmatchcase(name, pattern) for name in (channel.name, column, f"{channel.name}/{column}"))
+    ]
 
 
 def _narrowed(channel: Channel, places: list[int]) -> Channel:

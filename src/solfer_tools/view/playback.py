@@ -1,12 +1,13 @@
 """A recording that is played: what was published once is published again."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from solfer.errors import RecordingError, SolferError, UnknownName
 from solfer.recording.kinds import part_of, topic_of
-from solfer.recording.model import JOINTS_KIND, Channel, Recording
+from solfer.recording.model import JOINTS_KIND, Channel, Event
+from solfer.recording.reader import RecordingPieces
 from solfer.robot import Robot
 from solfer.robot.description.shipped import robot_of
 from solfer.transport import BodyMessage, JointMessage, Middleware, Writer
@@ -36,7 +37,7 @@ class Playback:
     """Publishes the rows of a recording at a time, as the robot and its plugins did.
 
     Args:
-        recording: The recording.
+        pieces: The recording.
         middleware: Carries them.
         robot: The robot.
 
@@ -50,21 +51,20 @@ class Playback:
         RecordingError: It has no measured joints.
     """
 
-    def __init__(self, recording: Recording, middleware: Middleware, robot: Robot):
-        self._recording = recording
+    def __init__(self, pieces: RecordingPieces, middleware: Middleware, robot: Robot):
+        self._pieces = pieces
         self._robot = robot
-        self._joints = _widest_first(recording.filled)
+        self._joints = _widest_first(pieces.channels)
         if not self._joints:
             raise RecordingError("no plugin measures joints", expected="a recording with <plugin>/measured/position")
-        times = self._joints[0].times
-        self.begin = float(times[0])
-        self.end = float(times[-1])
+        self.begin = pieces.begin
+        self.end = pieces.end
         self.time = self.begin
         self.speed = 1.0
         self.plays = True
         self._topics = PlayedTopics(middleware)
         self._commands: list[tuple[Channel, Writer]] = []
-        channels = recording.filled
+        channels = pieces.channels
         for channel in channels:
             plugin, _, rest = channel.name.partition("/")
             if channel.kind == JOINTS_KIND and rest.startswith("command/") and part_of(rest) == "position":
@@ -89,47 +89,63 @@ class Playback:
         """Go to a time [s]."""
         self.time = min(max(time, self.begin), self.end)
 
+    def next_events(self) -> list[Event]:
+        """See `RecordingPieces.next_events`."""
+        return self._pieces.next_events()
+
     def names(self) -> list[str]:
         """See `PlottedColumns`."""
-        return [f"{each.name}/{name}" for each in self._recording.filled for name in each.columns]
+        return [f"{each.name}/{name}" for each in self._pieces.channels for name in each.columns]
 
     def value(self, name: str) -> float:
         """See `PlottedColumns`."""
-        channel = next((each for each in self._recording.channels.values() if name.startswith(f"{each.name}/")), None)
+        channel = next((each for each in self._pieces.channels if name.startswith(f"{each.name}/")), None)
         column = name.removeprefix(f"{channel.name}/") if channel is not None else ""
         if channel is None or column not in channel.columns:
             return float("nan")
-        return float(self._row(channel)[channel.columns.index(column)])
+        row = self._row(channel)
+        return float("nan") if row is None else float(row[channel.columns.index(column)])
 
-    def _row(self, channel: Channel) -> np.ndarray:
-        """Return the newest row of a channel at the present time, shape (columns,)."""
-        row: np.ndarray = channel.values[max(int(np.searchsorted(channel.times, self.time, side="right")) - 1, 0)]
+    def _row(self, channel: Channel) -> np.ndarray | None:
+        """Return the newest row of a channel at the present time, shape (columns,); None: it has none around it."""
+        found = self._pieces.at(self.time).get(channel.name)
+        if found is None:
+            return None
+        row: np.ndarray = found.values[max(int(np.searchsorted(found.times, self.time, side="right")) - 1, 0)]
         return row
+
+    def _rows(self, channels: Iterable[Channel]) -> Iterator[tuple[Channel, np.ndarray]]:
+        """Yield the channels that have a row, with it."""
+        for channel in channels:
+            row = self._row(channel)
+            if row is not None:
+                yield channel, row
 
     def _publish(self) -> None:
         known: dict[str, float] = {}
-        for channel in reversed(self._joints):
-            known |= dict(zip(channel.columns, self._row(channel).tolist(), strict=True))
+        for channel, row in self._rows(reversed(self._joints)):
+            known |= dict(zip(channel.columns, row.tolist(), strict=True))
         joints = tuple(name for name in known if name not in self._chart)
+        if not joints:
+            return
         self._topics.states.write(JointMessage(joints, position=np.array([known[name] for name in joints])))
         self._publish_base(known)
         for channel, writer in self._commands:
-            writer.write(JointMessage(channel.columns, position=self._row(channel).copy()))
-        if self._forces:
-            values = np.array([self._row(each) for each in self._forces.values()])
-            self._topics.wrenches.write(PointsMessage("world", tuple(self._forces), values))
+            for _, row in self._rows((channel,)):
+                writer.write(JointMessage(channel.columns, position=row.copy()))
+        forces = {name: row for name, channel in self._forces.items() for _, row in self._rows((channel,))}
+        if forces:
+            self._topics.wrenches.write(PointsMessage("world", tuple(forces), np.array(list(forces.values()))))
 
     def _publish_base(self, known: dict[str, float]) -> None:
         chart = self._robot.kinematics.base
         link = self._robot.kinematics.base_link
         if chart is None or link is None:
             return
-        for channel in self._truths[:1]:
-            row = self._row(channel)
+        for channel, row in self._rows(self._truths[:1]):
             if np.isfinite(row[:7]).all():
                 self._topics.base.write(BodyMessage(channel.frame, link, row[:3].copy(), orientation=row[3:7].copy()))
-        for channel in self._estimates[:1]:
-            row = self._row(channel)
+        for channel, row in self._rows(self._estimates[:1]):
             self._topics.odometry.write(
                 BodyMessage(channel.frame, channel.child, row[:3].copy(), orientation=row[3:7].copy())
             )
@@ -139,15 +155,15 @@ class Playback:
             self._topics.base.write(BodyMessage("world", link, np.array(position), orientation=np.array(orientation)))
 
 
-def robot_of_recording(recording: Recording) -> Robot:
+def robot_of_recording(pieces: RecordingPieces) -> Robot:
     """Load the robot that a recording describes, with the contacts of the shipped robot of its name.
 
     Raises:
         RecordingError: It describes none.
     """
-    widest = next(iter(_widest_first(recording.channels.values())), None)
+    widest = next(iter(_widest_first(pieces.channels)), None)
     plugin = widest.name.partition("/")[0] if widest is not None else ""
-    texts = [recording.attachments.get(f"{plugin}/robot.{kind}") for kind in ("urdf", "srdf")]
+    texts = [pieces.attachments.get(f"{plugin}/robot.{kind}") for kind in ("urdf", "srdf")]
     if texts[0] is None:
         raise RecordingError("it has no robot", expected=f"an attachment '{plugin}/robot.urdf', or --robot")
     urdf, srdf = (None if each is None else each.decode() for each in texts)

@@ -14,7 +14,7 @@ from support.page import opened_page, view  # noqa: E402
 from solfer import Robot  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
 from solfer.recording.model import JOINTS_KIND, Channel  # noqa: E402
-from solfer.recording.reader import read  # noqa: E402
+from solfer.recording.reader import RecordingPieces, read  # noqa: E402
 from solfer.recording.writer import RecordingWriter  # noqa: E402
 from solfer.robot.description.shipped import robot_of  # noqa: E402
 from solfer.telemetry.rows import RowLayout  # noqa: E402
@@ -79,7 +79,7 @@ def test_each_link_is_where_the_file_has_it(repository, tmp_path):
     files = robot_of("centauro")[1]
     robot = Robot.load(files.urdf, files.srdf, files.floating_base, name="centauro", contacts=files.contacts)
     bus = Bus()
-    playback = Playback(recording, MemoryMiddleware(bus, "recording"), robot)
+    playback = Playback(RecordingPieces(file), MemoryMiddleware(bus, "recording"), robot)
     playback.plays = False
     node = MemoryMiddleware(bus, "view")
     scene = LiveScene(robot, node)

@@ -14,7 +14,9 @@ from support.unit.upper_body import upper_body  # noqa: E402
 from solfer import Robot  # noqa: E402
 from solfer.errors import RecordingError  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
-from solfer.recording.model import JOINTS_KIND, Channel, Recording  # noqa: E402
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Recording  # noqa: E402
+from solfer.recording.reader import RecordingPieces  # noqa: E402
+from solfer.recording.writer import save  # noqa: E402
 from solfer_tools.scene import LiveScene  # noqa: E402
 from solfer_tools.view import Page, PageServer, Playback  # noqa: E402
 from solfer_tools.view.playback import robot_of_recording  # noqa: E402
@@ -46,10 +48,22 @@ def scene_at(playback, bus, scene, duration):
     return scene.update() if scene.update() is not None else None
 
 
+def pieces_of(recording, folder):
+    save(recording, folder / "run.mcap")
+    return RecordingPieces(folder / "run.mcap")
+
+
 @pytest.fixture
-def played(recording):
-    bus, shown = Bus(), robot_of_recording(recording)
-    playback = Playback(recording, MemoryMiddleware(bus, "recording"), shown)
+def pieces(recording, tmp_path):
+    pieces = pieces_of(recording, tmp_path)
+    yield pieces
+    pieces.close()
+
+
+@pytest.fixture
+def played(pieces):
+    bus, shown = Bus(), robot_of_recording(pieces)
+    playback = Playback(pieces, MemoryMiddleware(bus, "recording"), shown)
     scene = LiveScene(shown, MemoryMiddleware(bus, "view"))
     return playback, lambda duration: scene_at(playback, bus, scene, duration)
 
@@ -99,19 +113,24 @@ def test_columns_are_those_of_the_recording(recording, played):
     assert np.isnan(playback.value("hands/measured/position/other")) and np.isnan(playback.value("other"))
 
 
-def test_a_recording_without_joints_or_robot_is_refused(robot):
-    with pytest.raises(RecordingError, match="no plugin measures joints"):
-        Playback(Recording({}), MemoryMiddleware(Bus(), "recording"), robot)
-    with pytest.raises(RecordingError, match="it has no robot"):
-        robot_of_recording(Recording({}))
+def test_a_recording_without_rows_joints_or_robot_is_refused(robot, tmp_path):
+    with pytest.raises(RecordingError, match="there are no rows"):
+        pieces_of(Recording({}), tmp_path)
+    times = np.array([0.0])
+    other = Channel("hands/other", COLUMNS_KIND, ("x",), ("m",), times=times, values=times[:, None])
+    with closing(pieces_of(Recording({"hands/other": other}), tmp_path)) as pieces:
+        with pytest.raises(RecordingError, match="no plugin measures joints"):
+            Playback(pieces, MemoryMiddleware(Bus(), "recording"), robot)
+        with pytest.raises(RecordingError, match="it has no robot"):
+            robot_of_recording(pieces)
 
 
 @pytest.mark.slow
-def test_the_time_line_takes_its_own_times_and_speeds_alone(recording):
+def test_the_time_line_takes_its_own_times_and_speeds_alone(pieces):
     """Speeds and times that are none change nothing; then those of the lists count."""
     bus = Bus()
-    shown = robot_of_recording(recording)
-    playback = Playback(recording, MemoryMiddleware(bus, "recording"), shown)
+    shown = robot_of_recording(pieces)
+    playback = Playback(pieces, MemoryMiddleware(bus, "recording"), shown)
     with closing(PageServer(0)) as server:
         page = Page(server, shown.description, MemoryMiddleware(bus, "view"), playback=playback)
         with opened_page(server.address) as client:

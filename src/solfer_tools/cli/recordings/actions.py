@@ -12,14 +12,14 @@ from solfer.model.urdf.description import Description
 from solfer.recording.model import Channel, Recording
 from solfer.recording.reader import read
 from solfer.recording.requests import grouped
-from solfer.recording.selection import between, select, span
+from solfer.recording.selection import between, chooses, select, span
 from solfer.recording.writer import save
 from solfer_tools.cli.recordings.progress import progress
 
 
 def info(options: argparse.Namespace) -> None:
     """Print what a recording holds."""
-    recording = read(options.file)
+    recording = read(options.file, lambda channel: False)
     for line in _info(recording):
         print(line)
     print(f"file: {_size(options.file.stat().st_size)}")
@@ -63,7 +63,7 @@ ACTIONS = {"info": info, "cut": cut, "export": export}
 
 def _chosen(options: argparse.Namespace) -> Recording:
     """Return the part of a recording that was requested."""
-    recording = read(options.file)
+    recording = read(options.file, chooses(options.columns))
     _warn(recording)
     start, end = span(recording)
     part = between(select(recording, options.columns, str(options.file)), options.begin, options.end, start=start)

@@ -86,13 +86,13 @@ def _named(name: str) -> Robot:
 
 def _recording(options: argparse.Namespace) -> ShownSource:
     from solfer.middleware.memory import Bus, MemoryMiddleware
-    from solfer.recording.reader import read
+    from solfer.recording.reader import RecordingPieces
     from solfer_tools.view.playback import robot_of_recording
 
-    recording = read(options.file)
+    pieces = RecordingPieces(options.file)
     bus = Bus()
-    robot = robot_of_recording(recording) if options.robot is None else _named(options.robot)
-    playback = Playback(recording, MemoryMiddleware(bus, "recording"), robot)
+    robot = robot_of_recording(pieces) if options.robot is None else _named(options.robot)
+    playback = Playback(pieces, MemoryMiddleware(bus, "recording"), robot)
 
     def step(duration: float) -> None:
         bus.run_until(bus.time + duration)

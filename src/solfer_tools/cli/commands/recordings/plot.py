@@ -32,12 +32,13 @@ def run(options: argparse.Namespace) -> int:
         UnknownName: There is no such column.
     """
     from solfer.recording.reader import read
+    from solfer.recording.selection import chooses
     from solfer_tools.cli.recordings.progress import progress
     from solfer_tools.review import check_suffix, saved, show
 
     if options.output is not None:
         check_suffix(options.output)
-    figures = _figures(read(options.file), options)
+    figures = _figures(read(options.file, chooses(options.columns)), options)
     if options.output is None:
         show(figures)
         return 0
