@@ -7,7 +7,7 @@ import numpy as np
 from solfer.errors import RecordingError, SolferError, UnknownName
 from solfer.recording.kinds import part_of, topic_of
 from solfer.recording.model import JOINTS_KIND, Channel, Event
-from solfer.recording.reader import RecordingPieces
+from solfer.recording.reading.pieces import RecordingPieces
 from solfer.robot import Robot
 from solfer.robot.description.shipped import robot_of
 from solfer.transport import BodyMessage, JointMessage, Middleware, Writer

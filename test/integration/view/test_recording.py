@@ -14,7 +14,8 @@ from support.page import opened_page, view  # noqa: E402
 from solfer import Robot  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
 from solfer.recording.model import JOINTS_KIND, Channel  # noqa: E402
-from solfer.recording.reader import RecordingPieces, read  # noqa: E402
+from solfer.recording.reader import read  # noqa: E402
+from solfer.recording.reading.pieces import RecordingPieces  # noqa: E402
 from solfer.recording.writer import RecordingWriter  # noqa: E402
 from solfer.robot.description.shipped import robot_of  # noqa: E402
 from solfer.telemetry.rows import RowLayout  # noqa: E402

@@ -7,7 +7,8 @@ import pytest
 
 from solfer.errors import RecordingError
 from solfer.recording.model import COLUMNS_KIND, Channel, Event, Recording
-from solfer.recording.reader import RecordingPieces, read
+from solfer.recording.reader import read
+from solfer.recording.reading.pieces import RecordingPieces
 from solfer.recording.writer import save
 
 

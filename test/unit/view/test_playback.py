@@ -14,8 +14,8 @@ from support.unit.upper_body import upper_body  # noqa: E402
 from solfer import Robot  # noqa: E402
 from solfer.errors import RecordingError  # noqa: E402
 from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
-from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Recording  # noqa: E402
-from solfer.recording.reader import RecordingPieces  # noqa: E402
+from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Event, Recording  # noqa: E402
+from solfer.recording.reading.pieces import RecordingPieces  # noqa: E402
 from solfer.recording.writer import save  # noqa: E402
 from solfer_tools.scene import LiveScene  # noqa: E402
 from solfer_tools.view import Page, PageServer, Playback  # noqa: E402
@@ -39,7 +39,8 @@ def recording(robot):
         for what, more in (("measured", 0.0), ("command/position_controller", 0.1))
     ]
     texts = {"hands/robot.urdf": robot.description.text.encode()}
-    return Recording({each.name: each for each in channels}, attachments=texts)
+    events = [Event(101.0, "hands", "hold", "<b>no feedback</b>"), Event(102.0, "hands", "request", "left")]
+    return Recording({each.name: each for each in channels}, events, attachments=texts)
 
 
 def scene_at(playback, bus, scene, duration):
@@ -135,6 +136,11 @@ def test_the_time_line_takes_its_own_times_and_speeds_alone(pieces):
         page = Page(server, shown.description, MemoryMiddleware(bus, "view"), playback=playback)
         with opened_page(server.address) as client:
             client.until(lambda: "time [s]" in client.labels, "a time line")
+            for _ in range(5):
+                page.update(None)
+                client.receive(0.05)
+            for mark in ("1.00 s hands hold &lt;b&gt;no feedback", "2.00 s hands request left"):
+                assert mark in client.content
 
             def change(label, number):
                 client.change(label, number)

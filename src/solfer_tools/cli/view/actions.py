@@ -86,7 +86,7 @@ def _named(name: str) -> Robot:
 
 def _recording(options: argparse.Namespace) -> ShownSource:
     from solfer.middleware.memory import Bus, MemoryMiddleware
-    from solfer.recording.reader import RecordingPieces
+    from solfer.recording.reading.pieces import RecordingPieces
     from solfer_tools.view.playback import robot_of_recording
 
     pieces = RecordingPieces(options.file)
