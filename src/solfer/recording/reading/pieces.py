@@ -112,10 +112,13 @@ class RecordingPieces:
 
     def _indexed(self, place: int, size: int) -> Iterator[_ChunkPlace]:
         """Yield the chunks that a summary lists, and take what else it lists."""
-        indices = {Opcode.ATTACHMENT_INDEX: AttachmentIndex, Opcode.METADATA_INDEX: MetadataIndex}
+        indices: dict[int, type[AttachmentIndex] | type[MetadataIndex]] = {
+            Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+            Opcode.METADATA_INDEX: MetadataIndex,
+        }
         for opcode, content in self._records.at(place, size, KINDS | indices.keys() | {Opcode.CHUNK_INDEX}):
             if opcode in indices:
-                where = indices[Opcode(opcode)].read(ReadDataStream(io.BytesIO(content)))
+                where = indices[opcode].read(ReadDataStream(io.BytesIO(content)))
                 self._reader.take_at(where.offset, where.length)
             elif opcode == Opcode.CHUNK_INDEX:
                 begin, end, chunk, length, rest = _CHUNK_INDEX.unpack_from(content)
