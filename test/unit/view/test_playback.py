@@ -1,6 +1,8 @@
 """A recording that is played shows what was recorded at each time."""
 
+import argparse
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
 from solfer.recording.model import COLUMNS_KIND, JOINTS_KIND, Channel, Event, Recording  # noqa: E402
 from solfer.recording.reading.pieces import RecordingPieces  # noqa: E402
 from solfer.recording.writer import save  # noqa: E402
+from solfer_tools.cli.view.actions import _picture, _recording  # noqa: E402
 from solfer_tools.scene import LiveScene  # noqa: E402
 from solfer_tools.view import Page, PageServer, Playback  # noqa: E402
 from solfer_tools.view.playback import robot_of_recording  # noqa: E402
@@ -89,6 +92,26 @@ def test_links_are_those_of_the_row_at_each_time(robot, recording, played):
         for found, channel in ((state.measured, "measured"), (state.desired, "command/position_controller")):
             kinematics = expected(robot, recording, f"hands/{channel}/position", playback.time)
             assert_allclose(found["arm1_7"].position, kinematics.position("arm1_7"), atol=1e-9)
+
+
+def test_a_recording_beside_it_is_the_other_robot(robot, recording, tmp_path):
+    """From its own begin on, at the same time after it."""
+    later = {each.name: replace(each, times=each.times + 500.0, values=each.values + 0.2) for each in recording.filled}
+    (tmp_path / "other").mkdir()
+    pieces_of(recording, tmp_path).close()
+    pieces_of(replace(recording, channels=later), tmp_path / "other").close()
+    files = {"file": tmp_path / "run.mcap", "beside": tmp_path / "other" / "run.mcap"}
+    source = _recording(argparse.Namespace(**files, robot=None))
+    source.playback.plays = False
+    source.playback.seek(101.5 + 1e-6)
+    scene = LiveScene(source.robot, source.middleware)
+    for _ in range(3):
+        source.pace._step(0.05)
+        state = _picture(scene, source.beside)
+    for found, channels in ((state.measured, recording.channels), (state.desired, later)):
+        rows = {"hands/measured/position": replace(channels["hands/measured/position"], times=TIMES)}
+        kinematics = expected(robot, rows, "hands/measured/position", 101.5 + 1e-6)
+        assert_allclose(found["arm1_7"].position, kinematics.position("arm1_7"), atol=1e-9)
 
 
 def test_it_plays_at_its_speed_and_ends(played):

@@ -12,6 +12,7 @@ from solfer.cli.options import Number
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
     parser.add_argument("file", metavar="FILE", nargs="?", type=Path, help="a recording (default: ROS, live)")
+    parser.add_argument("--beside", metavar="FILE", type=Path, help="another recording, drawn in blue where it differs")
     parser.add_argument("--robot", metavar="NAME|FILE", help="robot of this package, or its bundle (default: centauro)")
     sources = parser.add_mutually_exclusive_group()
     sources.add_argument("--namespace", metavar="NAME", help="look into the real-time layer of this namespace, no ROS")
@@ -41,6 +42,8 @@ def run(options: argparse.Namespace) -> int:
     others = (options.namespace, options.study, options.foxglove or None, options.control or None)
     if options.file is not None and any(each is not None for each in others):
         options.parser.error("a recording with --namespace, --run, --foxglove or --control, expected FILE alone")
+    if options.beside is not None and options.file is None:
+        options.parser.error("--beside without a recording, expected FILE --beside FILE")
     from solfer_tools.cli.view.actions import show
 
     return show(options)

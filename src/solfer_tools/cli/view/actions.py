@@ -4,15 +4,17 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
+from solfer.errors import RecordingError
 from solfer.robot import Robot
 from solfer.robot.description.shipped import robot_of
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer_tools.cli.view.paced import PacedClock
-from solfer_tools.scene import LiveScene
+from solfer_tools.scene import LiveScene, SceneState
 from solfer_tools.view import Page, PageServer, Playback
 
 ROBOT = "centauro"
@@ -32,6 +34,7 @@ class ShownSource:
         stop: The emergency stop; None: the service of the lower level.
         playback: The recording; None: it is live.
         pace: Its pace in memory; None: others set it.
+        beside: The scene of the recording beside it; None: there is none.
     """
 
     robot: Robot
@@ -39,6 +42,7 @@ class ShownSource:
     stop: Callable[[], None] | None = None
     playback: Playback | None = None
     pace: PacedClock | None = None
+    beside: LiveScene | None = None
 
 
 def show(options: argparse.Namespace) -> int:
@@ -60,8 +64,15 @@ def show(options: argparse.Namespace) -> int:
         if page.foxglove is not None:
             print(page.foxglove.address, flush=True)
         loop = FixedRateLoop(source.pace or source.middleware, RATE)
-        loop.run(lambda *_: page.update(scene.update()), source.middleware.running)
+        loop.run(lambda *_: page.update(_picture(scene, source.beside)), source.middleware.running)
     return 0
+
+
+def _picture(scene: LiveScene, beside: LiveScene | None) -> SceneState | None:
+    """Return a scene, with the robot of another one in place of the desired robot."""
+    state = scene.update()
+    other = None if beside is None else beside.update()
+    return state if state is None or other is None else replace(state, desired=other.measured)
 
 
 @contextmanager
@@ -89,18 +100,34 @@ def _recording(options: argparse.Namespace) -> ShownSource:
     from solfer.recording.reading.pieces import RecordingPieces
     from solfer_tools.view.playback import robot_of_recording
 
-    pieces = RecordingPieces(options.file)
+    def played(file: Path, bus: Bus) -> tuple[Robot, Playback]:
+        pieces = RecordingPieces(file)
+        robot = robot_of_recording(pieces) if options.robot is None else _named(options.robot)
+        return robot, Playback(pieces, MemoryMiddleware(bus, "recording"), robot)
+
     bus = Bus()
-    robot = robot_of_recording(pieces) if options.robot is None else _named(options.robot)
-    playback = Playback(pieces, MemoryMiddleware(bus, "recording"), robot)
+    robot, playback = played(options.file, bus)
+    beside = None
+    if options.beside is not None:
+        others = Bus()
+        other_robot, other = played(options.beside, others)
+        if other_robot.description.links.keys() != robot.description.links.keys():
+            raise RecordingError(
+                "it has a robot of other links", where=str(options.beside), expected=f"one of {robot.name}"
+            )
+        other.plays = False
+        beside = LiveScene(other_robot, MemoryMiddleware(others, NODE))
 
     def step(duration: float) -> None:
         bus.run_until(bus.time + duration)
         playback.advance(duration)
+        if beside is not None:
+            others.run_until(bus.time)
+            other.seek(other.begin + playback.time - playback.begin)
+            other.advance(duration)
 
-    return ShownSource(
-        robot, MemoryMiddleware(bus, NODE), playback=playback, pace=PacedClock(step, 1.0 / RATE, bus.call)
-    )
+    pace = PacedClock(step, 1.0 / RATE, bus.call)
+    return ShownSource(robot, MemoryMiddleware(bus, NODE), playback=playback, pace=pace, beside=beside)
 
 
 def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:

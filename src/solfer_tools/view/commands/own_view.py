@@ -32,7 +32,11 @@ VIEWS = {
 """Places of the camera and of what it looks to, in the same way, by the names of their buttons."""
 
 SHOWN = {  # group of the drawing: label, colour and meaning
-    "/desired": ("desired robot", "#4c8cff", "links that differ by more than 2 mm from the measured ones"),
+    "/desired": (
+        "desired robot",
+        "#4c8cff",
+        "links that differ by more than 2 mm from the measured ones; of the recording beside it, if one is shown",
+    ),
     "/forces": ("forces", "#e64c1a", "forces of the ground, 1 mm for each newton"),
     "/support": ("support polygon", "#1ab333", "support polygon; yellow: with its margins"),
     "/center": ("centre of mass", "#1a66e6", "centre of mass; red: its projection on the ground"),
