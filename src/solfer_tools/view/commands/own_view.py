@@ -115,9 +115,15 @@ class _OwnView:
         ahead = self._base.rotation[:2, 0]
         cosine, sine = ahead / (np.linalg.norm(ahead) or 1.0)
         turn = np.array(((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0)))
-        place, target = (tuple((turn @ each + (*self._base.position[:2], 0.0)).tolist()) for each in VIEWS[name])
+        camera, target = (np.array(each) for each in VIEWS[name])
+        width, height = self._client.camera.image_width, self._client.camera.image_height
+        if 0 < width < 0.65 * height:  # a phone: farther away, and above the panel, which covers its lower half
+            away = 0.65 * height / width * (camera - target)
+            target = target - (0.0, 0.0, 0.18 * np.linalg.norm(away))
+            camera = target + away
+        place, aim = (tuple((turn @ each + (*self._base.position[:2], 0.0)).tolist()) for each in (camera, target))
         self._send(SetCameraPositionMessage(place))
-        self._send(SetCameraLookAtMessage(target))
+        self._send(SetCameraLookAtMessage(aim))
 
     def _send(self, message: Message) -> None:
         self._client._websock_connection.queue_message(message)
