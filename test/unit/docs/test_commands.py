@@ -66,6 +66,10 @@ ELSEWHERE = {
     ),
     r"roslaunch solfer figure_4.launch lockstep:=true .*": ("test/ros/figure_4.test", "lockstep"),
     r"python examples/arm_driver.py my_robot/.*": ("test/integration/package/test_arm_driver.py", "arm_driver.py"),
+    r"python examples/ros_control_arm.py": ("test/ros/ros_control_test.py", "ros_control_arm.py"),
+    r"rosrun plugins plugin -p .* --system HW": ("test/ros/ros_control_test.py", "ros_control.md"),
+    r'rosservice call /joint_states/trajectory "{joints: .elbow.*': ("test/ros/ros_control_test.py", "ros_control.md"),
+    r'rosservice call /inverse_kinematics/reference "{task: tip.*': ("test/ros/ros_control_test.py", "ros_control.md"),
     r"rosrun plugins plugin -p joint_states -c my_robot/.*": (
         "test/integration/package/test_arm_driver.py",
         '"joint_states"',
