@@ -106,7 +106,8 @@ def main() -> None:
     rate = RATES[options.layer]
     with tempfile.TemporaryDirectory() as folder:
         file = configuration(Path(folder), options.layer)
-        arguments = ["solfer", "figure_4.launch", "merging:=whole_body", f"config:={file}", f"rates:=joints={rate:g}"]
+        scheme = ["motion:=joints", "merging:=whole_body"]
+        arguments = ["solfer", "figure_4.launch", *scheme, f"config:={file}", f"rates:=joints={rate:g}"]
         with Launch(arguments, Path(folder, "launch.log"), free_port()) as system:
             system.wait_for_master(60.0)
             with contextlib.closing(RosMiddleware(RosNode("shared_control", ["shared_control"]))) as middleware:

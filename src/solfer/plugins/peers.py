@@ -38,6 +38,11 @@ class Peer:
         self.found = not self._end.carries
 
     @property
+    def is_output(self) -> bool:
+        """Whether the plugin publishes to the peer."""
+        return not self._receives
+
+    @property
     def open(self) -> bool:
         """Whether to go on looking: the peer is missing, and is needed or was not warned about yet."""
         if self._end.arrival > -math.inf if self._receives else self._end.is_received:
@@ -76,10 +81,24 @@ class Peers:
         self._next = -math.inf
         self._has_called = False
         self._trouble = ""
+        self._outputs = tuple(peer for peer in peers if peer.is_output)
+        self._requested = ""
+
+    def note_request(self, name: str) -> None:
+        """Note that the plugin carries out a request: `look` warns if no node receives what it publishes then."""
+        missing = [peer for peer in self._outputs if peer.open or not peer.found]
+        if self._outputs and len(missing) == len(self._outputs):
+            self._requested = name
 
     def look(self) -> None:
         """Request the topics of other nodes, if that is due; to be called about once a second. Does not block."""
         now = self._middleware.now()
+        if self._requested and not self._has_called:
+            name = self._requested
+            self._requested = ""
+            self._has_called = True
+            self._middleware.topics().add_done_callback(lambda answer: self._warn_unreceived(answer, name))
+            return
         if self._has_called or now < self._next:
             return
         self._next = now + 1.0
@@ -95,12 +114,27 @@ class Peers:
     @property
     def done(self) -> bool:
         """Whether every peer was found, or needs no further warning."""
-        return self._next == math.inf
+        return self._next == math.inf and not self._requested
 
     def warning(self) -> str:
         """Return what is wrong with the needed peers, for the plugin's health; empty: nothing is known."""
         faults = [peer.fault for peer in self._peers if peer.needed and peer.fault and peer.open]
         return "; ".join(faults) or (self._trouble if any(peer.needed and peer.open for peer in self._peers) else "")
+
+    def _warn_unreceived(self, answer: "Future[Topics]", request: str) -> None:
+        try:
+            topics = answer.result()
+        except SolferError:
+            return  # `look` reports it for peers that are needed
+        finally:
+            self._has_called = False
+        for peer in self._outputs:
+            peer.update(topics)
+        if not any(peer.found for peer in self._outputs):
+            faults = "; ".join(peer.fault for peer in self._outputs)
+            logger.warning(
+                "%s carries out '%s', but no node receives what it publishes: %s", self._plugin, request, faults
+            )
 
     def _receive(self, answer: "Future[Topics]", due: Sequence[Peer], now: float) -> None:
         try:

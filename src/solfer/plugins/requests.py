@@ -18,11 +18,13 @@ class RequestNotes:
         enabled: Whether notes are recorded.
         notes: What happened since they were taken last: kind and text of an event. That of a request has name and
             fields, as JSON.
+        requested: Called with the name of each request and goal that is carried out.
     """
 
     def __init__(self) -> None:
         self.enabled = False
         self.notes: list[tuple[str, str]] = []
+        self.requested: Callable[[str], None] = lambda name: None
         self._calls: dict[str, Callable[[Mapping[str, Any]], Callable[[], Any]]] = {}
 
     def note(self, kind: str, text: str) -> None:
@@ -48,7 +50,7 @@ class RequestNotes:
             self._calls[f"{name}/cancel"] = lambda fields: action.cancel
             return replace(
                 action,
-                begin=lambda goal: self._note(name, goal, action.begin),
+                begin=lambda goal: self._carry_out(name, goal, action.begin),
                 cancel=lambda: self._note(f"{name}/cancel", {}, lambda _: action.cancel()),
             )
         return declaration
@@ -68,13 +70,17 @@ class RequestNotes:
 
     def _service(self, service: Service) -> Service:
         if service.prepare is None:
-            return replace(service, handler=lambda request: self._note(service.name, request, service.handler))
+            return replace(service, handler=lambda request: self._carry_out(service.name, request, service.handler))
         prepare = service.prepare
         return replace(
             service,
             prepare=lambda request: (request, prepare(request)),
-            handler=lambda pair: self._note(service.name, pair[0], lambda _: service.handler(pair[1])),
+            handler=lambda pair: self._carry_out(service.name, pair[0], lambda _: service.handler(pair[1])),
         )
+
+    def _carry_out(self, name: str, value: Any, handler: Callable[[Any], Any]) -> Any:
+        self.requested(name)
+        return self._note(name, value, handler)
 
     def _note(self, name: str, value: Any, handler: Callable[[Any], Any]) -> Any:
         if self.enabled:

@@ -17,7 +17,8 @@ from solfer.config import (
     Problems,
 )
 from solfer.config.records.middlewares import MIDDLEWARES, PREDEFINED_MAPS
-from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
+from solfer.config.records.pipes import JOINT_COMMAND
+from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
 from solfer.robot.description.files import own_contacts
@@ -231,7 +232,7 @@ class _Builder:
             elif idle:
                 order = self._try(partial(self._idle_joints, record, robot))
             else:
-                order = self._wait(partial(self._controller_joints, record))
+                order = self._wait(partial(self._commanded_joints, record, robot)) or _actuated(robot)
             if order is not None:
                 own = controller_map(record.leads_to)
                 named = record.dofs.mapping if record.dofs.mapping in LOWER_LEVEL_MAPS else own
@@ -253,6 +254,24 @@ class _Builder:
     def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
         order = self._outside.controller_joints(record.leads_to, timeout, record.where())
         return order if record.calibration is None else commanded_joints(record, self._calibration(record), order)
+
+    def _commanded_joints(self, record: ControllerRecord, robot: Robot, timeout: float) -> tuple[str, ...]:
+        """Return the controller's joints; those of the pipe if a node receives its commands and does not name them."""
+        unknowing = 2.0  # time after which it counts that a node receives the commands [s]
+        topic = record.leads_to + (record.sink or "/command")
+        try:
+            return self._controller_joints(record, min(unknowing, timeout))
+        except ServiceUnavailable:
+            is_received = self._outside.is_received(topic, JOINT_COMMAND)
+        try:
+            # the service of a lower level that has just started may follow its subscription
+            return self._controller_joints(record, self._SHORT_TIMEOUT if is_received else timeout - unknowing)
+        except ServiceUnavailable as error:
+            if not is_received:
+                raise
+            joints = tuple(robot.dofs[dof] for dof in np.intersect1d(select(record.dofs, robot), robot.actuated))
+            logger.warning("%s; commands are for %s", error.what, ", ".join(joints))
+            return joints
 
     def _idle_joints(self, record: ControllerRecord, robot: Robot) -> tuple[str, ...]:
         """Return the controller's joints, or the Robot's if it does not answer: nothing is sent in mode `idle`."""

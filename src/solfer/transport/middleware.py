@@ -235,21 +235,31 @@ class Middleware(abc.ABC):
         """
         return self.topics().result().missing_publisher(topic, message)
 
+    def is_received(self, topic: str, message: str) -> bool:
+        """Return whether another node receives this type of message on a topic; waits for the answer.
+
+        Raises:
+            MiddlewareError: The subscribers cannot be found out.
+        """
+        return self.topics().result().missing_subscriber(topic, message) is None
+
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """Return the names of the joints of a lower-level controller, in its order.
 
         Raises:
-            MiddlewareError: There is no such controller, or it did not answer within `timeout` [s].
+            ServiceUnavailable: No node offered them within `timeout` [s].
+            MiddlewareError: The controller did not answer within `timeout`, or refuses.
         """
         try:
             reply = self.call(
                 f"{controller}/get_joint_names", JOINT_NAMES, NoFields(), reply=JointNames, timeout=timeout
             )
         except MiddlewareError as error:
-            raise MiddlewareError(
+            raise type(error)(
                 f"lower-level controller '{controller}' does not name its joints: {error.what}",
                 where=where,
-                expected=error.expected or "a running simulator or robot",
+                expected=error.expected
+                or f"a running simulator or robot, or a node that receives {controller}/command",
                 names=error.names,
             ) from error
         if not reply.success:

@@ -103,15 +103,18 @@ def joints(plugin: str) -> Callable[[story.Show], int]:
     return lambda show: centauro.demonstrate(show, centauro.steps_of, plugin, services=(story.UPPER, story.LOWER))
 
 
+JOINTS = {"motion": "joints"}
+"""Argument of launch files whose figures have tasks in the paper: the demonstration moves joints instead."""
+
 SCHEMES = {
     "fig2": Scheme("Fig. 2, manipulation of the upper body", "figure_2.launch", wave),
-    "fig3": Scheme("Fig. 3, a robot that is carried by torques", "figure_3.launch", carry),
-    "fig4": Scheme("Fig. 4, shared control", "figure_4.launch", joints("shared_compensation")),
+    "fig3": Scheme("Fig. 3, a robot that is carried by torques", "figure_3.launch", carry, arguments=JOINTS),
+    "fig4": Scheme("Fig. 4, shared control", "figure_4.launch", joints("shared_compensation"), arguments=JOINTS),
     "fig5": Scheme("Fig. 5, the full control scheme", "figure_5.launch", drive, arguments={"world": "gate"}),
     "squat": Scheme("Inverse dynamics, squats on torques", "inverse_dynamics.launch", squat),
 }
 """The schemes, by their names on the command line."""
 
 WITHOUT_TORQUES = Scheme(
-    "Fig. 4 without torques", "figure_4.launch", joints("whole_body"), arguments={"merging": "whole_body"}
+    "Fig. 4 without torques", "figure_4.launch", joints("whole_body"), arguments={**JOINTS, "merging": "whole_body"}
 )

@@ -52,9 +52,11 @@ def world(example, tmp_path):
     return bus, device, start
 
 
-def test_the_page_has_the_whole_file(page, repository):
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    assert code == (repository / "examples/arm_driver.py").read_text()
+@pytest.mark.parametrize(("page", "file"), [("hardware", "arm_driver"), ("ros_control", "ros_control_arm")])
+def test_the_page_has_the_whole_file(page, file, repository):
+    text = (repository / f"docs/how-to/{page}.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert code == (repository / f"examples/{file}.py").read_text()
 
 
 @pytest.mark.slow

@@ -1,14 +1,18 @@
 """Figs. 3 and 4 of the paper with gravity compensation, which one tag puts on the measured or the desired state."""
 
 import contextlib
+import re
 
 import numpy as np
 import pytest
+import yaml
 from support.integration.world import CONFIG, World
 from support.integration.xbot_world import XbotWorld
 from support.paper.figure_3 import write_offline
 
+from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
+from solfer_tools.navigation.course import twist
 
 JOINTS = ("j_arm1_4", "torso_yaw")
 
@@ -70,3 +74,34 @@ def test_figure_4_carries_what_both_parts_want(tmp_path):
     for plugin in in_both(("upper_body", "lower_body"), "shared_compensation", shipped, tmp_path):
         hip = plugin.robot.command.torque[plugin.robot.dof("hip_pitch_1")]
         assert abs(hip) > 5.0
+
+
+def test_figure_3_begins_with_inverse_kinematics(repository):
+    """The request of the page lowers the robot, which gravity compensation carries."""
+    text = (repository / "docs/tutorials/figures.md").read_text()
+    (request,) = re.findall(r'^rosservice call /desired_tasks/reference "(.*)"$', text, re.MULTILINE)
+    fields = yaml.safe_load(request) | {"values": tuple(yaml.safe_load(request)["values"])}
+    with contextlib.closing(World()) as world:
+        height = world.simulation.q[2]
+        plugins = [world.plugin(name) for name in ("desired_tasks", "gravity_compensation")]
+        world.run(0.6)
+        assert world.ask("desired_tasks/reference", **fields).success
+        world.run(1.5)
+        assert {each.life for each in plugins} == {PluginState.RUNNING}
+        # hands stay, so the base sinks more than the centre of mass
+        assert -0.06 < world.simulation.q[2] - height < -0.02
+
+
+def test_figure_4_drives_by_the_shipped_modules():
+    """Locomotion drives the legs, manipulation holds the arms, and one plugin commands all joints."""
+    with contextlib.closing(World()) as world:
+        plugins = [world.plugin("hands"), world.plugin("odometry", target="solfer.components.odometry:Odometry")]
+        plugins += [world.plugin("locomotion"), world.plugin("shared_compensation")]
+        world.run(1.0)
+        writer = MemoryMiddleware(world.bus, "driver").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
+        before = world.simulation.q[0]
+        for _ in range(15):
+            writer.write(twist(0.1, 0.0, 0.0))
+            world.run(0.1)
+        assert {each.life for each in plugins} == {PluginState.RUNNING}
+        assert world.simulation.q[0] - before > 0.05

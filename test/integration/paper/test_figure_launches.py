@@ -16,8 +16,8 @@ REPOSITORY = Path(__file__).parents[3]
 PLUGINS = {
     1: {"joint_states"},
     2: {"manipulation"},
-    3: {"desired_joints", "gravity_compensation"},
-    4: {"upper_body", "lower_body", "shared_compensation"},
+    3: {"desired_tasks", "gravity_compensation"},
+    4: {"hands", "odometry", "locomotion", "shared_compensation"},
     5: {"hands", "full_control"},
 }
 LAYER = {"xbot", "xbot_bridge", "xbot_simulator", "xbot_watchdog", "robot_state_publisher"}
@@ -49,9 +49,9 @@ def test_one_argument_moves_them_to_other_places():
 )
 def test_figure_4_starts_with_the_merging_of_the_page(repository, page, merging):
     text = (repository / "docs" / f"{page}.md").read_text()
-    (argument,) = re.findall(r"^roslaunch solfer figure_4.launch (merging:=.*)$", text, re.MULTILINE)
+    (argument,) = re.findall(r"^roslaunch solfer figure_4.launch (motion:=joints merging:=.*)$", text, re.MULTILINE)
     parts = {"upper_body", "lower_body", "simulator", "robot_state_publisher"}
-    assert nodes(4, argument) == (0, {*parts, merging}, "")
+    assert nodes(4, *argument.split()) == (0, {*parts, merging}, "")
 
 
 @pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
@@ -83,6 +83,7 @@ def test_an_argument_that_is_not_there_is_refused():
     [
         (["middleware:=ros"], "middleware:=ros: unknown value of middleware 'ros'\n  did you mean: ROS?"),
         (["rate:=fast"], "rate:=fast: rate is 'fast'\n  expected: a number from 1 to 4000 [Hz]"),
+        (["motion:=joint"], "unknown argument 'motion'"),
         (["gui:=maybe"], "unknown value of gui 'maybe'\n  expected: one of true, false"),
         (["world:=flaat"], "unknown world 'flaat'\n  did you mean: flat?"),
         (["record:=nowhere/run.mcap"], "there is no folder 'nowhere'\n  expected: a file in a folder"),
@@ -102,6 +103,6 @@ def test_a_wrong_value_is_refused(arguments, said, repository, capsys):
 
 
 def test_right_values_are_accepted(repository, capsys):
-    right = ["merging:=whole_body", "gui:=True", "rate:=", "factor:=0", "lockstep:=true"]
+    right = ["motion:=joints", "merging:=whole_body", "gui:=True", "rate:=", "factor:=0", "lockstep:=true"]
     assert main(["launch", f"{repository}/launch/figure_4.launch", *right]) == 0
     assert capsys.readouterr().out == "figure_4.launch\n"

@@ -49,7 +49,7 @@ ELSEWHERE = {
     r"roslaunch my_robot .*": ("test/integration/package/test_new_robot.py", "launch_files"),
     r'eval "\$\(solfer completion\)"': ("test/unit/cli/test_cli_completion.py", '"completion"'),
     r"roslaunch solfer simulation.launch.*": ("test/ros/table_1.test", "simulation.launch"),
-    r"roslaunch solfer figure_[1-4].launch( rate:=200| middleware:=XBOT)?": (
+    r"roslaunch solfer figure_[1-4].launch( rate:=200| middleware:=XBOT| motion:=joints)?": (
         "test/integration/paper/test_figure_launches.py",
         "figure_",
     ),
@@ -59,13 +59,18 @@ ELSEWHERE = {
     r"./run exec python benchmark/rviz.py .*": ("test/integration/simulation/test_rviz.py", "benchmark/rviz.py"),
     r"roslaunch solfer figure_5.launch lockstep:=true .*": ("test/ros/figure_5.test", "lockstep"),
     r"rosservice call /joint_states/[gs]et_parameters .*": ("test/ros/config_test.py", "live_parameters.md"),
+    r"rosservice call /desired_tasks/reference .*": ("test/integration/paper/test_figure_3.py", "figures.md"),
     r"rosservice call /(desired_joints|gravity_compensation)/.*": ("test/ros/compensation_test.py", "compensation.md"),
-    r"roslaunch solfer figure_4.launch merging:=.*": (
+    r"roslaunch solfer figure_4.launch motion:=joints merging:=.*": (
         "test/integration/paper/test_figure_launches.py",
         "merging",
     ),
-    r"roslaunch solfer figure_4.launch lockstep:=true .*": ("test/ros/figure_4.test", "lockstep"),
+    r"roslaunch solfer figure_4.launch motion:=joints lockstep:=true .*": ("test/ros/figure_4.test", "lockstep"),
     r"python examples/arm_driver.py my_robot/.*": ("test/integration/package/test_arm_driver.py", "arm_driver.py"),
+    r"python examples/ros_control_arm.py": ("test/ros/ros_control_test.py", "ros_control_arm.py"),
+    r"rosrun plugins plugin -p .* --system HW": ("test/ros/ros_control_test.py", "ros_control.md"),
+    r'rosservice call /joint_states/trajectory "{joints: .elbow.*': ("test/ros/ros_control_test.py", "ros_control.md"),
+    r'rosservice call /inverse_kinematics/reference "{task: tip.*': ("test/ros/ros_control_test.py", "ros_control.md"),
     r"rosrun plugins plugin -p joint_states -c my_robot/.*": (
         "test/integration/package/test_arm_driver.py",
         '"joint_states"',
@@ -102,7 +107,10 @@ ELSEWHERE = {
     r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),
     r"rosservice call /joint_states/trajectory .*": ("test/ros/motion_test.py", "README.md"),
     r"rosservice call /(upper|lower)_body/trajectory .*": ("test/ros/figure_4_test.py", "shared_control.md"),
-    r"roslaunch solfer figure_4.launch namespace:=.*": ("test/ros/namespaces_test.py", "roslaunch solfer"),
+    r"roslaunch solfer figure_4.launch motion:=joints namespace:=.*": (
+        "test/ros/namespaces_test.py",
+        "roslaunch solfer",
+    ),
     r"rosservice call /left/.*": ("test/ros/namespaces_test.py", "rosservice call /left/"),
     r"rosservice call /lower_level/.*": ("test/ros/refused_test.py", "emergency_stop"),
     r"rosservice call /NAME/get_config .*": ("test/ros/config_test.py", "get_config"),

@@ -59,7 +59,13 @@ def test_unknown_dofs_are_refused(context, changes, error, match):
         factory.feedback(received(dofs=dofs(**changes)), context)
 
 
-@pytest.mark.parametrize("numbers, words", [(None, "nothing in 'velocity'"), (np.zeros(1), "1 numbers in 'velocity'")])
+@pytest.mark.parametrize(
+    "numbers, words",
+    [
+        (None, "nothing in 'velocity' (expected: 2 numbers, one for each name, or a pipe with `velocity: false`)"),
+        (np.zeros(1), "1 numbers in 'velocity'"),
+    ],
+)
 def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
     interface = {"position": True, "velocity": True}
     pipe = factory.feedback(received(interface=interface), context)

@@ -86,6 +86,21 @@ def test_an_optional_peer_is_warned_about_once(looking, caplog):
     assert looking.peers.warning() == "" and looking.peers.done
 
 
+@pytest.mark.parametrize("is_received", [False, True])
+def test_a_request_without_a_receiver_is_a_warning(looking, caplog, is_received):
+    """Also long after the topic itself was warned about, and not if a subscriber has come since."""
+    looking.publish("desired", needed=False)
+    looking.after(10.0)
+    if is_received:
+        looking.other.reader("desired", KIND)
+    caplog.clear()
+    looking.peers.note_request("trajectory")
+    looking.after(1.2)
+    line = "no subscriber on desired (controller 'pipe', cart.yaml:7:3)"
+    expected = f"cart carries out 'trajectory', but no node receives what it publishes: {line}"
+    assert caplog.messages == ([] if is_received else [expected]) and looking.peers.done
+
+
 def test_a_present_peer_is_looked_for_once(looking, caplog, monkeypatch):
     asked, topics = [], MemoryMiddleware.topics
     monkeypatch.setattr(MemoryMiddleware, "topics", lambda node: asked.append(node) or topics(node))

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from solfer import Robot
 from solfer.config import load
-from solfer.errors import ConfigError, MiddlewareError, ModelError, SolferErrors, UnknownName
+from solfer.errors import ConfigError, MiddlewareError, ModelError, ServiceUnavailable, SolferErrors, UnknownName
 from solfer.model import Description, Kinematics
 from solfer.model.urdf.cut import cut
 from solfer.robot import build
@@ -65,6 +65,7 @@ class NotedMiddleware:
         self.parameters, self.waited = parameters, []
         self.orders = {"joint_states": ("camera", "torso_yaw", *WHEELS), "order": ("torso_yaw", "hip_yaw_1")}
         self.controllers = {"wheels": WHEELS}
+        self.received = set()
 
     def parameter(self, name, where=""):
         if name not in self.parameters:
@@ -80,8 +81,11 @@ class NotedMiddleware:
     def controller_joints(self, controller, timeout, where=""):
         self.waited.append(controller)
         if controller not in self.controllers:
-            raise MiddlewareError(f"there is no controller '{controller}'", where=where)
+            raise ServiceUnavailable(f"there is no controller '{controller}'", where=where)
         return self.controllers[controller]
+
+    def is_received(self, topic, message):
+        return (topic, message) in self.received
 
 
 @pytest.fixture(scope="module")
@@ -272,6 +276,17 @@ def test_idle_plugins_need_no_controller(configured, outside, caplog):
         robot = build(configured(mode="idle"), outside)
     assert robot.maps["LOWER_LEVEL"].external == tuple(np.array(robot.dofs)[robot.actuated])
     assert "there is no controller 'wheels'" in caplog.text
+
+
+def test_a_foreign_controller_need_not_name_joints(configured, outside, caplog):
+    """Where a node receives its commands, those of the pipe are taken, with one warning."""
+    outside.controllers = {}
+    with pytest.raises(MiddlewareError, match="there is no controller 'wheels'"):
+        build(configured(), outside)
+    outside.received = {("wheels/command", "solfer/JointCommand")}
+    assert set(build(configured(), outside).maps["LOWER_LEVEL"].external) == set(WHEELS)
+    (warning,) = (record.message for record in caplog.records if record.levelname == "WARNING")
+    assert warning.startswith("there is no controller 'wheels'; commands are for j_wheel_")
 
 
 def test_a_part_is_built_from_the_whole(configured, outside):

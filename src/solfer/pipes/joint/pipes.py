@@ -220,7 +220,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
 
 def _unfit(field: str, numbers: np.ndarray | None, count: int) -> PipeError:
     got = "nothing" if numbers is None else f"{len(numbers)} numbers"
-    return PipeError(f"{got} in '{field}'", expected=f"{count} numbers, one for each name")
+    without = f", or a pipe with `{field}: false`" if numbers is None else ""
+    return PipeError(f"{got} in '{field}'", expected=f"{count} numbers, one for each name{without}")
 
 
 @dataclass(frozen=True)

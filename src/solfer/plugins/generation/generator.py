@@ -128,6 +128,7 @@ class Generator:
         outputs = self.make_outputs(robot, controllers)
         claim = self.make_claim(robot, watches, outputs)
         peers = Peers(configuration.module.name, self._peers(watches, controllers), self.middleware)
+        self.requests.requested = peers.note_request
         parts = PluginParts(
             component,
             robot,

@@ -34,6 +34,9 @@ class Outside(Protocol):
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`."""
 
+    def is_received(self, topic: str, message: str) -> bool:
+        """See `Middleware.is_received`."""
+
 
 def read_description(source: TextRecord, outside: Outside) -> Description:
     """Read the robot's description from a URDF.

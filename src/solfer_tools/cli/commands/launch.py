@@ -116,6 +116,7 @@ def choices(known: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
         "middleware": tuple(MIDDLEWARES),
         "system": ("SM", "HW"),
         "layer": ("NRT", "RT"),
+        "motion": ("tasks", "joints"),
         # in simulation.launch `lockstep` is a list of nodes
         **{name: ("true", "false") for name in SWITCHES if known.get(name) != ""},
     }

@@ -12,7 +12,7 @@ MODULES = (
     "joint_states", "joint_online", "joint_lower", "joint_reference", "upper_body", "lower_body", "whole_body",
     "gravity_compensation", "desired_joints", "shared_compensation", "soft_compensation", "spring_compensation",
     "compliance_compensation", "odometry", "ground_forces", "gravity_forces",
-    "inverse_kinematics", "inverse_dynamics", "squat", "squat_estimated", "squat_offline",
+    "inverse_kinematics", "desired_tasks", "inverse_dynamics", "squat", "squat_estimated", "squat_offline",
     "manipulation", "drawing", "upper_body_ik", "wheeled_motion",
     "driving", "support_shaping", "hands", "locomotion", "full_compensation",
 )  # fmt: skip
