@@ -61,7 +61,11 @@ def table(
     turned = float(np.degrees(abs(base[-1, 3] - base[0, 3])))
     driven = float(np.hypot(*np.ptp(base[:, :2], axis=0)))
     rows = [
-        *((f"largest joint error, {part}", f"{error:.4f} rad ({joint})") for part, (error, joint) in errors.items()),
+        *(
+            (f"largest joint error, {part}", f"{error:.4f} rad ({joint})")
+            for part, (error, joint) in errors.items()
+            if joint  # a scheme may command some parts alone
+        ),
         ("distance driven", f"{driven:.3f} m"),
         ("base drift, there and back", f"{drift:.1f} mm, {turned:.2f} deg"),
     ]
