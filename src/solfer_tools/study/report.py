@@ -15,6 +15,7 @@ from scipy.stats import rankdata
 
 from solfer.config.loading.layers import ROOT
 from solfer.config.yaml.edit import edited
+from solfer.config.yaml.nodes import Key
 from solfer.errors import StudyError, UnknownName
 from solfer_tools.review import FIRST_COLOR, FONT_SIZE, SECOND_COLOR, WRONG_COLOR, check_suffix, new_figure, save
 from solfer_tools.study.folder import RECORDING, RUNS, StudyFolder, write_whole, writing_to
@@ -121,7 +122,7 @@ def _best(folder: StudyFolder, rows: Sequence[Row]) -> Iterator[str]:
     yield f"<h2>Best run</h2>{_run(folder, row)}"
     paths = {name: study.path(name) for name in study.names}
     for first, place in ((True, "main configuration"), (False, "file of the study")):
-        tree = {
+        tree: dict[tuple[Key, ...], Any] = {
             (*ROOT, *path[1:]) if first else path: row[name]
             for name, path in paths.items()
             if (path[0] == CONFIGURATION_KEY) == first
@@ -207,7 +208,8 @@ def _scatter_plots(study: Study, rows: Sequence[Row], varying: Sequence[str]) ->
             axes.plot(numbers(rows, name)[chosen], numbers(rows, measure)[chosen], ".", color=color, markersize=3)
         if study.variations[name].log_uniform is not None:
             axes.set_xscale("log")
-            axes.xaxis.get_major_locator().set_params(subs=(1.0, 2.0, 5.0))
+            locator: Any = axes.xaxis.get_major_locator()
+            locator.set_params(subs=(1.0, 2.0, 5.0))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_formatter("")
         axes.set_xlabel(_label(study, name))

@@ -113,7 +113,7 @@ def _print(options: argparse.Namespace, lines: Callable[[], Iterator[str]]) -> N
 
 
 def _fitted(line: str) -> str:
-    """Cut a line at the width of the terminal, and colour the health in it, unless NO_COLOR is set."""
+    """Cut a line at the width of the terminal, and colour the health in it, unless the environment forbids colours."""
     width = shutil.get_terminal_size().columns
     line = line if len(line) <= width else line[: width - 1] + "\N{HORIZONTAL ELLIPSIS}"
     if os.environ.get("NO_COLOR"):
