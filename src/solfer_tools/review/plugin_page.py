@@ -148,7 +148,7 @@ def _errors(place: "SubFigure", tracks: list[Track], start: float) -> None:
     middles = [float(np.flatnonzero(of_kind == kind).mean()) for kind in places.values()]
     units = [unit for _, unit in places]
     right.set_yticks(
-        middles, [f"\N{PLUS-MINUS SIGN}{scale:.3g} m{unit}" for scale, unit in zip(scales, units, strict=True)]
+        middles, [f"\N{PLUS-MINUS SIGN}{scale:.3g} {_milli(unit)}" for scale, unit in zip(scales, units, strict=True)]
     )
     right.tick_params(labelsize=FONT_SIZE, length=0)
     for border in np.flatnonzero(np.diff(of_kind)):
@@ -156,6 +156,10 @@ def _errors(place: "SubFigure", tracks: list[Track], start: float) -> None:
     bar = place.colorbar(image, ax=axes, location="bottom", aspect=20 if is_column(place) else 80, extend="both")
     bar.set_label("part of the scale on the right", fontsize=FONT_SIZE)
     bar.ax.tick_params(labelsize=FONT_SIZE)
+
+
+def _milli(unit: str) -> str:
+    return f"m{unit}" if unit else "1e-3"
 
 
 def _kind(track: Track) -> tuple[str, str]:
