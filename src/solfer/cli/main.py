@@ -9,12 +9,14 @@ sets `parser` to its own, which prints the usage after a mistake. Imports that o
 import argparse
 import io
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
+from typing import NoReturn
 
-from solfer.errors import SolferError, singles
+from solfer.errors import SolferError, nearest, singles
 
 COMMANDS = {
     "check": "solfer.cli.commands.check",
@@ -24,6 +26,16 @@ COMMANDS = {
     "record": "solfer.cli.rt.record",
 }
 """Modules of the sub-commands."""
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Parses the words of a command, and names those that are nearest to a wrong one."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and an error, and exit with 2."""
+        wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
+        close = nearest(wrong[1], re.findall(r"[^\s',]+", wrong[2])) if wrong else []
+        super().error(f"{message}\n  did you mean: {', '.join(close)}?" if close else message)
 
 
 def main(arguments: Sequence[str] | None = None, commands: Mapping[str, str] = COMMANDS) -> int:
@@ -88,7 +100,7 @@ def _run(words: Sequence[str], commands: Mapping[str, str]) -> int:
 
 def parser(modules: Mapping[str, str] = COMMANDS) -> argparse.ArgumentParser:
     """Build the parser of the command line, with some of the sub-commands."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="solfer",
         description="Tools for robots and their configurations. None but `params` and `top` need a ROS master.",
     )

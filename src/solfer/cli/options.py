@@ -114,6 +114,7 @@ SECONDS = Number(0.01, 86400.0, "seconds")
 def add_times(parser: argparse.ArgumentParser) -> None:
     """Declare when tables are printed."""
     parser.add_argument("--once", action="store_true", help="print the table once instead of again and again")
+    parser.add_argument("--json", action="store_true", help="print the health as a line of JSON")
     parser.add_argument(
         "--every", type=SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
     )

@@ -11,6 +11,7 @@ from solfer.interfaces.declaration import Action, Declaration, Parameter, Servic
 from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.unbuilt import importable_beside
 from solfer.robot import robot_files
 
 _LOG = logging.getLogger(__name__)
@@ -124,7 +125,8 @@ def declared_by(configuration: Configuration) -> tuple[Declared, ...]:
 def known_declarations(configuration: Configuration) -> tuple[Declared, ...]:
     """List the same where it is known, with a warning where it is not."""
     try:
-        return declared_by(configuration)
+        with importable_beside(configuration.file):  # as `check` does, so that the package need not be built
+            return declared_by(configuration)
     except SolferError as error:
         _LOG.warning("warning: what '%s' declares is left out: %s", configuration.module.name, error)
         return ()

@@ -28,6 +28,9 @@ SHARED_FOLDER = "recordings"
 MASTER_PREFIX = "ros."
 """How the names of namespaces begin in which nodes of a ROS master are recorded."""
 
+RUNNING = "a plugin that runs, such as by `./run demo` or `roslaunch solfer joint_states.launch`; or --wait SECONDS"
+"""What can be recorded, for errors where nothing runs."""
+
 YOUNG_AGE = 60.0
 """Age up to which such a namespace is kept without a living process [s]: one may be about to begin."""
 
@@ -160,7 +163,8 @@ def of_plugins(plugins: Sequence[str], namespace: str = "", root: Path = SHARED_
         count = sum(plugin in drain.plugins for drain in found)
         if not count:
             known = {name for drain in found for name in drain.plugins}
-            raise UnknownName("plugin", plugin, sorted(known), where="what is recorded now")
+            expected = "" if known else RUNNING
+            raise UnknownName("plugin", plugin, sorted(known), where="what is recorded now", expected=expected)
         if count > 1:
             raise MiddlewareError(
                 f"{count} processes record a plugin '{plugin}'", expected="NAMESPACE of the one that is meant"
@@ -181,7 +185,6 @@ def of_namespace(namespace: str, root: Path = SHARED_MEMORY) -> list[RecordDrain
         raise MiddlewareError(f"{len(known)} namespaces record", expected=f"NAMESPACE, one of {', '.join(known)}")
     chosen = namespace or (known[0] if known else "solfer")
     if chosen not in known:
-        raise UnknownName(
-            "namespace that records", chosen, known, where=str(root), expected="" if known else "plugins that run"
-        )
+        expected = "" if known else RUNNING
+        raise UnknownName("namespace that records", chosen, known, where=str(root), expected=expected)
     return [drain for name, drain in found if name == chosen]

@@ -8,11 +8,12 @@ from solfer_tools.cli.scenario_trace import ScenarioTrace
 from solfer_tools.review import (
     DESIRED_COLOR,
     FIRST_COLOR,
+    FONT_SIZE,
     SECOND_COLOR,
     draw,
     dress,
+    legend,
     new_figure,
-    outline,
 )
 
 if TYPE_CHECKING:
@@ -39,11 +40,12 @@ def scenario_page(trace: ScenarioTrace) -> "Figure":
     times = trace.times
     for column, name in enumerate(("x m", "y m", "z m", "heading rad")):
         draw(base, times, trace.base[:, column] - trace.base[0, column], label=name, linewidth=1.0)
-    base.legend(fontsize=7)
+    legend(base)
     dress(base, "base, from its begin")
     far = np.linalg.norm(trace.vertices - trace.vertices[0], axis=2)
-    kept = outline(far.max(axis=1))
-    moved.plot(times[kept], far[kept], linewidth=1.0)
+    for number, distances in enumerate(far.T):
+        draw(moved, times, distances, label=f"vertex {number + 1}", linewidth=1.0)
+    legend(moved)
     dress(moved, "vertices, from their begins", "m")
-    moved.set_xlabel("s")
+    moved.set_xlabel("time [s]", fontsize=FONT_SIZE)
     return figure

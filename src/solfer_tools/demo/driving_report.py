@@ -174,6 +174,8 @@ def table(
     seen: Seen,
     places: Mapping[str, Tracked],
     reports: Mapping[str, HealthReport],
+    *,
+    waited: bool = False,
 ) -> list[Row]:
     """Build the closing table.
 
@@ -183,6 +185,7 @@ def table(
         seen: What the robot did.
         places: Measured beside desired, see `tracked`.
         reports: Health of the nodes.
+        waited: Whether the simulation waited for the plugins, which is no loss of time.
     """
     distance = float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
@@ -200,7 +203,7 @@ def table(
         ("slip, fraction of the way of wheels", f"{_slip(robot, recorder):.1e}"),
         ("forces of the ground", _forces(robot, recorder)),
     ]
-    return rows + _health(reports) + layer(reports)
+    return rows + _health(reports, waited) + layer(reports)
 
 
 def _drift(recorder: DrivingRecorder, seen: Seen, distance: float) -> str:
@@ -243,7 +246,7 @@ def _forces(robot: Robot, recorder: DrivingRecorder) -> str:
     return f"carry {100.0 * float(sums.mean()):.1f} % of the weight, {100.0 * float(sums.std()):.1f} % RMS about it"
 
 
-def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
+def _health(reports: Mapping[str, HealthReport], waited: bool) -> list[Row]:
     """List times of cycles, ages of feedbacks, counts and the real-time factor."""
     rows: list[Row] = []
     for name in PLUGINS:
@@ -257,8 +260,8 @@ def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
     factor = simulation.get("real-time factor")
     if factor is None:
         return [*rows, ("real-time factor", "not reported")]
-    lost = float(simulation.get("time lost [s]", 0.0))
-    return [*rows, ("real-time factor", f"{float(factor):.2f} lately, {lost:.1f} s lost")]
+    lost = "" if waited else f", {float(simulation.get('time lost [s]', 0.0)):.1f} s lost"
+    return [*rows, ("real-time factor", f"{float(factor):.2f} lately{lost}")]
 
 
 def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waited: bool = False) -> str:

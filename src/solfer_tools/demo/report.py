@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.transport.middleware import HealthReport
 from solfer_tools.demo.record import MotionRecorder, Trace
-from solfer_tools.review import new_figure
+from solfer_tools.review import COLORS, FONT_SIZE, draw, dress, legend, new_figure, save, time_plots
 
 Row = tuple[str, str]
 """Name of a quantity, and its figure with unit."""
@@ -61,7 +61,11 @@ def table(
     turned = float(np.degrees(abs(base[-1, 3] - base[0, 3])))
     driven = float(np.hypot(*np.ptp(base[:, :2], axis=0)))
     rows = [
-        *((f"largest joint error, {part}", f"{error:.4f} rad ({joint})") for part, (error, joint) in errors.items()),
+        *(
+            (f"largest joint error, {part}", f"{error:.4f} rad ({joint})")
+            for part, (error, joint) in errors.items()
+            if joint  # a scheme may command some parts alone
+        ),
         ("distance driven", f"{driven:.3f} m"),
         ("base drift, there and back", f"{drift:.1f} mm, {turned:.2f} deg"),
     ]
@@ -120,24 +124,25 @@ def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, .
     base = recorder.base()
     start = measured.time[0]
     figure = new_figure(10.0, 9.0)
-    positions, errors, speeds, place = figure.subplots(4, 1, sharex=True)
+    positions, errors, speeds, place = time_plots(figure, 4, 1)
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
-    for joint in (each for each in joints if each in desired.names):
+    for number, joint in enumerate(each for each in joints if each in desired.names):
+        color = COLORS[number % len(COLORS)]
         values = measured.column(joint, "position")
-        goal = np.interp(times, desired.time, desired.column(joint, "position"))
-        (line,) = positions.plot(measured.time - start, values, label=joint)
-        positions.plot(desired.time - start, desired.column(joint, "position"), "--", color=line.get_color(), lw=0.8)
-        errors.plot(measured.time - start, 1e3 * (values - goal), color=line.get_color())
+        goal = desired.column(joint, "position")
+        draw(positions, measured.time - start, values, color=color, label=joint)
+        draw(positions, desired.time - start, goal, color=color, ls="--", lw=0.8)
+        error = 1e3 * (values - np.interp(times, desired.time, goal))
+        draw(errors, measured.time - start, error, color=color, label=joint)
     for wheel in wheels:
-        speeds.plot(measured.time - start, measured.column(wheel, "velocity"), label=wheel)
+        draw(speeds, measured.time - start, measured.column(wheel, "velocity"), label=wheel)
     for name in ("x", "y", "z"):
-        place.plot(base.time - start, base.column(name, "position"), label=name)
-    positions.set(ylabel="position [rad]", title="joints: measured (solid) and desired (dashed)")
-    errors.set(ylabel="error [mrad]", title="measured minus desired")
-    speeds.set(ylabel="speed [rad/s]", title="wheels")
-    place.set(ylabel="position [m]", xlabel="time [s]", title="floating base in the world")
-    for axes in (positions, speeds, place):
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        draw(place, base.time - start, base.column(name, "position"), label=name)
+    dress(positions, "joints: measured (solid) and desired (dashed)", "position [rad]")
+    dress(errors, "measured minus desired", "error [mrad]")
+    dress(speeds, "wheels", "speed [rad/s]")
+    dress(place, "floating base in the world", "position [m]")
     for axes in (positions, errors, speeds, place):
-        axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=110)
+        legend(axes)
+    figure.supxlabel("time [s]", fontsize=FONT_SIZE)
+    save([("demo", figure)], path)

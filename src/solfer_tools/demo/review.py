@@ -58,7 +58,7 @@ def present(found: DrivingFindings, file: Path, output: Path, films: bool) -> in
     world = read_world(find_world("gate"))
     seen = driving_report.see(robot, found.legs, found.recorder)
     places = driving_report.tracked(found.recorder, seen, recording)
-    rows = driving_report.table(robot, found.recorder, seen, places=places, reports=found.reports)
+    rows = driving_report.table(robot, found.recorder, seen, places=places, reports=found.reports, waited=found.waited)
     if warning := driving_report.warning(found.reports, seen, found.taken, waited=found.waited):
         print(warning)
     print(report.format_table(rows))

@@ -7,6 +7,7 @@ imported when something is drawn.
 from typing import TYPE_CHECKING
 
 from solfer_tools.review.canvas import (
+    COLORS,
     DESIRED_COLOR,
     FIRST_COLOR,
     FONT_SIZE,
@@ -15,11 +16,13 @@ from solfer_tools.review.canvas import (
     check_suffix,
     draw,
     dress,
+    legend,
     new_figure,
     outline,
     save,
     saved,
     show,
+    time_plots,
 )
 from solfer_tools.review.columns_page import columns_page
 from solfer_tools.review.compare import Comparison, compare
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "COLORS",
     "FONT_SIZE",
     "DESIRED_COLOR",
     "FIRST_COLOR",
@@ -49,6 +53,7 @@ __all__ = [
     "comparison_page",
     "draw",
     "dress",
+    "legend",
     "new_figure",
     "outline",
     "plugin_page",
@@ -56,5 +61,6 @@ __all__ = [
     "save",
     "saved",
     "show",
+    "time_plots",
     "tracks_of",
 ]

@@ -4,7 +4,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solfer_tools.review.canvas import FIRST_COLOR, FONT_SIZE, SECOND_COLOR, WRONG_COLOR, draw, dress, new_figure
+from solfer_tools.review.canvas import (
+    COLUMN_WIDTH,
+    FIRST_COLOR,
+    FONT_SIZE,
+    SECOND_COLOR,
+    WRONG_COLOR,
+    draw,
+    dress,
+    legend,
+    new_figure,
+    time_plots,
+)
 from solfer_tools.review.compare import Comparison
 from solfer_tools.review.verdict import JointVerdict
 
@@ -13,27 +24,27 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def comparison_page(comparison: Comparison, names: tuple[str, str]) -> "Figure":
+def comparison_page(comparison: Comparison, names: tuple[str, str], column: bool = False) -> "Figure":
     """Draw both positions and their difference, of the joints that differ first; if none does, where most is left.
 
     Args:
         comparison: What was found out.
         names: Names of the two recordings.
+        column: Whether the page is for a paper's column.
     """
     place = {joint: row for row, joint in enumerate(comparison.joints)}
     shown = [verdict for verdict in comparison.different if verdict.joint in place][:8]
     if not shown:
         known = (verdict for verdict in comparison.verdicts if verdict.joint in place)
         shown = sorted(known, key=lambda verdict: -verdict.largest)[:4]
-    figure = new_figure(12.0, 0.8 + 1.9 * len(shown))
-    grid = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
-    for (left, right), verdict in zip(grid, shown, strict=True):
+    figure = new_figure(COLUMN_WIDTH if column else 12.0, 0.8 + (3.0 if column else 1.9) * len(shown))
+    grid = iter(time_plots(figure, 2 * len(shown), 1 if column else 2))
+    for left, right, verdict in zip(grid, grid, shown, strict=True):
         _joint(left, right, verdict, comparison=comparison, row=place[verdict.joint], names=names)
-    for axes in grid[-1]:
-        axes.set_xlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT_SIZE)
+    figure.supxlabel(f"time after the beginning of {names[0]} [s]", fontsize=FONT_SIZE)
     count = len(comparison.different)
     differ = f"{count} joint{'s differ' if count != 1 else ' differs'}" if count else "no joint differs"
-    figure.suptitle(f"{names[1]} against {names[0]}: {differ}", fontsize=FONT_SIZE + 3)
+    figure.suptitle(f"{names[1]} against {names[0]}: {differ}", fontsize=FONT_SIZE + (0 if column else 3))
     return figure
 
 
@@ -48,13 +59,9 @@ def _joint(
     draw(right, times, 1e3 * (second - first), color="black", lw=0.9)
     right.axhline(0.0, color="grey", lw=0.5)
     dress(left, verdict.joint, "position [rad, m]")
-    dress(right, verdict.text or "no difference", "difference\n[mrad, mm]")
-    left.legend(fontsize=FONT_SIZE - 1, loc="best", ncols=2, framealpha=0.8)
-    if not np.isnan(verdict.since):
+    since = "" if np.isnan(verdict.since) else f", since {verdict.since:.3f} s"
+    dress(right, f"{verdict.text or 'no difference'}{since}", "difference\n[mrad, mm]")
+    legend(left)
+    if since:
         for axes in (left, right):
             axes.axvline(verdict.since, color=WRONG_COLOR, lw=0.9)
-        right.annotate(
-            f" {verdict.since:.3f} s", (verdict.since, 1.0), xycoords=("data", "axes fraction"), color=WRONG_COLOR,
-            fontsize=FONT_SIZE - 1, va="top",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
-        )  # fmt: skip

@@ -5,7 +5,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solfer_tools.review.canvas import FIRST_COLOR, FONT_SIZE, SECOND_COLOR, WRONG_COLOR, draw, dress, new_figure
+from solfer_tools.review.canvas import (
+    FIRST_COLOR,
+    FONT_SIZE,
+    SECOND_COLOR,
+    WRONG_COLOR,
+    draw,
+    dress,
+    legend,
+    new_figure,
+    time_plots,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,15 +35,14 @@ def replay_page(title: str, times: np.ndarray, tracks: Sequence[tuple[str, np.nd
     """
     shown = tracks[:MAX_REPLAY_ROWS]
     figure = new_figure(12.0, 0.8 + 1.9 * max(1, len(shown)))
-    grid = figure.subplots(max(1, len(shown)), 2, sharex=True, squeeze=False)
-    for (left, right), (name, recorded, replayed) in zip(grid, shown, strict=False):
+    grid = iter(time_plots(figure, 2 * len(shown), 2))
+    for left, right, (name, recorded, replayed) in zip(grid, grid, shown, strict=True):
         draw(left, times, recorded, color=FIRST_COLOR, lw=1.6, label="recorded")
         draw(left, times, replayed, color=SECOND_COLOR, lw=1.0, label="replayed")
         draw(right, times, replayed - recorded, color=WRONG_COLOR, lw=1.0)
+        legend(left)
         dress(left, name)
         dress(right, "difference")
-    grid[0][0].legend(fontsize=FONT_SIZE - 1)
-    for axes in grid[-1]:
-        axes.set_xlabel("time after the first cycle [s]", fontsize=FONT_SIZE)
+    figure.supxlabel("time after the first cycle [s]", fontsize=FONT_SIZE)
     figure.suptitle(title, fontsize=FONT_SIZE + 3)
     return figure

@@ -47,8 +47,7 @@ class StudyProgress:
             found.append((run, result))
             if not result.done:
                 self.failures += 1
-                values = ", ".join(f"{name} {value}" for name, value in run.variations.items())
-                self._log(f"run {run.id} failed ({values}): {result.failure.splitlines()[0]}")
+                self._log(f"run {run.id} failed ({run.text}): {result.failure.splitlines()[0]}")
         return found
 
     def show(self, is_last: bool = False) -> None:

@@ -63,6 +63,18 @@ class PlannedRun:
     key: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     id: ShortHash
 
+    @property
+    def text(self) -> str:
+        """Names and values of what varies, for people."""
+        return ", ".join(f"{name} {shown(value)}" for name, value in self.variations.items())
+
+
+def shown(value: Any) -> str:
+    """Write a value for people: a number with few digits, others as in JSON."""
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    return "" if value is None else value if isinstance(value, str) else json.dumps(value)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -100,10 +112,11 @@ class Study:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of what varies or is searched."""
-        return tuple(self._variations)
+        return tuple(self.variations)
 
     @cached_property
-    def _variations(self) -> dict[str, VariationRecord]:
+    def variations(self) -> dict[str, VariationRecord]:
+        """What varies or is searched, by name."""
         searched = {} if self.record.search is None else self.record.search.parameters
         return {**self.record.vary, **searched}
 
@@ -116,9 +129,9 @@ class Study:
         node = self._node
         over = None
         for name, value in variations.items():
-            path = self._path(name)
+            path = self.path(name)
             # with the place where it stands in the file
-            written = _node_of(value, self._variations[name].place() or self._node.mark)
+            written = _node_of(value, self.variations[name].place() or self._node.mark)
             if path[0] == CONFIGURATION_KEY:
                 over = _with(over or YamlNode({}, written.mark), path[1:], written)
             else:
@@ -164,7 +177,8 @@ class Study:
         """Plan a run."""
         record, over = self.settings(variations)
         decisive = {"plugins", "simulation", "motion", "settle", "duration", "measure", "fails"}
-        settings = _without_places(record.model_dump(include=decisive))
+        undecided = {"measure": {name: {"unit"} for name in record.measure}}
+        settings = _without_places(record.model_dump(include=decisive, exclude=undecided))
         changes = None if over is None else over.plain()
         files = [_file_hash(str(path)) for path in _files(record)]
         key = _hash(json.dumps([settings, changes, seed, files], sort_keys=True), self._unchanged)
@@ -178,8 +192,8 @@ class Study:
         """
         errors: list[SolferError] = []
         used = [configuration.name for _, configuration in listed(configurations_of(self.record, None))]
-        for name, each in self._variations.items():
-            path = self._path(name)
+        for name, each in self.variations.items():
+            path = self.path(name)
             if path[:2] == (CONFIGURATION_KEY, "modules") and path[2] not in used:
                 errors.append(UnknownName("configuration of a plugin of the study", path[2], used, where=each.where()))
         raise_all(errors)
@@ -188,7 +202,7 @@ class Study:
         if motion.function is not None:
             function_of(motion.function, motion.where("function"))
         rehearse(self.record)
-        alone = [{name: value} for name, each in self._variations.items() for value in _ends(each)]
+        alone = [{name: value} for name, each in self.variations.items() for value in _ends(each)]
         for variations in alone:
             try:
                 record, over = self.settings(variations)
@@ -213,8 +227,9 @@ class Study:
         """Write the file as it can be read in any folder, in JSON, which is YAML."""
         return json.dumps(anchored(self._node).plain(), indent=1)
 
-    def _path(self, name: str) -> tuple[str, ...]:
-        return tuple((self._variations[name].path or name).split("/"))
+    def path(self, name: str) -> tuple[str, ...]:
+        """Return the keys that lead to what varies."""
+        return tuple((self.variations[name].path or name).split("/"))
 
     def _check(self) -> None:
         problems = Problems()
@@ -224,23 +239,23 @@ class Study:
         if len(sizes) > 1:
             mark = next(iter(lists.values())).place("list") or self._node.mark
             problems.add(mark, f"lists of different lengths: {', '.join(lists)}", "lists that go together")
-        for name, each in self._variations.items():
-            path = self._path(name)
+        for name, each in self.variations.items():
+            path = self.path(name)
             mark = each.place() or self._node.mark
             varying = ("simulation", "motion", "duration", "settle", CONFIGURATION_KEY)
             if path[0] not in varying:
                 problems.unknown(mark, "begin of a path", path[0], varying)
             elif path[0] == CONFIGURATION_KEY and len(path) < 3:
                 problems.add(mark, f"'{'/'.join(path)}' leads to no tag", "configuration/modules/NAME/TAG")
-        for name in (*self._variations, *record.measure):
-            if name in (*ROW, *OUTCOME) or (name in self._variations and name in record.measure):
-                mark = (self._variations.get(name) or record.measure[name]).place() or self._node.mark
+        for name in (*self.variations, *record.measure):
+            if name in (*ROW, *OUTCOME) or (name in self.variations and name in record.measure):
+                mark = (self.variations.get(name) or record.measure[name]).place() or self._node.mark
                 problems.add(mark, f"two columns of the table are named '{name}'", "another name")
         search = record.search
         if search is not None and (goal := search.minimize or search.maximize) not in record.measure:
             problems.unknown(search.place() or self._node.mark, "measure", str(goal), record.measure)
         problems.raise_if_any()
-        check_expressions(record, self._variations)
+        check_expressions(record, self.variations)
 
 
 def read_study(file: str | os.PathLike) -> Study:

@@ -84,6 +84,7 @@ class MovingRecord(Record):
 class VariationRecord(Record):
     """A value that varies: each value of `grid` with all others, those of `list` side by side, or one that is drawn."""
 
+    unit: str = Field(default="", description="its unit, for the report")
     path: Name | None = Field(
         default=None,
         description="keys that lead to it: `simulation/mass`, `motion/scenario`, or `configuration/modules/NAME/TAG`; "
@@ -121,6 +122,7 @@ class VariationRecord(Record):
 class MeasureRecord(Record):
     """A number of a run: columns that are reduced, or an expression of other measures."""
 
+    unit: str = Field(default="", description="its unit, for the report")
     columns: tuple[str, ...] | str | None = Field(
         default=None,
         min_length=1,

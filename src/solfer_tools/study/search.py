@@ -1,5 +1,6 @@
 """A search for values, by Optuna, which keeps what it knows in the folder of the study."""
 
+import json
 import logging
 import math
 import time
@@ -8,12 +9,16 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from solfer.errors import StudyError
 from solfer_tools.study.drive import POLL_PERIOD, StudyProgress
 from solfer_tools.study.engines import engine_of, needs
 from solfer_tools.study.folder import StudyFolder
 from solfer_tools.study.plan import PlannedRun
 from solfer_tools.study.records import SearchRecord, VariationRecord
 from solfer_tools.study.result import Result
+
+LOG = "search.log"
+"""File of what Optuna knows, in the folder of the study."""
 
 
 def search(
@@ -36,7 +41,7 @@ def search(
         from optuna.storages.journal import JournalFileBackend
     optuna.logging.set_verbosity(logging.WARNING)
     # a journal works on file systems of a network, too
-    storage = JournalStorage(JournalFileBackend(str(folder.path / "search.log")))
+    storage = JournalStorage(JournalFileBackend(str(folder.path / LOG)))
     study = optuna.create_study(
         storage=storage,
         study_name="search",
@@ -65,7 +70,7 @@ def search(
     if any(trial.value is not None for trial in study.trials):
         best = study.best_trial
         run = folder.runs[best.number]
-        log(f"best of {len(study.trials)}: {best.value:.6g} with {dict(run.variations)}, run {run.id}")
+        log(f"best of {len(study.trials)}: {best.value:.5g} with {run.text}, run {run.id}")
     return folder.write_table()
 
 
@@ -82,7 +87,12 @@ def _search(study: Any, folder: StudyFolder, record: SearchRecord) -> PlannedRun
         trial = study.ask()
     else:
         trial = optuna.trial.Trial(study, study.trials[number]._trial_id)
-    values = {name: _suggested(trial, name, each) for name, each in record.parameters.items()}
+    try:
+        values = {name: _suggested(trial, name, each) for name, each in record.parameters.items()}
+    except ValueError as error:  # what is searched has changed
+        raise StudyError(
+            f"the search cannot go on: {error}", where=str(folder.path / LOG), expected="another folder"
+        ) from None
     run = folder.study.planned(number, folder.study.record.seed, values)
     folder.add(run)
     return run
@@ -90,7 +100,8 @@ def _search(study: Any, folder: StudyFolder, record: SearchRecord) -> PlannedRun
 
 def _suggested(trial: Any, name: str, record: VariationRecord) -> Any:
     if record.choice is not None:
-        return record.choice[trial.suggest_int(name, 0, len(record.choice) - 1)]
+        texts = {json.dumps(value): value for value in record.choice}  # Optuna keeps no lists
+        return texts[trial.suggest_categorical(name, list(texts))]
     low, high = record.uniform or record.log_uniform or (0.0, 1.0)
     return trial.suggest_float(name, low, high, log=record.log_uniform is not None)
 

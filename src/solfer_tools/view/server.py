@@ -3,6 +3,7 @@
 import asyncio
 import http
 import logging
+import re
 import secrets
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
@@ -122,7 +123,7 @@ class PageServer:
 
             def process(connection: ServerConnection, request: Request) -> Any:
                 request.path = request.path.partition("?")[0]
-                if not self._is_own(connection, request):
+                if not self._is_own(request):
                     return _empty(http.HTTPStatus.FORBIDDEN)
                 request.path = request.path.removeprefix(f"/{self._token}") or "/"
                 try:
@@ -165,18 +166,22 @@ class PageServer:
 
         return guarded
 
-    def _is_own(self, connection: ServerConnection, request: Request) -> bool:
-        """Return whether a request has the token, and is for this host, from an origin that may make it."""
-        hosts = [f"{name}:{connection.local_address[1]}" for name in ("localhost", HOST)]
-        origins = [f"http://{host}" for host in hosts]
+    def _is_own(self, request: Request) -> bool:
+        """Return whether a request has the token, and is for this host, from an origin that may make it.
+
+        The port may be another one, by which a tunnel leads here.
+        """
         _, token, kind, *_ = [*request.path.split("/"), "", ""]
         headers = request.headers
+        hosts = headers.get_all("Host")
+        origins = [f"http://{host}" for host in hosts]
         is_routed = kind in self.routes
         if is_routed:  # Foxglove in the browser, and on the desktop
             origins += ("https://app.foxglove.dev", "file://")
         return (
             secrets.compare_digest(token.encode(errors="surrogateescape"), self._token.encode())
-            and headers.get_all("Host") in [[host] for host in hosts]
+            and len(hosts) == 1
+            and re.fullmatch(rf"(localhost|{re.escape(HOST)}):[1-9][0-9]{{0,4}}", hosts[0]) is not None
             and all(origin in origins for origin in headers.get_all("Origin"))
             and ("Upgrade" not in headers or "Origin" in headers or is_routed)
         )

@@ -13,6 +13,7 @@ from support.realtime.executor_plugins import Layer
 
 from solfer.config.loading.rt_layer import read_layer
 from solfer.plugins import Registry, generate, load_checked
+from solfer_tools.cli.main import main
 
 OTHERS = ("PYTEST_ADDOPTS", "PYTEST_CURRENT_TEST")
 
@@ -49,6 +50,11 @@ def test_its_test_passes_unchanged(package, environment):
     done = run([sys.executable, "-m", "pytest", "-q", str(package)], package.parent, environment)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "2 passed" in done.stdout
+
+
+def test_it_is_drawn_before_it_is_built(package, capsys, caplog):
+    assert main(["graph", str(package / "config/swing_joint.yaml"), "-n", "swing_joint"]) == 0
+    assert "SwingJoint" in capsys.readouterr().out and not caplog.records
 
 
 def test_its_configuration_is_right(repository, package, environment):

@@ -112,6 +112,12 @@ def test_a_slow_machine_is_reported():
     assert not driving_report.warning({"odometry": left_out}, seen, 9.1, waited=True)
 
 
+@pytest.mark.parametrize(("is_lockstep", "figure"), [(False, "1.00 lately, 46.5 s lost"), (True, "1.00 lately")])
+def test_a_simulation_that_waits_loses_no_time(is_lockstep, figure):
+    report = HealthReport(Health.GOOD, "runs", {"real-time factor": 1.0, "time lost [s]": 46.5})
+    assert driving_report._health({"simulation": report}, is_lockstep) == [("real-time factor", figure)]
+
+
 def test_a_figure_that_is_too_large_is_marked():
     assert driving_report.bounded(0.5, 0.8, "degrees") == ""
     assert driving_report.bounded(0.9, 0.8, "degrees") == "  <-- more than 0.8 degrees"

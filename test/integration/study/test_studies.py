@@ -210,7 +210,8 @@ def test_a_search_finds_the_least_measure_and_goes_on_when_it_was_ended(tmp_path
     measure = {"z": {"columns": "simulation/base/z", "reduce": "end"}, "off": {"derive": "abs(mass - 1.02)"}}
     file, out = written(tmp_path, search=search, measure=measure), tmp_path / "out"
     code, output = study(file, "--out", tmp_path / "undisturbed", "--workers", 1)
-    assert code == 0 and "best of 8: 0 with {'mass': 1.02}" in output, output
+    assert code == 0 and "best of 8: 0 with mass 1.02, run " in output, output
+    assert "choices" in (tmp_path / "undisturbed/search.log").read_text()  # values, and not places in the list
     assert "3 of 3 runs, 0 failed" in output
     rows = list(csv.DictReader(table(tmp_path / "undisturbed").splitlines()))
     assert [row["run"] for row in rows] == list("01234567") and len({row["id"] for row in rows}) == 3
@@ -243,9 +244,10 @@ def test_bad_options_are_one_error(tmp_path, capsys):
 
 
 def test_the_dry_run_lists_the_runs_and_the_hours(tmp_path):
-    code, output = study(written(tmp_path, vary=VARY, runs=2), "--dry")
+    drawn = {"noise": {"path": "simulation/noise", "uniform": [0.5, 2.0]}}
+    code, output = study(written(tmp_path, vary=VARY | drawn, runs=2), "--dry")
     assert code == 0 and "4 runs of 0.2 s at most" in output
-    assert len(output.splitlines()) == 6
+    assert len(output.splitlines()) == 6 and not re.search(r"\d{6}", output)
 
 
 def test_the_first_document_of_a_run_is_its_settings(undisturbed):

@@ -1,5 +1,6 @@
 """`solfer rt` beside an RT layer, and without one."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -85,12 +86,25 @@ def test_top_names_the_health_of_each_part(namespace, statistics, capsys):
     for words in (["rt", "top"], ["top"]):
         assert main([*words, "--namespace", namespace, "--once"]) == 0
         texts.append(capsys.readouterr().out)
+    assert main(["top", "--namespace", namespace, "--once", "--json"]) == 0
+    parts = json.loads(capsys.readouterr().out)
+    assert parts["arms"]["health"] == "ERROR" and parts["legs pipes"]["why"] == "no publisher\nof imu"
     node.close()
     assert texts[0] == texts[1]
     lines = [line.split(maxsplit=2) for line in texts[0].split("RT layer")[0].splitlines() if line]
     assert lines[:3] == [["part", "health", "why"], ["arms", "ERROR", "ABORTED: too slow"], ["legs", "GOOD", "RUNNING"]]
     assert "legs pipes  WARNING  no publisher of imu" in texts[0]
     assert lines[-1][0] == "xbotcore"
+
+
+def test_top_fits_a_terminal_and_colours_the_health(namespace, statistics, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "24")
+    for no_color, line in (("", "arms      \x1b[31mERROR\x1b[0m    ABOR…"), ("1", "arms      ERROR    ABOR…")):
+        monkeypatch.setenv("NO_COLOR", no_color)
+        assert rt(namespace, "top", "--once") == 0
+        shown = capsys.readouterr().out.splitlines()
+        assert next(each for each in shown if each.startswith("arms")) == line
 
 
 def test_a_live_table_outlives_the_layer(namespace, statistics, capsys, monkeypatch):
@@ -146,6 +160,15 @@ def test_a_wrong_command_shows_its_own_usage(namespace, capsys, action, argument
     error = capsys.readouterr().err
     assert end.value.code == 2 and error.startswith(f"usage: solfer rt{action} [-h]")
     assert f"solfer rt{action}: error: {words}" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "close"), [(["chek"], "check"), (["log", "inf", "run.mcap"], "info"), (["rt", "stat"], "state")]
+)
+def test_a_wrong_word_gets_the_nearest_ones(capsys, arguments, close):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2 and f"\n  did you mean: {close}" in capsys.readouterr().err
 
 
 @pytest.mark.slow

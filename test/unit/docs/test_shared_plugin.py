@@ -1,4 +1,4 @@
-"""The examples of docs/explanation/shared_plugin.md run."""
+"""The examples of docs/explanation/shared_plugin.md run, and the programs of pages that have no test of their own."""
 
 import copy
 import re
@@ -57,6 +57,14 @@ def blocks(page, language):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["reference/dynamics.md", "explanation/transport_faults.md"])
+def test_the_program_of_another_page_runs(repository, monkeypatch, name):
+    monkeypatch.chdir(repository)
+    (program,) = blocks((repository / "docs" / name).read_text(), "python")
+    exec(compile(program, name, "exec"), {})
+
+
+@pytest.mark.slow
 def test_its_configuration_has_no_mistakes(folder, capsys):
     assert main(["check", "config/centauro.yaml", "-n", "shared_control"]) == 0
     assert main(["check", "config/layer.yaml"]) == 0
@@ -72,10 +80,11 @@ def test_its_layer_expands_the_shared_plugin(folder):
 
 
 @pytest.mark.slow
-def test_its_program_moves_both_parts(folder, page):
+def test_its_program_moves_both_parts(folder, page, monkeypatch):
     """The page's program runs as printed: both parts move the simulated robot, and the merge takes no extra cycle."""
     world = World()
-    scope = {"middleware": MemoryMiddleware(world.bus, "shared_control")}
+    monkeypatch.setattr("solfer.middleware.memory.Bus", lambda parameters: world.bus)
+    scope = {}
     exec(blocks(page, "python")[0], scope)
     together = scope["together"]
     together.start()

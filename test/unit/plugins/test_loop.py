@@ -119,6 +119,13 @@ def test_each_cycle_is_recorded_once():
 
 
 @pytest.mark.slow
+def test_an_end_in_good_order_is_logged(caplog):
+    machine = Machine([], [])
+    caplog.set_level("INFO", "solfer")
+    run(machine.plugin, machine)
+    assert caplog.messages == [f"stub has ended in good order after {CYCLES} cycles"]
+
+
 def test_statistics_are_those_of_the_last_cycles():
     """Quantiles by NumPy over a ring that has overflowed by one cycle; counts go on over the whole life."""
     statistics = LoopStatistics(5)

@@ -19,7 +19,8 @@ from solfer_tools.cli.main import main
 from solfer_tools.cli.recordings.actions import limits_of
 from solfer_tools.cli.recordings.progress import progress
 from solfer_tools.review import tracks_of
-from solfer_tools.review.canvas import LINE_POINTS, outline
+from solfer_tools.review.canvas import COLORS, LINE_POINTS, outline
+from solfer_tools.review.columns_page import columns_page
 from solfer_tools.review.plugin_page import plugin_page
 
 URDF = Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf"
@@ -249,6 +250,38 @@ def test_each_plugin_has_its_picture(file, capsys):
     assert pixels.shape[1] == 1650 and np.unique(pixels[::7, ::7, :3].reshape(-1, 3), axis=0).shape[0] > 20
     assert main(["plot", file, "-o", "out.pdf", "-c", "j_arm1_1", "-c", "arm/timing"]) == 0
     assert Path("out.pdf").read_bytes()[:4] == b"%PDF"
+    for name, arguments in (("whole", []), ("chosen", ["-c", "arm/measured/*"])):
+        assert main(["plot", file, "-o", f"{name}.png", "--column", *arguments]) == 0
+    assert {imread(file).shape[1] for file in ("whole_arm.png", "chosen.png")} == {1050}  # 3.5 inch of 300 pixels
+
+
+@pytest.mark.slow
+def test_an_erring_wheel_hides_no_joint(recording):
+    """Joints of a kind have one scale; the time stands on the page once."""
+    steered = recording["arm/measured/position"]
+    steered.values[:, 1] *= 1e3
+    names = ("j_arm1_1", "j_ankle_1", "j_wheel_1")
+    for name, each in recording.channels.items():
+        if each.columns == JOINTS_OF_ARM[: len(each.columns)]:
+            recording.channels[name] = dataclasses.replace(each, columns=names[: len(each.columns)])
+    figure = plugin_page(recording, "arm", {})
+    (image,) = [image for part in figure.subfigs for axes in part.axes for image in axes.get_images()]
+    assert np.nanmax(np.abs(image.get_array()), axis=1).min() > 0.9
+    assert figure.get_supxlabel() == "time [s]"
+    assert {axes.get_xlabel() for part in figure.subfigs for axes in part.axes} == {
+        "",
+        "part of the scale on the right",
+    }
+
+
+@pytest.mark.slow
+def test_lines_have_eight_colours_and_dashes_after_them(recording):
+    wide = channel("arm/log/wide", [f"c{each}" for each in range(30)], COLUMNS_KIND, "m")
+    figure = columns_page(dataclasses.replace(recording, channels={"arm/log/wide": wide}))
+    lines = figure.axes[0].get_lines()
+    looks = [(line.get_color(), line.get_linestyle()) for line in lines]
+    assert len(set(looks)) == len(looks) == 12 and {color for color, _ in looks} == set(COLORS) and len(COLORS) == 8
+    assert len(figure.axes[0].get_legend().get_texts()) == 12
 
 
 def test_progress_is_shown_on_a_terminal_alone(capsys, monkeypatch):

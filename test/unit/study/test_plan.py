@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from support.unit.studies import CONFIG, made, written
+from support.unit.studies import CONFIG, STUDY, made, written
 
 from solfer.errors import ConfigError, SolferError, SolferErrors
 from solfer_tools.study import read_study
@@ -78,6 +78,8 @@ def test_an_id_is_that_of_the_contents_wherever_the_files_lie(tmp_path):
         shutil.copy(CONFIG / "studies/ahead_and_turn.yaml", folder / "motion.yaml")
     ids = [made(each, motion={"scenario": {"file": "motion.yaml"}}).plan().runs[0].id for each in (here, there)]
     assert ids[0] == ids[1]
+    named = {name: {**each, "unit": "rad"} for name, each in STUDY["measure"].items()}
+    assert made(there, motion={"scenario": {"file": "motion.yaml"}}, measure=named).plan().runs[0].id == ids[0]
     file = there / "motion.yaml"
     file.write_text(file.read_text().replace("dt: 0.01", "dt: 0.02"))
     other = made(there, motion={"scenario": {"file": str(file.rename(there / "other.yaml"))}})

@@ -15,6 +15,7 @@ from solfer.segments.namespace import Namespace
 from solfer.telemetry import recordings
 from solfer.telemetry.recorder import Recorder
 from solfer.telemetry.recordings import (
+    RUNNING,
     FileRecorder,
     namespace_of_master,
     of_namespace,
@@ -66,11 +67,12 @@ def test_recordings_are_found_by_plugins(record, tmp_path):
 
 
 def test_recordings_are_found_by_namespace(record, tmp_path):
+    assert refused(lambda: of_plugins(["arm"], root=tmp_path), UnknownName)[2] == RUNNING
     record_all = "unknown namespace that records"
     assert refused(lambda: of_namespace("", tmp_path), UnknownName) == (
         f"{record_all} 'solfer'",
         str(tmp_path),
-        "plugins that run",
+        RUNNING,
     )
     record("one", "arm")
     record("one", "leg", beside="node")

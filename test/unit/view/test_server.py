@@ -121,7 +121,6 @@ HOSTS = (
     "evil.example",
     "evil.example:{port}",
     "localhost",
-    "localhost:1",
     "localhost:{port}.evil.example",
     "localhost.evil.example:{port}",
     "127.0.0.2:{port}",
@@ -158,6 +157,14 @@ def test_another_host_or_origin_gets_nothing(server, header, value):
     wrong = {header: value.format(port=server.viser.get_port())}
     assert status(server, f"/{token(server)}/", **wrong)[0] == 403
     assert status(server, f"/{token(server)}/", **{"Origin": "http://evil.example", **wrong})[0] == 403
+
+
+def test_a_tunnel_may_begin_at_another_port(server):
+    """As by `ssh -L 9090:localhost:8080`: the browser names the port that it knows, as host and as origin."""
+    own = {"Host": "localhost:9090", "Origin": "http://localhost:9090"}
+    assert status(server, f"/{token(server)}/", **own)[0] == 200
+    assert status(server, f"/{token(server)}/", **{**own, "Origin": "http://localhost:9091"})[0] == 403
+    assert status(server, "/", **own)[0] == 403
 
 
 def answer(server, request):

@@ -2,9 +2,14 @@
 
 import argparse
 import contextlib
+import json
+import math
+import os
+import re
+import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 
 from solfer.cli.columns import aligned
 from solfer.cli.rt.tables import overview
@@ -14,6 +19,12 @@ from solfer.segments.namespace import Namespace
 from solfer.telemetry.statistics import RuntimeStatistics
 from solfer.telemetry.summaries import LayerSummary, StatisticsReader, reports_of
 from solfer.transport.middleware import HealthReport
+
+SILENT = "SILENT"
+"""Health of a part that does not report any more."""
+
+COLORS = {"GOOD": "\x1b[32m", "WARNING": "\x1b[33m", "ERROR": "\x1b[31m", SILENT: "\x1b[31m"}
+"""Colour of each health on a terminal: green, yellow or red."""
 
 
 def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
@@ -28,11 +39,15 @@ def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
         nonlocal before, since
         layer = observer.look()
         if layer is None:
-            yield "the RT layer has ended"
+            yield as_json({}) if options.json else "the RT layer has ended"
         else:
-            yield from health({**reports_of(layer, before), **others.read()})
-            yield ""
-            yield from overview(layer, since)
+            reports = {**reports_of(layer, before), **others.read()}
+            if options.json:
+                yield as_json(reports)
+            else:
+                yield from health(reports)
+                yield ""
+                yield from overview(layer, since)
         before = layer
         since = f"the last {options.every:g} s"
 
@@ -50,8 +65,9 @@ def top_of_nodes(options: argparse.Namespace) -> None:
         for name, report in dict(reports()).items():
             if name not in seen or seen[name][0] is not report:
                 seen[name] = report, now
-        silent = {name for name, (_, newest) in seen.items() if now - newest > max(5.0, 2.0 * options.every)}
-        yield from health({name: report for name, (report, _) in seen.items()}, silent)
+        silent = {name for name, (_, time_of) in seen.items() if now - time_of > max(5.0, 2.0 * options.every)}
+        newest = {name: report for name, (report, _) in seen.items()}
+        yield from [as_json(newest, silent)] if options.json else health(newest, silent)
 
     with watched() as reports:
         reports()
@@ -59,20 +75,49 @@ def top_of_nodes(options: argparse.Namespace) -> None:
         _print(options, lines)
 
 
-def health(reports: Mapping[str, HealthReport], silent: set[str] | frozenset[str] = frozenset()) -> Iterator[str]:
+def health(reports: Mapping[str, HealthReport], silent: Collection[str] = ()) -> Iterator[str]:
     """List the health of each part, and why; those that are `silent` do not report any more."""
     rows = [
-        (name, "SILENT" if name in silent else report.level.name, report.summary.replace("\n", " "))
+        (name, _level(name, report, silent), report.summary.replace("\n", " "))
         for name, report in sorted(reports.items())
     ]
     return aligned([("part", "health", "why"), *rows])
 
 
+def as_json(reports: Mapping[str, HealthReport], silent: Collection[str] = ()) -> str:
+    """Write the health of each part, why, and its figures, as a line of JSON, which has no NaN; see `health`."""
+    parts = {}
+    for name, report in sorted(reports.items()):
+        values = {
+            key: value if isinstance(value, str) or math.isfinite(value) else str(value)
+            for key, value in report.values.items()
+        }
+        parts[name] = {"health": _level(name, report, silent), "why": report.summary, "values": values}
+    return json.dumps(parts)
+
+
+def _level(name: str, report: HealthReport, silent: Collection[str]) -> str:
+    return SILENT if name in silent else report.level.name
+
+
 def _print(options: argparse.Namespace, lines: Callable[[], Iterator[str]]) -> None:
-    clear = "\x1b[H\x1b[2J" if sys.stdout.isatty() and not options.once else ""
+    is_screen = sys.stdout.isatty() and not options.json
+    clear = "\x1b[H\x1b[2J" if is_screen and not options.once else ""
     with contextlib.suppress(KeyboardInterrupt):
         while True:
-            print(clear + "\n".join(lines()), flush=True)
+            shown = map(_fitted, lines()) if is_screen else lines()
+            print(clear + "\n".join(shown), flush=True)
             if options.once:
                 return
             time.sleep(options.every)
+
+
+def _fitted(line: str) -> str:
+    """Cut a line at the width of the terminal, and colour the health in it, unless the environment forbids colours."""
+    width = shutil.get_terminal_size().columns
+    line = line if len(line) <= width else line[: width - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    if os.environ.get("NO_COLOR"):
+        return line
+    return re.sub(
+        rf"(?<=  )({'|'.join(COLORS)})(?=  |$)", lambda found: f"{COLORS[found[1]]}{found[1]}\x1b[0m", line, count=1
+    )

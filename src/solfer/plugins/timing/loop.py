@@ -181,6 +181,9 @@ class PluginLoop:
         late = [error for name, error in plugins.failures.items() if name not in before]
         if failure is not None or late:
             self._fail(failure or late[0])
+        for managed, statistics in zip(plugins.plugins, self.statistics, strict=True):
+            if managed.name not in plugins.failures:
+                logger.info("%s has ended in good order after %d cycles", managed.name, statistics.cycles)
 
     def _cycle(self, late: float, skipped: int) -> None:
         """Run one cycle, which begins `late` [s] after its deadline, or after those of the `skipped` periods."""

@@ -4,6 +4,7 @@ The colours are those of the paper's figures: blue plugins with a green componen
 level and topics, a purple shared plugin.
 """
 
+import os
 from collections.abc import Iterator
 from html import escape
 
@@ -18,12 +19,13 @@ def dot_text(network: Network) -> str:
     fonts = "Helvetica,Arial,sans-serif"
     lines = [
         "digraph solfer {",
-        f'  graph [rankdir=LR, bgcolor=white, fontname="{fonts}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
+        f'  graph [rankdir=LR, bgcolor=white, fontname="{fonts}", fontsize=12, labeljust=l];',
+        "  graph [nodesep=0.35, ranksep=0.5, pad=0.2];",
         f'  node [shape=plain, fontname="{fonts}", fontsize=11, color="{LINE_COLOR}"];',
-        f'  edge [fontname="{fonts}", fontsize=10, color="{LINE_COLOR}", fontcolor="{LINE_COLOR}", arrowsize=0.8];',
+        f'  edge [color="{LINE_COLOR}", arrowsize=0.8];',
         *_plugins(network),
         *_third_parties(network),
-        *(f"  {_edge(arrow)}" for arrow in network.arrows),
+        *_arrows(network),
         "}",
     ]
     return "\n".join(lines) + "\n"
@@ -73,13 +75,36 @@ def _third_parties(network: Network) -> Iterator[str]:
         yield f"  {_name(end)} [label=<{_table(rows, yellow)}>];"
 
 
-def _edge(arrow: Arrow) -> str:
-    details = [arrow.content, arrow.reference]
-    rows = [f"<B>{escape(arrow.pipe)}</B>", *(_small(text) for text in details if text)]
-    label = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows) + '<TR><TD HEIGHT="5"></TD></TR>'
-    style = ', style=dashed, color="gray"' if arrow.idle else ""
-    table = f'<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">{label}</TABLE>'
-    return f"{_name(arrow.tail)} -> {_name(arrow.head)} [label=<{table}>{style}];"
+def _arrows(network: Network) -> Iterator[str]:
+    """Write each text as a node between the ends of its arrows: Graphviz lays nothing over a node.
+
+    What one sender sends to several receivers under one name stands there once.
+    """
+    groups: dict[tuple[End, bool, str, str, str], list[Arrow]] = {}
+    for arrow in network.arrows:
+        groups.setdefault((arrow.tail, arrow.idle, arrow.pipe, arrow.content, arrow.reference), []).append(arrow)
+    areas = _areas(network)
+    for number, ((tail, is_idle, pipe, *details), arrows) in enumerate(groups.items()):
+        rows = [f"<B>{escape(pipe)}</B>", *(_small(each) for each in details if each)]
+        cells = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
+        table = f'<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">{cells}</TABLE>'
+        text = f"text_{number}"
+        node = f'{text} [label=<{table}>, fontsize=10, fontcolor="{LINE_COLOR}"];'
+        around = os.path.commonprefix([areas.get(end, ()) for end in (tail, *(arrow.head for arrow in arrows))])
+        yield f"  {''.join(f'subgraph {area} {{ ' for area in around)}{node}{' }' * len(around)}"
+        style = 'style=dashed, color="gray"' if is_idle else ""
+        yield f"  {_name(tail)} -> {text} [dir=none, {style}];"
+        yield from (f"  {text} -> {_name(arrow.head)} [{style}];" for arrow in arrows)
+
+
+def _areas(network: Network) -> dict[End, tuple[str, str]]:
+    """Return the areas around each member of a shared plugin: that of the shared plugin, then that of the Robot."""
+    return {
+        End(Kind.PLUGIN, member): (f"cluster_{number}", f"cluster_{number}_{count}")
+        for number, groups in enumerate(network.shared.values())
+        for count, members in enumerate(groups)
+        for member in members
+    }
 
 
 def _table(rows: list[str], colour: str) -> str:

@@ -14,6 +14,7 @@ from solfer.errors import SolferError, StudyError
 from solfer_tools.study import Plan, Study, read_study
 from solfer_tools.study.drive import carry_out_all, find_run
 from solfer_tools.study.folder import RECORDING, StudyFolder
+from solfer_tools.study.plan import shown
 from solfer_tools.study.report import write_map, write_report
 from solfer_tools.study.run import carry_out as carry_out_one
 from solfer_tools.study.search import search
@@ -41,12 +42,12 @@ def dry(options: argparse.Namespace) -> int:
     record = study.record
     count = len(plan.runs) if record.search is None else record.search.trials
     rows = [("run", "seed", *study.names)]
-    shown = 20
-    rows += [(str(run.index), str(run.seed), *map(str, run.variations.values())) for run in plan.runs[:shown]]
+    most = 20
+    rows += [(str(run.index), str(run.seed), *map(shown, run.variations.values())) for run in plan.runs[:most]]
     for line in aligned(rows):
         print(line)
-    if len(plan.runs) > shown:
-        print(f"... and {len(plan.runs) - shown} more")
+    if len(plan.runs) > most:
+        print(f"... and {len(plan.runs) - most} more")
     factor = 1.5  # real-time factor of one processor, roughly
     hours = count * (record.duration + record.settle) / factor / 3600.0
     print(f"{count} runs of {record.duration + record.settle:g} s at most, about {hours:.2g} processor hours")

@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--limits", action="store_true", help="print what would have been found of each joint, too")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the joints that differ: .png or .pdf")
+    parser.add_argument("--column", action="store_true", help="draw for a paper's column: 3.5 inch wide, 8 pt")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,5 +44,6 @@ def run(options: argparse.Namespace) -> int:
         print(line)
     if options.plot is not None:
         short = (options.first.stem, options.second.stem)
-        save([("comparison", comparison_page(result, short if short[0] != short[1] else names))], options.plot)
+        page = comparison_page(result, short if short[0] != short[1] else names, options.column)
+        save([("comparison", page)], options.plot)
     return 1 if result.different else 0

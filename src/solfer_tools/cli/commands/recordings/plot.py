@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", dest="output", metavar="OUT", type=Path, help="write .png or .pdf (default: open a window)"
     )
+    parser.add_argument("--column", action="store_true", help="draw for a paper's column: 3.5 inch wide, 8 pt")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -56,5 +57,8 @@ def _figures(recording: "Recording", options: argparse.Namespace) -> "list[tuple
     if not recording.filled:
         raise RecordingError("there are no rows", where=str(options.file), expected="a recording of a plugin that ran")
     if options.columns:
-        return [("columns", columns_page(select(recording, options.columns, str(options.file))))]
-    return [(plugin, plugin_page(recording, plugin, limits_of(recording, plugin))) for plugin in recording.plugins]
+        return [("columns", columns_page(select(recording, options.columns, str(options.file)), options.column))]
+    return [
+        (plugin, plugin_page(recording, plugin, limits_of(recording, plugin), column=options.column))
+        for plugin in recording.plugins
+    ]
