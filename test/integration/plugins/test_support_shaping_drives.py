@@ -63,7 +63,7 @@ def test_it_balances_the_pressure_of_the_ground(file):
 def test_a_scene_shows_what_margins_leave(file):
     """Each edge of a polygon with sides along x and y has its margin: front, right, left, rear."""
     margins = "    locomotion:\n      margins: [0.1, 0.15, 0.2, 0.12]\n"
-    file.write_text(file.read_text().replace("    locomotion:              # L\n", margins))
+    file.write_text(re.sub(r"    locomotion: +#.*\n", margins, file.read_text()))
     robot = Robot.load(ROBOT / "centauro.urdf", ROBOT / "centauro.srdf", contacts=ROBOT / "contacts.yaml")
     with closing(Shaped(file)) as world:
         scene = LiveScene(robot, MemoryMiddleware(world.bus, "scene"))

@@ -199,7 +199,7 @@ def test_what_exceeds_its_limits_has_failed_and_the_others_go_on(tmp_path, monke
         "greedy:move: ValueError: four",
     ]
     assert Counter(row["failed"] for row in rows) == {"0": 1, "1": 3}
-    assert "(noise 4.0): greedy:move: ValueError: four" in output
+    assert "(noise 4): greedy:move: ValueError: four" in output
 
 
 def test_a_search_finds_the_least_measure_and_goes_on_when_it_was_ended(tmp_path):

@@ -44,6 +44,6 @@ def _is_laid_over(root: YamlNode) -> bool:
     modules = root.entries("modules").values()
     parts = [set(each.entries()) for each in modules]
     is_whole = bool({"middleware", "system", "layers"} & set(root.entries())) or any(
-        not keys or {"robot", "layer", "plugins"} & keys for keys in parts
+        not keys or {"class", "layer", "plugins", "robot", "secondary_file"} & keys for keys in parts
     )
     return not is_whole and (bool(parts) or root.get("robot", "rate") is not None)
