@@ -157,6 +157,7 @@ class PageServer:
             )
             quiet_logger("asyncio")  # it warns of each message to a connection that has ended
             options |= {
+                "backlog": 1024,  # connections that wait; one beyond them is repeated by its sender after a second
                 "max_size": 65536,  # [bytes] of a message; a longer one closes its connection
                 "logger": quiet_logger(f"{__name__}.websockets"),
                 "select_subprotocol": _subprotocol,
