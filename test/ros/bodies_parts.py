@@ -8,7 +8,7 @@ import pybullet
 from system import numbers
 
 from solfer.model import Description
-from solfer.simulation.bullet.body_urdf import body_urdf
+from solfer.simulation.loading.body_urdf import body_urdf
 
 
 class Bullet:

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from solfer.errors import SimulationError
-from solfer.simulation.bullet.meshes import Meshes
+from solfer.simulation.loading.meshes import Meshes
 
 
 def shape(tag, name):
