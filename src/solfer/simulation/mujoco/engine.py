@@ -8,7 +8,7 @@ import numpy as np
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
 from solfer.numerics.rotations import quaternion_from_rotation
-from solfer.simulation.mujoco.drawing import draw
+from solfer.simulation.mujoco.drawing import SEEN, MujocoCamera
 from solfer.simulation.mujoco.robot import MujocoRobot
 from solfer.simulation.mujoco.shapes import box_around
 from solfer.simulation.mujoco.world import ROBOT, MujocoWorld, SavedState, Touching
@@ -21,17 +21,22 @@ class MujocoEngine(PhysicsEngine):
 
     Args:
         gui: Refused: what is installed of MuJoCo has no window.
+        draws: Load the shapes by which robots are seen.
 
     Raises:
         MissingDependency: MuJoCo is not installed.
         SimulationError: A window is asked for.
     """
 
-    def __init__(self, gui: bool = False):
+    def __init__(self, gui: bool = False, draws: bool = False):
         if gui:
             raise SimulationError("MuJoCo has no window here", expected="the page of `solfer view`, or PyBullet")
         self._world = MujocoWorld()
         self._bodies = self._world.bodies
+        self._camera = MujocoCamera(self._world)
+        self._draws = draws
+        if draws:
+            self._camera.light()
         self._states: dict[int, SavedState] = {}
         self._saved = 0
 
@@ -39,7 +44,7 @@ class MujocoEngine(PhysicsEngine):
         self, description: Description, joints: Sequence[str], friction: Friction, *, floats: bool
     ) -> MujocoRobot:
         """See `PhysicsEngine.load_robot`."""
-        robot = MujocoRobot(self._world, description, joints, friction, floats=floats)
+        robot = MujocoRobot(self._world, description, joints, friction, floats=floats, draws=self._draws)
         robot.number = self._numbered(ROBOT + robot.links[-1])
         return robot
 
@@ -120,11 +125,12 @@ class MujocoEngine(PhysicsEngine):
 
     def render(self, view: CameraView) -> Picture:
         """See `PhysicsEngine.render`."""
-        return draw(self._world, view)
+        return self._camera.draw(view)
 
     def close(self) -> None:
         """See `PhysicsEngine.close`."""
         self._states.clear()
+        self._camera.close()
 
     def _add(  # noqa: PLR0913 for what a body may be
         self,
@@ -134,7 +140,7 @@ class MujocoEngine(PhysicsEngine):
         *,
         mass: float = 0.0,
         friction: float | None = None,
-        colour: Colour = (0.5, 0.5, 0.5, 0.0),
+        colour: Colour | None = None,
     ) -> int:
         """Add a body of one shape; without friction it can only be seen, without mass it does not move."""
         world = self._world
@@ -144,7 +150,7 @@ class MujocoEngine(PhysicsEngine):
         body = world.spec.worldbody.add_body(name=name, pos=position, quat=(w, x, y, z))
         if mass:
             body.add_freejoint()
-        shape = body.add_geom(type=kind, size=size, mass=mass, rgba=colour)
+        shape = body.add_geom(type=kind, size=size, mass=mass, rgba=colour or (0.5, 0.5, 0.5, 1.0), group=SEEN if colour else 0)
         if friction is None:
             shape.contype = shape.conaffinity = 0
         else:

@@ -1,6 +1,7 @@
 """The library MuJoCo: the only place that imports it."""
 
 import logging
+import os
 from functools import cache
 from types import ModuleType
 
@@ -17,6 +18,7 @@ def load_mujoco() -> ModuleType:
     Raises:
         MissingDependency: It is not installed.
     """
+    os.environ.setdefault("MUJOCO_GL", "egl")  # read at the import; draws without a display
     try:
         import mujoco
     except ModuleNotFoundError as error:

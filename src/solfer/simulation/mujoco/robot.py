@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
@@ -60,6 +61,7 @@ class MujocoRobot(RobotInEngine):
         joints: Its moving joints, in the order in which they are read and driven.
         friction: Friction of its links.
         floats: Whether its base moves.
+        draws: Whether it is loaded with the shapes by which it is seen.
 
     Raises:
         SimulationError: MuJoCo cannot load the robot, or `friction` names a link that it does not have.
@@ -73,15 +75,19 @@ class MujocoRobot(RobotInEngine):
         friction: Friction,
         *,
         floats: bool,
+        draws: bool,
     ):
         self._world = world
         with tempfile.TemporaryDirectory() as folder:
             urdf = body_urdf(description, floats, Path(folder), reader=READER)
-            text, assets = _with_assets(urdf.text)
+            text, assets = _with_assets(urdf.text, draws=draws)
         self.owner = urdf.owner
         of_links = coefficients(friction, urdf.owner)
         try:
-            self._attach(text, assets, urdf.base, floats=floats)
+            spec = self._specification(text, assets, urdf.base, floats=floats)
+            world.change()
+            world.spec.attach(spec, prefix=ROBOT, frame=world.spec.worldbody.add_frame())
+            world.compile()
         except (ValueError, world.mujoco.FatalError) as error:
             raise SimulationError(
                 f"MuJoCo cannot load the robot: {str(error).strip()}",
@@ -192,12 +198,9 @@ class MujocoRobot(RobotInEngine):
         """See `RobotInEngine.mass`."""
         return float(self._world.model.body_mass[list(self._numbers.values())].sum())
 
-    def _attach(self, text: str, assets: dict[str, bytes], base: str, *, floats: bool) -> None:
-        """Give the world the bodies of a URDF: with motors, without contacts among them, with a base that is free."""
-        world = self._world
-        spec = world.mujoco.MjSpec.from_string(text, assets=assets)
-        spec.compiler.fusestatic = False
-        spec.compiler.alignfree = False
+    def _specification(self, text: str, assets: dict[str, bytes], base: str, *, floats: bool) -> Any:
+        """Read a URDF, for bodies with motors, without contacts among them, with a base that is free."""
+        spec = self._world.mujoco.MjSpec.from_string(text, assets=assets)
         if floats:
             spec.body(base).add_freejoint(name=FREE)
         for joint in spec.joints:
@@ -209,9 +212,7 @@ class MujocoRobot(RobotInEngine):
         for geom in spec.geoms:
             if geom.contype:
                 Touching.ROBOT.prepare(geom)
-        world.change()
-        world.spec.attach(spec, prefix=ROBOT, frame=world.spec.worldbody.add_frame())
-        world.compile()
+        return spec
 
     def _find(self, base: str, joints: Sequence[str], *, floats: bool) -> None:
         """Find the numbers of links and joints, which other bodies do not change."""
@@ -231,9 +232,11 @@ FREE = "the base's freedom"
 """Name of the joint of a base that floats; no joint of a URDF has it."""
 
 
-def _with_assets(text: str) -> tuple[str, dict[str, bytes]]:
-    """Read the meshes of a URDF; it names them by numbers then."""
+def _with_assets(text: str, draws: bool) -> tuple[str, dict[str, bytes]]:
+    """Read the meshes of a URDF, which names them by numbers then, and says how MuJoCo has to take it."""
     robot = ElementTree.fromstring(text)
+    compiler = {"fusestatic": "false", "alignfree": "false", "discardvisual": "false" if draws else "true"}
+    SubElement(SubElement(robot, "mujoco"), "compiler", compiler)
     assets = {}
     for number, mesh in enumerate(robot.iter("mesh")):
         path = Path(mesh.get("filename", ""))
