@@ -1,15 +1,26 @@
 """The physics engines by their names."""
 
+import os
 from importlib.util import find_spec
 
 from solfer.errors import UnknownName
 from solfer.simulation.physics import PhysicsEngine
-from solfer.simulation.world.records import ENGINES, EngineName
+from solfer.simulation.world.records import ENGINES
+
+ENGINE_VARIABLE = "SOLFER_ENGINE"
+"""Environment variable with the engine that is used where none is named."""
 
 
-def default_engine() -> EngineName:
-    """Return the engine that is used where none is named: PyBullet, or MuJoCo where PyBullet alone is missing."""
-    return "mujoco" if find_spec("pybullet") is None and find_spec("mujoco") is not None else "bullet"
+def default_engine() -> str:
+    """Return the engine that is used where none is named: that of ENGINE_VARIABLE, else one that is installed.
+
+    Raises:
+        UnknownName: The variable names no engine.
+    """
+    chosen = os.environ.get(ENGINE_VARIABLE)
+    if chosen and chosen not in ENGINES:
+        raise UnknownName("physics engine", chosen, ENGINES, where=ENGINE_VARIABLE)
+    return chosen or ("mujoco" if find_spec("pybullet") is None and find_spec("mujoco") is not None else "bullet")
 
 
 def make_engine(name: str | None = None, gui: bool = False, draws: bool = False) -> PhysicsEngine:

@@ -63,8 +63,9 @@ class Simulation:
         self.start = bundle.start
         self._groups = bundle.groups
         self._count = 0
-        named = engine is None or isinstance(engine, str)
-        self._engine = make_engine(engine or world.engine, gui) if named else engine
+        if engine is None or isinstance(engine, str):
+            engine = make_engine(engine or world.engine, gui)
+        self._engine = engine
         try:
             self.body = Body(
                 self._engine,

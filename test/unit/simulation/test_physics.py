@@ -5,7 +5,6 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-
 from scipy.integrate import solve_ivp
 
 from solfer.errors import SimulationError

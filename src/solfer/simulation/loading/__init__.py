@@ -1,1 +1,1 @@
-"""What every physics engine is given of a robot: a URDF with its fixed links lumped, physical inertias, and meshes that it reads."""
+"""What engines are given of a robot: a URDF with lumped links and physical inertias, and meshes that they read."""

@@ -89,9 +89,9 @@ class Meshes:
             logger.warning("visual shapes without their meshes are left out: %s%s", self._absent[0], more)
 
     def _readable(self, path: Path) -> Path | None:
-        """Return the path of a mesh that the engine reads: an STL only if it is binary with no byte behind its triangles.
+        """Return the path of a mesh that the engine reads; None: the engine finds nothing in the file.
 
-        None: the engine finds nothing in the file.
+        An STL is binary then, with no byte behind its triangles.
         """
         unit_of(path)
         kind = path.suffix.lower()

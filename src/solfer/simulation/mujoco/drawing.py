@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from solfer.errors import MissingDependency, SimulationError
 from solfer.installation import pip_install
 from solfer.simulation.mujoco.world import MujocoWorld
@@ -14,7 +12,7 @@ SEEN = 1
 
 
 class MujocoCamera:
-    """Draws a world by EGL, which needs no display and no graphics card.
+    """Draws a world without a display and without a graphics card.
 
     Args:
         world: The world.

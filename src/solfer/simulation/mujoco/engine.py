@@ -11,7 +11,8 @@ from solfer.numerics.rotations import quaternion_from_rotation
 from solfer.simulation.mujoco.drawing import SEEN, MujocoCamera
 from solfer.simulation.mujoco.robot import MujocoRobot
 from solfer.simulation.mujoco.shapes import box_around
-from solfer.simulation.mujoco.world import ROBOT, MujocoWorld, SavedState, Touching
+from solfer.simulation.mujoco.touching import Touching
+from solfer.simulation.mujoco.world import MujocoWorld, SavedState
 from solfer.simulation.physics import CameraView, Colour, PhysicsEngine, Picture, Pose, Vector
 from solfer.simulation.world.records import Friction
 
@@ -44,25 +45,21 @@ class MujocoEngine(PhysicsEngine):
         self, description: Description, joints: Sequence[str], friction: Friction, *, floats: bool
     ) -> MujocoRobot:
         """See `PhysicsEngine.load_robot`."""
-        robot = MujocoRobot(self._world, description, joints, friction, floats=floats, draws=self._draws)
-        robot.number = self._numbered(ROBOT + robot.links[-1])
-        return robot
+        return MujocoRobot(self._world, description, joints, friction, floats=floats, draws=self._draws)
 
     def add_plane(self, normal: Sequence[float], friction: float) -> int:
         """See `PhysicsEngine.add_plane`."""
         pose = (0.0, 0.0, 0.0), _upright_on(normal)
-        return self._add(self._mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0), pose, friction=friction)
+        return self._add(pose, friction, type=self._mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0))
 
     def add_box(self, size: Sequence[float], pose: Pose, mass: float, friction: float, colour: Colour) -> int:
         """See `PhysicsEngine.add_box`."""
-        half = [edge / 2.0 for edge in size]
-        return self._add(self._mujoco.mjtGeom.mjGEOM_BOX, half, pose, mass=mass, friction=friction, colour=colour)
+        return self._add(pose, friction, mass=mass, **self._box(size, colour))
 
     def add_tiles(self, size: Sequence[float], colours: Iterable[Colour]) -> list[int]:
         """See `PhysicsEngine.add_tiles`."""
-        half = [edge / 2.0 for edge in size]
         pose = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
-        return [self._add(self._mujoco.mjtGeom.mjGEOM_BOX, half, pose, colour=colour) for colour in colours]
+        return [self._add(pose, **self._box(size, colour)) for colour in colours]
 
     def pose(self, body: int) -> Pose:
         """See `PhysicsEngine.pose`."""
@@ -132,35 +129,28 @@ class MujocoEngine(PhysicsEngine):
         self._states.clear()
         self._camera.close()
 
-    def _add(  # noqa: PLR0913 for what a body may be
-        self,
-        kind: Any,
-        size: Sequence[float],
-        pose: Pose,
-        *,
-        mass: float = 0.0,
-        friction: float | None = None,
-        colour: Colour | None = None,
-    ) -> int:
+    def _add(self, pose: Pose, friction: float | None = None, **shape: Any) -> int:
         """Add a body of one shape; without friction it can only be seen, without mass it does not move."""
         world = self._world
         world.change()
         position, (x, y, z, w) = pose
         name = f"body {len(self._bodies)}"
         body = world.spec.worldbody.add_body(name=name, pos=position, quat=(w, x, y, z))
-        if mass:
+        if shape.get("mass"):
             body.add_freejoint()
-        shape = body.add_geom(type=kind, size=size, mass=mass, rgba=colour or (0.5, 0.5, 0.5, 1.0), group=SEEN if colour else 0)
+        made = body.add_geom(**shape)
         if friction is None:
-            shape.contype = shape.conaffinity = 0
+            made.contype = made.conaffinity = 0
         else:
-            Touching.WORLD.prepare(shape)
+            Touching.WORLD.prepare(made)
             world.set_friction(name, friction)
-        return self._numbered(name)
-
-    def _numbered(self, body: str) -> int:
-        self._bodies.append(body)
+        self._bodies.append(name)
         return len(self._bodies) - 1
+
+    def _box(self, size: Sequence[float], colour: Colour) -> dict[str, Any]:
+        """Describe a box that is seen."""
+        half = [edge / 2.0 for edge in size]
+        return {"type": self._mujoco.mjtGeom.mjGEOM_BOX, "size": half, "rgba": colour, "group": SEEN}
 
     @property
     def _mujoco(self) -> Any:

@@ -15,8 +15,10 @@ from solfer.numerics.rotations import rotated
 from solfer.simulation.loading.body_urdf import body_urdf
 from solfer.simulation.loading.friction import coefficients
 from solfer.simulation.loading.meshes import MeshReader
+from solfer.simulation.mujoco.motors import RIGID
 from solfer.simulation.mujoco.shapes import box_around, closest_points
-from solfer.simulation.mujoco.world import RIGID, ROBOT, MujocoWorld, Touching
+from solfer.simulation.mujoco.touching import ROBOT, Touching
+from solfer.simulation.mujoco.world import MujocoWorld, Push
 from solfer.simulation.physics import (
     STEP,
     BaseState,
@@ -49,7 +51,7 @@ class MujocoJoints(JointGroup):
 
     def hold_speeds(self, speeds: np.ndarray, efforts: Sequence[float]) -> None:
         """See `JointGroup.hold_speeds`."""
-        self._world.hold_speeds(self._dofs, speeds, efforts)
+        self._world.motors.hold(self._dofs, speeds, efforts)
 
 
 class MujocoRobot(RobotInEngine):
@@ -78,6 +80,7 @@ class MujocoRobot(RobotInEngine):
         draws: bool,
     ):
         self._world = world
+        self.number = len(world.bodies)
         with tempfile.TemporaryDirectory() as folder:
             urdf = body_urdf(description, floats, Path(folder), reader=READER)
             text, assets = _with_assets(urdf.text, draws=draws)
@@ -95,6 +98,7 @@ class MujocoRobot(RobotInEngine):
                 expected="a robot that MuJoCo can load",
             ) from error
         self._find(urdf.base, joints, floats=floats)
+        world.bodies.append(ROBOT + urdf.base)
         for link in self.links:
             world.set_friction(ROBOT + link, of_links[link])
 
@@ -114,10 +118,9 @@ class MujocoRobot(RobotInEngine):
             return BaseState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), angular=(0.0, 0.0, 0.0))
         place, dof = self._floating
         x, y, z, w, i, j, k = data.qpos[place : place + 7].tolist()
-        motion = data.qvel[dof : dof + 6].tolist()
-        # MuJoCo's angular velocity has the axes of the body
-        angular = rotated(motion[3:], (i, j, k, w))
-        return BaseState((x, y, z), (i, j, k, w), tuple(motion[:3]), angular=tuple(angular))
+        vx, vy, vz, *turn = data.qvel[dof : dof + 6].tolist()
+        angular = rotated(turn, (i, j, k, w))  # MuJoCo's has the axes of the body
+        return BaseState((x, y, z), (i, j, k, w), (vx, vy, vz), angular=angular)
 
     def place_joints(self, positions: Sequence[float] | np.ndarray) -> None:
         """See `RobotInEngine.place_joints`."""
@@ -174,7 +177,8 @@ class MujocoRobot(RobotInEngine):
 
     def push(self, link: str, force: Sequence[float], torque: Sequence[float], position: Sequence[float]) -> None:
         """See `RobotInEngine.push`."""
-        self._world.push(self._numbers[self.owner[link]], force, torque, position=position)
+        body = self._numbers[self.owner[link]]
+        self._world.push(Push(body, np.array(force), np.array(torque), position=np.array(position)))
 
     def contacts(self) -> list[ContactPoint]:
         """See `RobotInEngine.contacts`."""
@@ -233,7 +237,7 @@ FREE = "the base's freedom"
 
 
 def _with_assets(text: str, draws: bool) -> tuple[str, dict[str, bytes]]:
-    """Read the meshes of a URDF, which names them by numbers then, and says how MuJoCo has to take it."""
+    """Read the meshes of a URDF, which it names by numbers then, and add how MuJoCo compiles it."""
     robot = ElementTree.fromstring(text)
     compiler = {"fusestatic": "false", "alignfree": "false", "discardvisual": "false" if draws else "true"}
     SubElement(SubElement(robot, "mujoco"), "compiler", compiler)

@@ -84,7 +84,9 @@ class WorldRecord(Record):
     """The surroundings of a robot. Friction coefficients of bodies that touch are multiplied."""
 
     engine: EngineName | None = Field(
-        default=None, description="physics engine; default: `bullet`, or `mujoco` where PyBullet is not installed"
+        default=None,
+        description="physics engine; default: that of the environment variable SOLFER_ENGINE, or `bullet`, or `mujoco` "
+        "where PyBullet is not installed",
     )
     ground: GroundRecord = Field(default_factory=GroundRecord, description="the plane below everything")
     stairs: dict[str, StairsRecord] = Field(default_factory=dict, description="stairs by name")
