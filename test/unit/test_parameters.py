@@ -35,7 +35,7 @@ KERNELS = {
 FOREIGN = re.compile(
     r"^(self\._)?(bullet|lapack|struct)\.|\bmujoco\.mj_|(\.|^)(warning|info|error|exception|debug)$|kernel\."
 )
-"""Calls of others: of PyBullet, MuJoCo and LAPACK, which have no names, of `struct`, of loggers, and of kernels by module."""
+"""Calls of others: of engines and LAPACK, which have no names, of `struct`, of loggers, of kernels by module."""
 
 
 def test_functions_with_more_parameters_are_few():
