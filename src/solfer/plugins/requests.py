@@ -104,8 +104,11 @@ class RequestNotes:
 
 
 def _warned(reply: Any, warning: str) -> Any:
-    """Add a warning to a reply; a refusal stays as it is."""
-    return replace(reply, message="; ".join(filter(None, (reply.message, warning)))) if reply.success else reply
+    """Add a warning to a reply; a refusal, and a reply without a message, stay as they are."""
+    message = getattr(reply, "message", None)
+    if message is None or not getattr(reply, "success", True):
+        return reply
+    return replace(reply, message="; ".join(filter(None, (message, warning))))
 
 
 def _call(handler: Callable[[Any], Any], value: Any) -> Callable[[], Any]:

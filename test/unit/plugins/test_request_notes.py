@@ -75,3 +75,10 @@ def test_replies_say_that_no_node_receives_what_is_commanded(commands):
     warning = "no node receives scale"
     expected = [warning, f"2.5 s; {warning}", "no", f"late; {warning}"] if commands else ["", "2.5 s", "no", "late"]
     assert [each.message for each in answers] == expected
+
+
+def test_a_reply_without_a_message_stays_as_it_is():
+    notes = RequestNotes()
+    notes.requested = lambda name: "no node receives it"
+    answer = Ask()
+    assert notes.noted(Service("scale", "test/Scale", Ask, Ask, lambda _: answer)).handler(Ask()) is answer
