@@ -65,6 +65,11 @@ def add_system(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
 
 
+def add_column(parser: argparse.ArgumentParser) -> None:
+    """Add --column, for a picture in a paper."""
+    parser.add_argument("--column", action="store_true", help="draw for a paper's column: 3.5 inch wide, 8 pt")
+
+
 def add_namespace(
     parser: argparse.ArgumentParser, actions: Iterable[argparse.ArgumentParser], default: str, meaning: str
 ) -> None:

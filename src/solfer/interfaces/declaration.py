@@ -39,6 +39,8 @@ class Service:
             uses.
         largest: Bytes of a request as it comes over a network; a larger one is refused undecoded.
         quick: Whether `prepare` takes less than a millisecond: it is rationed no more than what is urgent.
+        commands: Whether it is to move the robot: the `message` of its reply says so where no node receives what the
+            plugin publishes.
         urgent: Whether it goes before all others and is not rationed: it has to cost next to nothing.
     """
 
@@ -52,6 +54,7 @@ class Service:
     largest: int = 65536
     urgent: bool = False
     quick: bool = False
+    commands: bool = True
 
     def prepared(self, request: Any) -> Callable[[], Any]:
         """Run `prepare`, and return the call that is left to do between two cycles. To be called outside of the cycle.

@@ -43,11 +43,16 @@ class Peer:
         return not self._receives
 
     @property
-    def open(self) -> bool:
-        """Whether to go on looking: the peer is missing, and is needed or was not warned about yet."""
+    def missing(self) -> bool:
+        """Whether the peer was not found yet."""
         if self._end.arrival > -math.inf if self._receives else self._end.is_received:
             self.found = True
-        return not self.found and (self.needed or not self.fault)
+        return not self.found
+
+    @property
+    def is_dispensable(self) -> bool:
+        """Whether the plugin works without it, and has warned about it."""
+        return not self.needed and self.warned > -math.inf
 
     def update(self, topics: Topics) -> None:
         """Find out what is wrong, if anything is."""
@@ -64,8 +69,9 @@ class Peer:
 class Peers:
     """Warns when a pipe has no peer, or a peer with another type of message.
 
-    A needed peer is warned about again and again, and in the plugin's health; any other once. When all peers are there,
-    it stops looking.
+    A needed peer is warned about again and again, and in the plugin's health; any other once. It stops looking when all
+    peers are there, and those that are not needed were warned about; but not while no node receives any output, which
+    replies to requests say.
 
     Args:
         plugin: Name of the plugin, for messages.
@@ -82,61 +88,52 @@ class Peers:
         self._has_called = False
         self._trouble = ""
         self._outputs = tuple(peer for peer in peers if peer.is_output)
-        self._requested = ""
+        self._unsaid = ""
 
-    def note_request(self, name: str) -> None:
-        """Note that the plugin carries out a request: `look` warns if no node receives what it publishes then."""
-        missing = [peer for peer in self._outputs if peer.open or not peer.found]
-        if self._outputs and len(missing) == len(self._outputs):
-            self._requested = name
+    def note_request(self, name: str) -> str:
+        """Return that no node receives what the plugin publishes, as far as is known; empty: one does.
+
+        Args:
+            name: The request that the plugin carries out; `look` logs it.
+        """
+        if not self._is_unreceived or not all(peer.fault for peer in self._outputs):
+            return ""
+        what = f"no node receives what it publishes: {'; '.join(peer.fault for peer in self._outputs)}"
+        self._unsaid = f"carries out '{name}', but {what}"
+        return what
 
     def look(self) -> None:
         """Request the topics of other nodes, if that is due; to be called about once a second. Does not block."""
+        if self._unsaid:
+            logger.warning("%s %s", self._plugin, self._unsaid)
+            self._unsaid = ""
         now = self._middleware.now()
-        if self._requested and not self._has_called:
-            name = self._requested
-            self._requested = ""
-            self._has_called = True
-            self._middleware.topics().add_done_callback(lambda answer: self._warn_unreceived(answer, name))
-            return
         if self._has_called or now < self._next:
             return
         self._next = now + 1.0
-        missing = [peer for peer in self._peers if peer.open]
-        if not missing:
+        missing = [peer for peer in self._peers if peer.missing]
+        if not self._is_unreceived and all(peer.is_dispensable for peer in missing):
             self._next = math.inf
-        # others than those that it needs may start together with it, and later [s]
-        due = [peer for peer in missing if now >= self._begin + (1.0 if peer.needed else 5.0)]
-        if due:
+        elif now >= self._begin + 1.0:
             self._has_called = True
-            self._middleware.topics().add_done_callback(lambda answer: self._receive(answer, due, now))
+            self._middleware.topics().add_done_callback(lambda answer: self._receive(answer, missing, now))
 
     @property
     def done(self) -> bool:
         """Whether every peer was found, or needs no further warning."""
-        return self._next == math.inf and not self._requested
+        return self._next == math.inf and not self._unsaid
+
+    @property
+    def _is_unreceived(self) -> bool:
+        """Whether there are outputs, none of which has been found to be received."""
+        return bool(self._outputs) and all(peer.missing for peer in self._outputs)
 
     def warning(self) -> str:
         """Return what is wrong with the needed peers, for the plugin's health; empty: nothing is known."""
-        faults = [peer.fault for peer in self._peers if peer.needed and peer.fault and peer.open]
-        return "; ".join(faults) or (self._trouble if any(peer.needed and peer.open for peer in self._peers) else "")
+        faults = [peer.fault for peer in self._peers if peer.needed and peer.fault and peer.missing]
+        return "; ".join(faults) or (self._trouble if any(peer.needed and peer.missing for peer in self._peers) else "")
 
-    def _warn_unreceived(self, answer: "Future[Topics]", request: str) -> None:
-        try:
-            topics = answer.result()
-        except SolferError:
-            return  # `look` reports it for peers that are needed
-        finally:
-            self._has_called = False
-        for peer in self._outputs:
-            peer.update(topics)
-        if not any(peer.found for peer in self._outputs):
-            faults = "; ".join(peer.fault for peer in self._outputs)
-            logger.warning(
-                "%s carries out '%s', but no node receives what it publishes: %s", self._plugin, request, faults
-            )
-
-    def _receive(self, answer: "Future[Topics]", due: Sequence[Peer], now: float) -> None:
+    def _receive(self, answer: "Future[Topics]", missing: Sequence[Peer], now: float) -> None:
         try:
             topics = answer.result()
         except SolferError as error:
@@ -144,7 +141,7 @@ class Peers:
             return
         else:
             self._trouble = ""
-            for peer in due:
+            for peer in missing:
                 self._update(peer, topics, now)
         finally:
             self._has_called = False
@@ -152,9 +149,11 @@ class Peers:
     def _update(self, peer: Peer, topics: Topics, now: float) -> None:
         before = peer.fault
         peer.update(topics)
-        # again after 10 s, while nothing changes
-        if peer.fault and (peer.fault != before or now >= peer.warned + 10.0):
-            peer.warned = now
-            logger.warning("%s: %s", self._plugin, peer.fault)
-        elif before and not peer.fault:
+        patience = 1.0 if peer.needed else 5.0  # [s]; others than those that it needs may start together with it
+        if not peer.fault and peer.warned > -math.inf:
+            peer.warned = -math.inf
             logger.info("%s: resolved: %s", self._plugin, before)
+        elif peer.fault and now >= self._begin + patience and not peer.is_dispensable:
+            if peer.fault != before or now >= peer.warned + 10.0:  # again, while nothing changes
+                peer.warned = now
+                logger.warning("%s: %s", self._plugin, peer.fault)

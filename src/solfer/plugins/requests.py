@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ from solfer.errors import UnknownName
 from solfer.interfaces.declaration import Action, Declaration, Service, TopicIn
 from solfer.recording.model import REQUEST
 from solfer.transport.declared.fields import made, plain
+from solfer.transport.inbox import pass_on
 
 
 class RequestNotes:
@@ -18,13 +20,14 @@ class RequestNotes:
         enabled: Whether notes are recorded.
         notes: What happened since they were taken last: kind and text of an event. That of a request has name and
             fields, as JSON.
-        requested: Called with the name of each request and goal that is carried out.
+        requested: Called with the name of each goal, and of each request that is to move the robot, when it is carried
+            out; returns what its caller has to know, empty: nothing.
     """
 
     def __init__(self) -> None:
         self.enabled = False
         self.notes: list[tuple[str, str]] = []
-        self.requested: Callable[[str], None] = lambda name: None
+        self.requested: Callable[[str], str] = lambda name: ""
         self._calls: dict[str, Callable[[Mapping[str, Any]], Callable[[], Any]]] = {}
 
     def note(self, kind: str, text: str) -> None:
@@ -50,7 +53,7 @@ class RequestNotes:
             self._calls[f"{name}/cancel"] = lambda fields: action.cancel
             return replace(
                 action,
-                begin=lambda goal: self._carry_out(name, goal, action.begin),
+                begin=lambda goal: self._begin(name, goal, action.begin),
                 cancel=lambda: self._note(f"{name}/cancel", {}, lambda _: action.cancel()),
             )
         return declaration
@@ -70,22 +73,42 @@ class RequestNotes:
 
     def _service(self, service: Service) -> Service:
         if service.prepare is None:
-            return replace(service, handler=lambda request: self._carry_out(service.name, request, service.handler))
+            return replace(service, handler=lambda request: self._carry_out(service, request, service.handler))
         prepare = service.prepare
         return replace(
             service,
             prepare=lambda request: (request, prepare(request)),
-            handler=lambda pair: self._carry_out(service.name, pair[0], lambda _: service.handler(pair[1])),
+            handler=lambda pair: self._carry_out(service, pair[0], lambda _: service.handler(pair[1])),
         )
 
-    def _carry_out(self, name: str, value: Any, handler: Callable[[Any], Any]) -> Any:
+    def _begin(self, name: str, goal: Any, begin: Callable[[Any], Any]) -> Any:
         self.requested(name)
-        return self._note(name, value, handler)
+        return self._note(name, goal, begin)
+
+    def _carry_out(self, service: Service, request: Any, handler: Callable[[Any], Any]) -> Any:
+        """Carry out a request; its reply, also one that comes later, contains what `requested` returns."""
+        reply = self._note(service.name, request, handler)
+        warning = self.requested(service.name) if service.commands else ""
+        if not warning:
+            return reply
+        if not isinstance(reply, Future):
+            return _warned(reply, warning)
+        answer: Future[Any] = Future()
+        reply.add_done_callback(lambda done: pass_on(done, answer, lambda value: _warned(value, warning)))
+        return answer
 
     def _note(self, name: str, value: Any, handler: Callable[[Any], Any]) -> Any:
         if self.enabled:
             self.notes.append((REQUEST, json.dumps([name, plain(value)], default=str)))
         return handler(value)
+
+
+def _warned(reply: Any, warning: str) -> Any:
+    """Add a warning to a reply; a refusal, and a reply without a message, stay as they are."""
+    message = getattr(reply, "message", None)
+    if message is None or not getattr(reply, "success", True):
+        return reply
+    return replace(reply, message="; ".join(filter(None, (message, warning))))
 
 
 def _call(handler: Callable[[Any], Any], value: Any) -> Callable[[], Any]:

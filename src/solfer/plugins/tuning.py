@@ -157,6 +157,7 @@ class Tuning:
             handler=self._carry_out,
             prepare=self._prepare,
             quick=True,
+            commands=False,
         )
 
     def getting(self) -> Service:

@@ -60,11 +60,22 @@ def oddity(number: WrittenNumber, scale: RobotScale) -> str:
     unit = number.units[0] if len(number.units) == 1 else ""
     rule = _RULES.get((unit, number.compared))
     what = "" if rule is None else rule(scale, number.value)
-    slip = 1000.0  # of who writes thousandths of a unit
-    if rule is None or what or not number.default or number.value < slip * number.default:
-        return what
+    return what or _beside_default(number, unit)
+
+
+def _beside_default(number: WrittenNumber, unit: str) -> str:
+    """Return that a number is far from the default of its field; empty: it is not, or there is none."""
+    if number.default <= 0.0 or number.value <= 0.0 or (number.units and not unit) or number.compared == "nothing":
+        return ""
     ratio = number.value / number.default
-    return f"{number.value:g} {unit} is {ratio:.4g} times the default, {number.default:g} {unit}"
+    much, little = _SLIPS.get(unit, (_THOUSAND, 0.0))
+    if little < ratio < much:
+        return ""
+    other = _OTHER_UNITS.get(unit)
+    meant = f"; {number.value:g} {other[0]} are {other[1] * number.value:.4g} {unit}" if other else ""
+    written = f"{number.value:g} {unit}".rstrip()
+    usual = f"{number.default:g} {unit}".rstrip()
+    return f"{written} is {ratio:.4g} times the default, {usual}{meant}"
 
 
 @lru_cache(maxsize=8)
@@ -115,6 +126,12 @@ def _wheel(scale: RobotScale, value: float) -> str:
     if value <= 3.0 * scale.wheel:
         return ""
     return f"{value:g} m, and the robot's wheels have a radius of {scale.wheel:.3g} m; {_smaller(value)}"
+
+
+def _radius(scale: RobotScale, value: float) -> str:
+    if math.isinf(scale.wheel) or 3.0 * value >= scale.wheel:
+        return _wheel(scale, value)
+    return f"{value:g} m, and the robot's wheels have a radius of {scale.wheel:.3g} m"
 
 
 def _distance(_: RobotScale, value: float) -> str:
@@ -221,9 +238,28 @@ def _slope(_: RobotScale, value: float) -> str:
     return f"{value:g} deg is more than a turn" if value > 360.0 else ""
 
 
+_THOUSAND = 1000.0  # of who writes thousandths of a unit
+_SLIPS: dict[str, tuple[float, float]] = {
+    "m": (_THOUSAND, 1.001 / _THOUSAND),
+    "deg": (_THOUSAND, 1.0 / 30.0),  # of who writes radians
+    "rad/s": (30.0, 0.0),  # of who writes degrees
+    "rad/s2": (30.0, 0.0),
+    "s": (100.0, 0.0),
+}
+"""How many times the default of its field a number hardly is, by its unit: from, and up to."""
+
+_OTHER_UNITS: dict[str, tuple[str, float]] = {
+    "deg": ("rad", math.degrees(1.0)),
+    "rad/s": ("deg/s", math.radians(1.0)),
+    "rad/s2": ("deg/s2", math.radians(1.0)),
+    "s": ("ms", 1e-3),
+}
+"""What may have been written instead of a unit, and how much of it that is."""
+
 _RULES: dict[tuple[str, str], Rule] = {
     ("m", ""): _length,
     ("m", "wheel"): _wheel,
+    ("m", "radius"): _radius,
     ("m", "world"): _distance,
     ("rad/s", ""): _joint_speed,
     ("deg/s", ""): _degrees_a_second,

@@ -11,7 +11,7 @@ from solfer.simulation.engines import make_engine
 from solfer.simulation.physics import STEP, PhysicsEngine
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
-from solfer.simulation.robot_body.placement import START_ORIGIN, StartPlacement, fix, put
+from solfer.simulation.robot_body.placement import START_ORIGIN, StartPlacement, put
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
 from solfer.simulation.sensors import Sensors
@@ -268,7 +268,7 @@ class Simulation:
             if self.floating:
                 put(self.body, self.world, posture, placement=placement)
             else:
-                fix(self.body, self.world, posture)
+                self.body.place(posture)
         except SimulationError:
             self._engine.restore_state(before)
             raise

@@ -8,11 +8,12 @@ import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.simulation.physics import STEP
+from solfer.simulation.robot_body.placement import sunk
 from solfer.simulation.simulation import Simulation
 
 
 def simulate_for_a_second(bundle: Path) -> str:
-    """Simulate a robot without commands; return how it does not keep its posture, or an empty string.
+    """Simulate a robot without commands; return how it begins wrong or does not keep its posture, or "".
 
     Args:
         bundle: Its bundle, such as config/robots/centauro/robot.yaml.
@@ -23,6 +24,7 @@ def simulate_for_a_second(bundle: Path) -> str:
     sag = 0.1  # [rad, m], by which a joint may give way under the robot's weight
     fallen = math.cos(math.radians(20.0))
     with closing(Simulation.from_file(bundle)) as simulation:
+        inside = sunk(simulation.body, simulation.world)
         begin = simulation.q.copy()
         for _ in range(round(1.0 / STEP)):
             simulation.step()
@@ -32,6 +34,8 @@ def simulate_for_a_second(bundle: Path) -> str:
                 where=str(bundle),
                 expected="gains, masses and inertias that fit each other",
             )
+        if inside:
+            return inside
         base = simulation.kinematics.base_link
         if base is not None and simulation.state.now.rotation(base)[2, 2] < fallen:
             return "the robot falls within 1 s without commands"

@@ -34,15 +34,18 @@ RUNNING = "a plugin that runs, such as by `./run demo` or `roslaunch solfer join
 YOUNG_AGE = 60.0
 """Age up to which such a namespace is kept without a living process [s]: one may be about to begin."""
 
+BEGINNING = 1.0
+"""The same where the last node of this user ends [s]: another one has then made its own folder, but no recording."""
+
 CRASH_AGE = 86400.0
 """Age up to which it is kept without a living process for what a crash left in it [s]."""
 
 
 def namespace_of_master() -> str:
-    """Return the namespace in which the nodes of this ROS master and of this namespace of ROS are recorded."""
+    """Return the namespace for recordings of this user's nodes of this ROS master, and of this namespace of ROS."""
     port = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
     inside = os.environ.get("ROS_NAMESPACE", "")
-    return ".".join((f"{MASTER_PREFIX}{port}", *filter(None, inside.split("/"))))
+    return ".".join((f"{MASTER_PREFIX}{os.geteuid()}.{port}", *filter(None, inside.split("/"))))
 
 
 def place_beside(namespace: str, node: str) -> Path:
@@ -61,13 +64,21 @@ def sweep(own: str, root: Path = SHARED_MEMORY) -> None:
         folder = root / f"{PREFIX}{name}"
         if name != own and name.startswith(MASTER_PREFIX):
             with contextlib.suppress(OSError):
-                if _is_left(folder):
+                if _age(folder) >= YOUNG_AGE and _is_left(folder):
                     shutil.rmtree(folder)
+
+
+def leave(namespace: str, root: Path = SHARED_MEMORY) -> None:
+    """Remove a namespace of a ROS master after the orderly end of its last node."""
+    folder = root / f"{PREFIX}{namespace}"
+    with contextlib.suppress(OSError):
+        if _age(folder / SHARED_FOLDER) >= BEGINNING and _is_left(folder):
+            shutil.rmtree(folder)
 
 
 def _is_left(folder: Path) -> bool:
     status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or _age(folder) < YOUNG_AGE:
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid():
         return False
     files = [each for each in folder.rglob("*") if each.is_file()]
     lives = any(locked(each.with_suffix("")) for each in files if each.suffix == ".lock")

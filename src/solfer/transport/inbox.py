@@ -106,7 +106,7 @@ class Inbox:
                 raise MiddlewareError(self.refusal)
             result = call()
             if isinstance(result, Future):
-                result.add_done_callback(lambda done: _pass_on(done, future))
+                result.add_done_callback(lambda done: pass_on(done, future))
             else:
                 future.set_result(result)
         except BaseException as error:  # belongs to the caller, which gets it from the Future
@@ -115,10 +115,10 @@ class Inbox:
                 raise
 
 
-def _pass_on(done: "Future[Any]", future: "Future[Any]") -> None:
-    """Answer as a call has done that took longer."""
+def pass_on(done: "Future[Any]", future: "Future[Any]", changed: Callable[[Any], Any] = lambda reply: reply) -> None:
+    """Answer as a call has done that took longer, with its reply `changed`."""
     error = done.exception()
     if error is None:
-        future.set_result(done.result())
+        future.set_result(changed(done.result()))
     else:
         future.set_exception(error)

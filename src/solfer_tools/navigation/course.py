@@ -11,6 +11,7 @@ from solfer.numerics.planar_move import turned
 from solfer.transport import BodyMessage, Middleware, Reader, Writer
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.messages import FieldsMessage
+from solfer.transport.topics import Topics
 
 STALE_AGE = 0.5
 """Age from which on what is measured does not count [s]."""
@@ -23,7 +24,7 @@ class Course(abc.ABC):
     """A motion that a navigation publishes, period by period.
 
     Attributes:
-        writers: Where it is published; each needs a subscriber before it begins.
+        writers: Where it is published; each needs a subscriber before it begins, see `unreceived`.
         count: How many steps or waypoints there are.
         ratio: Ratio of the robot's pace, and with it that of the motion's clock, to the published one.
         max_pace: Largest pace that it can go on at.
@@ -36,6 +37,10 @@ class Course(abc.ABC):
     count: int = 0
     ratio: float = 1.0
     max_pace: float = 1.0
+
+    def unreceived(self, topics: Topics) -> Sequence[Writer]:
+        """Return writers of which one still needs a subscriber, so that it cannot begin; none: it can."""
+        return [each for each in self.writers if topics.missing_subscriber(each.topic, each.carries)][:1]
 
     @abc.abstractmethod
     def awaits(self) -> str:

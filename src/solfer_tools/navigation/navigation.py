@@ -55,14 +55,16 @@ class _Subscribers:
             return "the topics of others"
         topics = self._topics.result()
         self._topics = None
-        for writer in self._course.writers:
-            missing = topics.missing_subscriber(writer.topic, writer.carries)
-            if missing is None:
-                continue
+        if lacking := self._course.unreceived(topics):
             if now - self.begin > 30.0:
-                raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
+                missing = [topics.missing_subscriber(each.topic, each.carries) for each in lacking]
+                raise MiddlewareError(
+                    "; ".join(each.what for each in missing if each),
+                    expected=f"a subscriber of {' or '.join(dict.fromkeys(each.carries for each in lacking))}",
+                    names=tuple(dict.fromkeys(name for each in missing if each for name in each.names)),
+                )
             self._lacked = now
-            return f"a subscriber on {writer.topic}"
+            return f"a subscriber on {' or '.join(each.topic for each in lacking)}"
         settling = 0.5  # [s], after which all connections are there for certain
         self._are_connected = now - max(self._lacked, self.begin) >= settling
         return "" if self._are_connected else CONNECTIONS

@@ -1,13 +1,102 @@
-"""Waypoints on `cmd_vel`."""
+"""Waypoints, as velocities of the base or as its positions."""
 
-from solfer.numerics.planar_move import seen_from
-from solfer.transport import Middleware
-from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose, twist
+import abc
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import SizeMismatch
+from solfer.interfaces.support import BASE_PORT, LEAD
+from solfer.interfaces.task_references import REFERENCE_MESSAGES
+from solfer.numerics.planar_move import seen_from, turned
+from solfer.numerics.rotations import quaternion_product
+from solfer.transport import Middleware, Writer
+from solfer.transport.messages import VectorMessage
+from solfer.transport.topics import Topics
+from solfer_tools.navigation.course import CORRECTION_TIME, Course, Localisation, MeasuredPose, heading_of, twist
+from solfer_tools.navigation.reference_course import BegunReference
 from solfer_tools.navigation.waypoints import WaypointFollower
+
+
+class _Drive(abc.ABC):
+    """How velocities of the base reach the target."""
+
+    writer: Writer
+
+    @abc.abstractmethod
+    def awaits(self) -> str:
+        """Return what is missing; empty: nothing."""
+
+    @abc.abstractmethod
+    def publish(self, velocity: tuple[float, float, float], period: float) -> None:
+        """Publish velocities of a period [s], seen from the heading of the base: x, y [m/s], heading [rad/s]."""
+
+
+class _Velocities(_Drive):
+    """Publishes the velocities themselves."""
+
+    def __init__(self, middleware: Middleware, name: str):
+        self.writer = middleware.writer(f"{name}cmd_vel", "geometry_msgs/Twist")
+
+    def awaits(self) -> str:
+        """See `_Drive.awaits`."""
+        return ""
+
+    def publish(self, velocity: tuple[float, float, float], period: float) -> None:
+        """See `_Drive.publish`."""
+        self.writer.write(twist(*velocity))
+
+
+class _Positions(_Drive):
+    """Publishes the pose that results from the velocities, from the target's own reference on.
+
+    It is ahead by the way of `LEAD`, as that of `ScenarioPositions`.
+    """
+
+    def __init__(self, middleware: Middleware, name: str, writer: Writer):
+        self.writer = writer
+        self._begun = BegunReference(middleware, f"{name}get_reference")
+        self._place = np.zeros(3)
+        self._begin: np.ndarray | None = None
+        self._yaw = self._turn = 0.0
+
+    def awaits(self) -> str:
+        """See `_Drive.awaits`.
+
+        Raises:
+            SizeMismatch: The reference is no pose.
+        """
+        if self._begin is None:
+            values = self._begun.values(BASE_PORT)
+            if isinstance(values, str):
+                return values
+            if len(values) != 7:
+                what = f"{len(values)} numbers for '{BASE_PORT}' from {self._begun.service}"
+                raise SizeMismatch(what, expected="7: position and quaternion")
+            self._place = values[:3].copy()
+            self._begin = values[3:]
+            self._yaw = heading_of(self._begin)
+        return ""
+
+    def publish(self, velocity: tuple[float, float, float], period: float) -> None:
+        """See `_Drive.publish`."""
+        if self._begin is None:
+            return
+        x, y, rate = velocity
+        velocity_there = np.array((*turned(self._yaw + self._turn + 0.5 * period * rate, x, y), 0.0))
+        self._place += period * velocity_there
+        self._turn += period * rate
+        half = 0.5 * (self._turn + LEAD * rate)
+        turn = quaternion_product(np.array((0.0, 0.0, math.sin(half), math.cos(half))), self._begin)
+        self.writer.write(VectorMessage("world", np.concatenate((self._place + LEAD * velocity_there, turn))))
 
 
 class WaypointCourse(Course):
     """Follows waypoints with velocities seen from the heading of the base.
+
+    They are published on `cmd_vel`. A target that does not receive these gets the positions that result from them: on
+    `base`, the pipe of a module that drives, or on `base/reference`, that of a task of `inverse_kinematics`.
 
     It ends where the base has come to rest at the last one: a base that lags behind its velocities, as just after its
     start, rolls on and is sent back. In a map it stays until the corrections of the localisation have been followed.
@@ -15,9 +104,10 @@ class WaypointCourse(Course):
     Args:
         middleware: Carries all of it.
         follower: The law.
-        target: Namespace of `cmd_vel`.
+        target: Namespace of the topics.
         odometry: Topic of the odometry.
         localisation: Where its frame is in that of the waypoints; None: they are the same.
+        positions: Whether positions are published, also to a target that receives velocities.
     """
 
     def __init__(
@@ -27,18 +117,40 @@ class WaypointCourse(Course):
         target: str,
         odometry: str,
         localisation: Localisation | None = None,
+        *,
+        positions: bool = False,
     ):
         self._follower = follower
         self._pose = MeasuredPose(middleware, odometry, localisation)
         self._settles = 0.0 if localisation is None else CORRECTION_TIME
         self._rested = 0.0
-        self._twist = middleware.writer(f"{target}/cmd_vel" if target else "cmd_vel", "geometry_msgs/Twist")
-        self.writers = (self._twist,)
+        name = f"{target}/" if target else ""
+        poses = (
+            middleware.writer(f"{name}{BASE_PORT}", "geometry_msgs/PoseStamped"),
+            middleware.declared_writer(f"{name}{BASE_PORT}/reference", REFERENCE_MESSAGES["pose"][0]),
+        )
+        self._drives: list[_Drive] = [_Positions(middleware, name, writer) for writer in poses]
+        if not positions:
+            self._drives.insert(0, _Velocities(middleware, name))
+        self._drive = self._drives[0]
+        self.writers = tuple(each.writer for each in self._drives)
         self.count = len(follower.waypoints)
 
+    def unreceived(self, topics: Topics) -> Sequence[Writer]:
+        """See `Course.unreceived`; the first drive that is received is that of the course."""
+        for each in self._drives:
+            if topics.missing_subscriber(each.writer.topic, each.writer.carries) is None:
+                self._drive = each
+                return ()
+        return self.writers
+
     def awaits(self) -> str:
-        """See `Course.awaits`; without odometry the base stops."""
-        missing = self._pose.awaits()
+        """See `Course.awaits`; without odometry the base stops.
+
+        Raises:
+            SizeMismatch: The target's reference is no pose.
+        """
+        missing = self._pose.awaits() or self._drive.awaits()
         if missing:
             self._follower.stop()
         return missing
@@ -51,7 +163,7 @@ class WaypointCourse(Course):
         moves = follower.step(place, period, pace)
         self._rested = 0.0 if moves else self._rested + period
         x, y, rate = follower.velocity
-        self._twist.write(twist(*seen_from(pose.heading, x, y), rate))
+        self._drive.publish((*seen_from(pose.heading, x, y), rate), period)
         if moves:
             return True
         if self._rested >= self._settles and pose.still >= 0.3:
@@ -62,7 +174,7 @@ class WaypointCourse(Course):
     def rest(self) -> None:
         """See `Course.rest`."""
         self._follower.stop()
-        self._twist.write(twist(0.0, 0.0, 0.0))
+        self._drive.publish((0.0, 0.0, 0.0), 0.0)
 
     @property
     def number(self) -> int:

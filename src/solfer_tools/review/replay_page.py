@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer_tools.review.canvas import (
+    COLUMN_WIDTH,
     FIRST_COLOR,
     FONT_SIZE,
     SECOND_COLOR,
@@ -24,7 +25,9 @@ MAX_REPLAY_ROWS = 8
 """Most numbers on a page."""
 
 
-def replay_page(title: str, times: np.ndarray, tracks: Sequence[tuple[str, np.ndarray, np.ndarray]]) -> "Figure":
+def replay_page(
+    title: str, times: np.ndarray, tracks: Sequence[tuple[str, np.ndarray, np.ndarray]], column: bool = False
+) -> "Figure":
     """Draw numbers as recorded and as replayed, and their differences.
 
     Args:
@@ -32,10 +35,11 @@ def replay_page(title: str, times: np.ndarray, tracks: Sequence[tuple[str, np.nd
         times: Of the cycles, shape (T,) [s].
         tracks: Title, recorded and replayed values of each number, shape (T,); after `MAX_REPLAY_ROWS` they are left
             out.
+        column: Whether the page is for a paper's column.
     """
     shown = tracks[:MAX_REPLAY_ROWS]
-    figure = new_figure(12.0, 0.8 + 1.9 * max(1, len(shown)))
-    grid = iter(time_plots(figure, 2 * len(shown), 2))
+    figure = new_figure(COLUMN_WIDTH if column else 12.0, 0.8 + (3.0 if column else 1.9) * max(1, len(shown)))
+    grid = iter(time_plots(figure, 2 * len(shown), 1 if column else 2))
     for left, right, (name, recorded, replayed) in zip(grid, grid, shown, strict=True):
         draw(left, times, recorded, color=FIRST_COLOR, lw=1.6, label="recorded")
         draw(left, times, replayed, color=SECOND_COLOR, lw=1.0, label="replayed")
@@ -44,5 +48,5 @@ def replay_page(title: str, times: np.ndarray, tracks: Sequence[tuple[str, np.nd
         dress(left, name)
         dress(right, "difference")
     figure.supxlabel("time after the first cycle [s]", fontsize=FONT_SIZE)
-    figure.suptitle(title, fontsize=FONT_SIZE + 3)
+    figure.suptitle(title, fontsize=FONT_SIZE + (0 if column else 3))
     return figure

@@ -11,7 +11,9 @@ from support.bullet import raw_bullet
 from support.unit.chains import chain
 
 from solfer.errors import ModelError, SimulationError
-from solfer.simulation import Simulation, read_bundle
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.trial import simulate_for_a_second
 
 DATA = Path(pybullet_data.getDataPath())
 BODY = """<robot name="pair">
@@ -179,8 +181,10 @@ def test_an_arm_in_the_ground_is_reported(tmp_path, caplog):
     for z, warns in ((-0.05, True), (0.3, False)):
         text = BODY.format(inertial="", inertia=f"{SOUND}</inertial>{shape.format(z=z)}")
         urdf.write_text(text.replace("</collision></inertial>", "</collision>"))
+        wrong = simulate_for_a_second(bundle(tmp_path, "rod.urdf"))
+        assert wrong.startswith("link 'arm' begins 0.250 m inside of the world") == warns
         caplog.clear()
-        run(Simulation.from_file(bundle(tmp_path, "rod.urdf")), 0)
-        assert [text.startswith("link 'arm' begins 0.250 m inside of the world") for text in caplog.messages] == (
-            [True] if warns else []
-        )
+        simulation = Simulation.from_file(bundle(tmp_path, "rod.urdf"))
+        SimulationServer(simulation, MemoryMiddleware(Bus(), "simulator"))
+        assert caplog.messages == ([wrong] if warns else [])
+        simulation.close()

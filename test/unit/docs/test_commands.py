@@ -104,7 +104,7 @@ ELSEWHERE = {
     r"solfer top .*": ("test/ros/config_test.py", '"top"'),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
     r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
-    r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),
+    r"solfer record ros.1000.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),
     r"rosservice call /joint_states/trajectory .*": ("test/ros/motion_test.py", "README.md"),
     r"rosservice call /(upper|lower)_body/trajectory .*": ("test/ros/figure_4_test.py", "shared_control.md"),
     r"roslaunch solfer figure_4.launch motion:=joints namespace:=.*": (

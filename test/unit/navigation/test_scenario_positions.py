@@ -1,4 +1,4 @@
-"""Scenarios as positions, for a base that goes there: it ends where the file says, whatever the machine does."""
+"""Courses as positions, for a base that goes there: it ends where it is sent, whatever the machine does."""
 
 import math
 from collections.abc import Callable
@@ -7,13 +7,20 @@ import numpy as np
 import pytest
 from support.unit.scenarios import made
 
-from solfer.errors import SolferError
+from solfer.errors import MiddlewareError, SolferError
 from solfer.interfaces.declaration import Service
 from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport import BodyMessage, Inbox
 from solfer.transport.messages import FieldsMessage
-from solfer_tools.navigation import Navigation, ScenarioCourse
+from solfer_tools.navigation import (
+    DriveLimits,
+    Navigation,
+    ScenarioCourse,
+    Waypoint,
+    WaypointCourse,
+    WaypointFollower,
+)
 from solfer_tools.scenarios import Player
 
 RATE = 50.0  # [Hz]
@@ -44,6 +51,7 @@ class GuidedBase:
         bus: Where it is.
         heading: At the beginning [rad].
         count: Number of its vertices.
+        topic: Where it receives positions of the base.
 
     Attributes:
         pace: Returns that share, which it publishes.
@@ -53,9 +61,9 @@ class GuidedBase:
         received: Whether it has received positions.
     """
 
-    def __init__(self, bus: Bus, heading: float = 0.0, count: int = 4):
+    def __init__(self, bus: Bus, heading: float = 0.0, count: int = 4, topic: str = "locomotion/base"):
         self._node, self._inbox = MemoryMiddleware(bus, "robot"), Inbox()
-        self._base = self._node.reader("locomotion/base", "geometry_msgs/PoseStamped")
+        self._base = self._node.reader(topic, "geometry_msgs/PoseStamped")
         self._vertices = self._node.reader("locomotion/vertices", "solfer/RobotPoints")
         self._odometry = self._node.writer("odometry/odom", "nav_msgs/Odometry")
         self._pace = self._node.writer("locomotion/pace", "std_msgs/Float64")
@@ -208,3 +216,43 @@ def test_what_positions_cannot_do_is_named(bus, tmp_path):
     GuidedBase(bus, count=3)
     with pytest.raises(SolferError, match="3 vertices of locomotion/get_reference"):
         drive(bus, play(bus, made(tmp_path, PATTERN, **TABLES)))
+
+
+def go(bus, *waypoints, **options):
+    middleware = MemoryMiddleware(bus, "navigation")
+    follower = WaypointFollower([Waypoint(*each) for each in waypoints], DriveLimits())
+    course = WaypointCourse(middleware, follower, "locomotion", "odometry/odom", **options)
+    return Navigation(middleware, course, "navigation", RATE)
+
+
+@pytest.mark.parametrize("options", [{}, {"positions": True}])
+@pytest.mark.parametrize("topic", ["locomotion/base", "locomotion/base/reference"])
+def test_way_points_are_positions_where_these_are_received(bus, topic, options):
+    """From the target's own reference on: a base that has a heading, and one of a task, go where they are sent."""
+    base = GuidedBase(bus, heading=0.7, topic=topic)
+    drive(bus, go(bus, (1.5, 0.4), (1.2, 0.9, -0.5), **options))
+    assert base.received
+    np.testing.assert_allclose(base.pose, (1.2, 0.9, 0.9, -0.5), atol=0.012)
+
+
+def test_positions_are_for_who_receives_no_velocities(bus):
+    velocities = MemoryMiddleware(bus, "driver").reader("locomotion/cmd_vel", "geometry_msgs/Twist")
+    base = GuidedBase(bus)
+    navigation = go(bus, (2.0, 0.0))
+    for _ in range(int(2 * RATE)):
+        bus.run_until(bus.time + 1.0 / RATE)
+        navigation.cycle()
+    assert velocities.read() and velocities.message.fields["linear"]["x"] > 0.1 and not base.received
+
+
+def test_a_target_of_neither_is_one_error(bus):
+    GuidedBase(bus, topic="elsewhere")
+    navigation = go(bus, (2.0, 0.0))
+    with pytest.raises(MiddlewareError) as error:
+        drive(bus, navigation)
+    assert error.value.what == (
+        "no subscriber on locomotion/cmd_vel; no subscriber on locomotion/base; "
+        "no subscriber on locomotion/base/reference"
+    )
+    assert error.value.expected == "a subscriber of geometry_msgs/Twist or geometry_msgs/PoseStamped"
+    assert bus.time == pytest.approx(30.0, abs=1.0)

@@ -81,24 +81,28 @@ def test_an_optional_peer_is_warned_about_once(looking, caplog):
     looking.publish("desired", needed=False)
     looking.after(4.9)
     assert not caplog.messages
+    looking.other.writer("desires", KIND)
     looking.after(30.0)
     assert caplog.messages == ["cart: no subscriber on desired (controller 'pipe', cart.yaml:7:3)"]
-    assert looking.peers.warning() == "" and looking.peers.done
+    assert looking.peers.warning() == "" and not looking.peers.done  # replies to requests say it
 
 
+@pytest.mark.parametrize("after", [2.0, 10.0])
 @pytest.mark.parametrize("is_received", [False, True])
-def test_a_request_without_a_receiver_is_a_warning(looking, caplog, is_received):
-    """Also long after the topic itself was warned about, and not if a subscriber has come since."""
+def test_a_request_without_a_receiver_is_a_warning(looking, caplog, is_received, after):
+    """Also before the topic itself is warned about, and not if a subscriber has come since."""
     looking.publish("desired", needed=False)
-    looking.after(10.0)
+    looking.after(after)
     if is_received:
         looking.other.reader("desired", KIND)
+        looking.after(1.2)
     caplog.clear()
-    looking.peers.note_request("trajectory")
-    looking.after(1.2)
+    reply = looking.peers.note_request("trajectory")
+    looking.after(0.2)
     line = "no subscriber on desired (controller 'pipe', cart.yaml:7:3)"
-    expected = f"cart carries out 'trajectory', but no node receives what it publishes: {line}"
-    assert caplog.messages == ([] if is_received else [expected]) and looking.peers.done
+    expected = f"no node receives what it publishes: {line}"
+    assert reply == ("" if is_received else expected) and looking.peers.done == is_received
+    assert caplog.messages == ([] if is_received else [f"cart carries out 'trajectory', but {expected}"])
 
 
 def test_a_present_peer_is_looked_for_once(looking, caplog, monkeypatch):
@@ -146,7 +150,7 @@ def test_what_the_same_process_receives_counts(looking, caplog, is_received):
     if is_received:
         SpaceMember("other", space, looking.other).reader("desired", KIND)
     looking.after(20.0)
-    assert len(caplog.messages) == 1 - is_received and looking.peers.done
+    assert len(caplog.messages) == 1 - is_received and looking.peers.done == is_received
 
 
 def test_what_is_written_into_a_shared_robot_is_received(looking):

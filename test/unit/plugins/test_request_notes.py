@@ -1,12 +1,13 @@
 """What others ask of a component is noted, and asked again in the same words."""
 
 import json
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
 import pytest
 
 from solfer.errors import UnknownName
-from solfer.interfaces.declaration import Service
+from solfer.interfaces.declaration import Accepted, Service
 from solfer.plugins.requests import RequestNotes
 from solfer.recording.model import REQUEST
 
@@ -56,3 +57,28 @@ def test_what_is_prepared_is_noted_as_asked():
 def test_what_asks_nothing_is_left_alone():
     declaration = object.__new__(type("Other", (), {"name": "other"}))
     assert RequestNotes().noted(declaration) is declaration
+
+
+@pytest.mark.parametrize("commands", [True, False])
+def test_replies_say_that_no_node_receives_what_is_commanded(commands):
+    """Also one that comes later, but no refusal, and no request that moves nothing."""
+    waiting = Future()
+    replies = [Accepted(), Accepted(message="2.5 s"), Accepted(False, "no"), waiting]
+    notes = RequestNotes()
+    notes.requested = lambda name: f"no node receives {name}"
+    handler = notes.noted(
+        Service("scale", "test/Scale", Ask, Accepted, lambda _: replies.pop(0), commands=commands)
+    ).handler
+    answers = [handler(Ask()) for _ in range(4)]
+    waiting.set_result(Accepted(message="late"))
+    answers[3] = answers[3].result(0)
+    warning = "no node receives scale"
+    expected = [warning, f"2.5 s; {warning}", "no", f"late; {warning}"] if commands else ["", "2.5 s", "no", "late"]
+    assert [each.message for each in answers] == expected
+
+
+def test_a_reply_without_a_message_stays_as_it_is():
+    notes = RequestNotes()
+    notes.requested = lambda name: "no node receives it"
+    answer = Ask()
+    assert notes.noted(Service("scale", "test/Scale", Ask, Ask, lambda _: answer)).handler(Ask()) is answer

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from support.plugins.fleet import loaded
 from support.recording.sine import WRENCH, EveryMessage, Pressed, Slow, recorded, tree
 
@@ -91,3 +92,5 @@ def test_other_gain_names_first_cycle_and_joint(recording, tmp_path, capsys):
     assert f"differs first: roll of command/left/position in cycle {started + 1}" in out
     assert "shoulder" not in out
     assert (tmp_path / "out.png").stat().st_size > 1000
+    assert main([*command, "--plot", str(tmp_path / "narrow.png"), "--column"]) == 1
+    assert imread(tmp_path / "narrow.png").shape[1] == 1050  # 3.5 inch of 300 pixels

@@ -13,7 +13,7 @@ from solfer.recording.reader import read
 from solfer.segments.lock import Lock
 from solfer.segments.namespace import Namespace
 from solfer.telemetry.recorder import Recorder
-from solfer.telemetry.recordings import CRASH_AGE, YOUNG_AGE, keep, recordings, sweep
+from solfer.telemetry.recordings import CRASH_AGE, YOUNG_AGE, keep, leave, recordings, sweep
 from solfer.telemetry.rows import RECORDING
 
 
@@ -70,7 +70,7 @@ def test_recordings_of_another_user_are_passed_over(tmp_path):
 def test_what_dead_nodes_of_other_masters_left_is_swept(tmp_path):
     """What a living process owns stays, and the own master's, a layer's, a new one, and a crash of today."""
 
-    def leave(name, age=2.0 * YOUNG_AGE, crash=None):
+    def left(name, age=2.0 * YOUNG_AGE, crash=None):
         """Make a namespace of some age [s] with the lock of a node and, after a crash, its recording."""
         file = Namespace(name, tmp_path).place("recordings", "arm", RECORDING)
         lock = Lock(file)
@@ -81,15 +81,40 @@ def test_what_dead_nodes_of_other_masters_left_is_swept(tmp_path):
         os.utime(tmp_path / f"solfer-{name}", (then, then))
         return lock
 
-    living = leave("ros.1")
+    living = left("ros.1")
     for name in ("ros.2", "ros.3", "layer"):
-        leave(name).release()
-    leave("ros.4", age=0.5 * YOUNG_AGE).release()
-    leave("ros.5", crash=0.5 * CRASH_AGE).release()
-    leave("ros.6", crash=2.0 * CRASH_AGE).release()
+        left(name).release()
+    left("ros.4", age=0.5 * YOUNG_AGE).release()
+    left("ros.5", crash=0.5 * CRASH_AGE).release()
+    left("ros.6", crash=2.0 * CRASH_AGE).release()
     sweep("ros.3", tmp_path)
     kept = sorted(folder.name.removeprefix("solfer-") for folder in tmp_path.iterdir())
     assert kept == ["layer", "ros.1", "ros.3", "ros.4", "ros.5"]
     living.release()
     sweep("ros.3", tmp_path)
     assert not (tmp_path / "solfer-ros.1").exists()
+
+
+def test_the_last_node_of_a_master_leaves_nothing(tmp_path):
+    """Another node that lives, or has just made its folder, keeps all of it; so does what a crash has left."""
+    place = Namespace("ros.0.1", tmp_path).place
+    first, second = (Lock(place("recordings", name, RECORDING)) for name in ("arm", "leg"))
+    folder = tmp_path / "solfer-ros.0.1"
+    first.release()
+    then = time.time() - 2.0
+    os.utime(folder / "recordings", (then, then))
+    leave("ros.0.1", tmp_path)
+    assert folder.exists()
+    second.release()
+    place("recordings", "hand", RECORDING)
+    leave("ros.0.1", tmp_path)
+    assert folder.exists()
+    os.utime(folder / "recordings", (then, then))
+    crash = place("recordings", "head", RECORDING)
+    crash.write_bytes(b"seconds")
+    os.utime(folder / "recordings", (then, then))
+    leave("ros.0.1", tmp_path)
+    assert folder.exists()
+    crash.unlink()
+    leave("ros.0.1", tmp_path)
+    assert not folder.exists()

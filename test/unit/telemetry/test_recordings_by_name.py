@@ -1,5 +1,6 @@
 """What is recorded on this machine, by the names of plugins and namespaces, and the watchdog's loop."""
 
+import os
 from contextlib import ExitStack, closing
 from types import SimpleNamespace
 
@@ -84,14 +85,15 @@ def test_recordings_are_found_by_namespace(record, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("uri", "namespace"),
-    [("http://robot:11399", "ros.11399"), ("http://robot", "ros.11311"), ("", "ros.11311"), (None, "ros.11311")],
+    ("uri", "port"),
+    [("http://robot:11399", 11399), ("http://robot", 11311), ("", 11311), (None, 11311)],
 )
-def test_a_master_has_a_namespace(monkeypatch, uri, namespace):
+def test_a_master_has_a_namespace_for_each_user(monkeypatch, uri, port):
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     if uri is not None:
         monkeypatch.setenv("ROS_MASTER_URI", uri)
     monkeypatch.delenv("ROS_NAMESPACE", raising=False)
+    namespace = f"ros.{os.geteuid()}.{port}"
     assert namespace_of_master() == namespace
     monkeypatch.setenv("ROS_NAMESPACE", "/left/")  # as roslaunch writes it
     assert namespace_of_master() == f"{namespace}.left"

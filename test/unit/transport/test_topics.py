@@ -172,7 +172,7 @@ def test_a_name_is_declared_once():
         bind("base", topics, MemoryWire().middleware, Inbox(), rate=100.0)
 
 
-@pytest.mark.parametrize("rate", [0.0, -5.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("rate", [0, 0.0, -5.0, "50", float("nan"), float("inf")])
 def test_a_rate_is_positive(rate):
     topic = TopicOut("twist", "geometry_msgs/TwistStamped", TwistStamped, print, rate=rate)
     with pytest.raises(ComponentError, match="'base' declares the topic 'base/twist' with a rate of"):

@@ -1,7 +1,7 @@
 """Record what plugins measure, desire and send, on every middleware, to a file that all tools of ROS 2 read.
 
 It drains the memory in which a real-time layer, and each node of a plugin, keeps its last seconds, and slows down none
-of them. Without NAMESPACE and -n: the only namespace that records. Nodes of a ROS master are in `ros.<port>`.
+of them. Without NAMESPACE and -n: the only namespace that records. Nodes of a ROS master are in `ros.<user id>.<port>`.
 """
 
 import argparse

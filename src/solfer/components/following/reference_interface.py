@@ -45,7 +45,12 @@ class ReferenceInterface:
         return (
             Service("reference", "solfer/SetReference", SetReference, reply=Accepted, handler=self.set_reference),
             Service(
-                "get_reference", "solfer/GetReference", GetReference, reply=ReferenceReply, handler=self.get_reference
+                "get_reference",
+                "solfer/GetReference",
+                GetReference,
+                reply=ReferenceReply,
+                handler=self.get_reference,
+                commands=False,
             ),
             Service("ub_reference", "solfer/MovePoint", MovePoint, reply=Accepted, handler=self.move_point),
         )

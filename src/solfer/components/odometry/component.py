@@ -183,7 +183,7 @@ class Odometry(Component):
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/set_base`."""
-        return (Service("set_base", "solfer/SetBase", SetBase, reply=Accepted, handler=self.set_base),)
+        return (Service("set_base", "solfer/SetBase", SetBase, reply=Accepted, handler=self.set_base, commands=False),)
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive `<name>/set_pose`; publish `<name>/pose` with its covariance, diagnostics and, by a tag, tf."""

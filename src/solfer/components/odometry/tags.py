@@ -34,7 +34,7 @@ class OdometryTags(Record):
         "covariances; wheels that slip or are lifted are left out, the gyroscope's bias is estimated, the ground may "
         "rise",
     )
-    wheel_radius: Annotated[float | None, ComparedWith("wheel")] = Field(
+    wheel_radius: Annotated[float | None, ComparedWith("radius")] = Field(
         None, **LENGTH, description="radius of the wheels [m]; default: ring and tube of their contacts"
     )
     filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU measures")

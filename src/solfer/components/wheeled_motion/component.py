@@ -313,7 +313,12 @@ class WheeledMotion(Component):
                 timeout=Lifting.TIMEOUT,
             ),
             Service(
-                "get_reference", "solfer/GetReference", GetReference, reply=ReferenceReply, handler=self.get_reference
+                "get_reference",
+                "solfer/GetReference",
+                GetReference,
+                reply=ReferenceReply,
+                handler=self.get_reference,
+                commands=False,
             ),
         )
 

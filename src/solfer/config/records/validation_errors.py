@@ -140,6 +140,7 @@ def _note_at(
         allowed = [name for each in items for name in _allowed(each)]
         names = nearest(str(place.value), allowed) if isinstance(place.value, str) else ()
         if _lacks_brackets(record, path, items, place.value):
+            expected = expected.replace("a list", "a list of numbers")
             names = [f"[{place.value}]"]
         got = f"a list of {len(place.value)}" if isinstance(place.value, tuple) else place.kind
         problems.add(place.mark, f"expected {expected}, got {got}", names=names)

@@ -113,15 +113,15 @@ def _put_down(
     return obstacles
 
 
-def fix(body: Body, world: World, joints: Sequence[float] | np.ndarray) -> None:
-    """Put a robot with a fixed base at the world's origin, with a warning if its links reach into the world there."""
-    body.place(joints)
+def sunk(body: Body, world: World) -> str:
+    """Return which link of a robot with a fixed base is inside of the world, which pushes it out; empty: none."""
+    if body.floating:
+        return ""
     obstacles, _ = world.under(*body.extent())
     depth, link = body.overlap(obstacles)
-    if depth > 1e-3:  # [m]; a smaller overlap is a matter of rounding
-        logger.warning(
-            "link '%s' begins %.3f m inside of the world, which pushes it out: the base is fixed at z = 0; "
-            "a link below the root of the URDF raises it",
-            link,
-            depth,
-        )
+    if depth <= 1e-3:  # [m]; a smaller overlap is a matter of rounding
+        return ""
+    return (
+        f"link '{link}' begins {depth:.3f} m inside of the world, which pushes it out: the base is fixed at z = 0; "
+        "a link below the root of the URDF raises it"
+    )

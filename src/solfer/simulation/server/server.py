@@ -11,6 +11,7 @@ from solfer.errors import SimulationError
 from solfer.lower_level import LowerLevelServer
 from solfer.simulation.physics import STEP
 from solfer.simulation.rendering.pictures import Pictures
+from solfer.simulation.robot_body.placement import sunk
 from solfer.simulation.sensors import Rates
 from solfer.simulation.server.pace import Pace
 from solfer.simulation.server.publications import publications
@@ -124,6 +125,8 @@ class SimulationServer:
         middleware.serve(OWNER, simulator_services(self), self.inbox.submit)
         self._screenshots = Screenshots(simulation, self.inbox, pictures or Pictures())
         middleware.serve(OWNER, (screenshot_service(self.screenshot),), self._screenshots.submit)
+        if inside := sunk(simulation.body, simulation.world):
+            logger.warning("%s", inside)
 
     def cycle(self) -> None:
         """Receive commands and service calls, make one step unless time stands still, publish what is due.

@@ -70,9 +70,11 @@ def _require_unique(owner: str, declared: Sequence[Declaration]) -> None:
 
 def _require_rates(owner: str, declared: Sequence[Declaration]) -> None:
     for each in declared:
-        if isinstance(each, TopicOut | Action) and each.rate is not None and not 0.0 < each.rate < math.inf:
+        if not isinstance(each, TopicOut | Action) or each.rate is None:
+            continue
+        if not isinstance(each.rate, int | float) or not 0.0 < each.rate < math.inf:
             kind = "topic" if isinstance(each, TopicOut) else "action"
-            what = f"'{owner}' declares the {kind} '{full_name(owner, each.name)}' with a rate of {each.rate:g} Hz"
+            what = f"'{owner}' declares the {kind} '{full_name(owner, each.name)}' with a rate of {each.rate!r:.80} Hz"
             raise ComponentError(what, expected="a positive rate")
 
 

@@ -116,8 +116,8 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
         yield "all inputs were repeated: it is the component that differs, or it reads the clock or random numbers"
 
 
-def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
-    """Draw the numbers that differ; if none does, the first ones.
+def draw(replay: Replay, found: ReplayDifferences, path: Path, column: bool = False) -> None:
+    """Draw the numbers that differ; if none does, the first ones. `column`: for a paper's column.
 
     Raises:
         RecordingError: The picture cannot be written.
@@ -127,16 +127,16 @@ def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:
     recorded = recorded_commands(replay)
     rows = replay.rows
     chosen = [(each.channel, each.column) for each in found.different[:MAX_REPLAY_ROWS]] or [
-        (name, column) for name, channel in replay.commands.items() if name in recorded for column in channel.columns
+        (name, number) for name, channel in replay.commands.items() if name in recorded for number in channel.columns
     ][:MAX_REPLAY_ROWS]
     both = replay.running & rows.running
     tracks = []
-    for name, column in chosen:
-        pair = rows.values(recorded[name], (column,))[:, 0], replay.commands[name].column(column)
+    for name, number in chosen:
+        pair = rows.values(recorded[name], (number,))[:, 0], replay.commands[name].column(number)
         theirs, ours = (np.where(both, values, np.nan) for values in pair)
-        tracks.append((f"{column} of {name}", theirs, ours))
+        tracks.append((f"{number} of {name}", theirs, ours))
     title = f"{rows.plugin} of {Path(rows.where).name}, replayed"
-    save([("replay", replay_page(title, rows.times - rows.times[0], tracks))], path)
+    save([("replay", replay_page(title, rows.times - rows.times[0], tracks, column))], path)
 
 
 def _plugin(recording: Recording, name: str) -> str:

@@ -8,6 +8,8 @@ still. The exit code is 0 if no joint differs, 1 if one does, and 2 after an err
 import argparse
 from pathlib import Path
 
+from solfer.cli.options import add_column
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the sub-command."""
@@ -23,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--limits", action="store_true", help="print what would have been found of each joint, too")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the joints that differ: .png or .pdf")
-    parser.add_argument("--column", action="store_true", help="draw for a paper's column: 3.5 inch wide, 8 pt")
+    add_column(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,6 +8,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from solfer.cli.options import add_column
+
 if TYPE_CHECKING:
     from solfer.recording.model import Recording
     from solfer_tools.review import Figure
@@ -22,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", dest="output", metavar="OUT", type=Path, help="write .png or .pdf (default: open a window)"
     )
-    parser.add_argument("--column", action="store_true", help="draw for a paper's column: 3.5 inch wide, 8 pt")
+    add_column(parser)
 
 
 def run(options: argparse.Namespace) -> int:

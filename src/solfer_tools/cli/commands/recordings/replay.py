@@ -8,7 +8,7 @@ named. The exit code is 0 if all commands are the same, 1 if not, and 2 after an
 import argparse
 from pathlib import Path
 
-from solfer.cli.options import add_system
+from solfer.cli.options import add_column, add_system
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="recorded plugin whose feedback it gets (default: that of the name, or the only)",
     )
     parser.add_argument("--plot", type=Path, metavar="OUT", help="draw the numbers that differ: .png or .pdf")
+    add_column(parser)
     add_system(parser)
 
 
@@ -43,6 +44,6 @@ def run(options: argparse.Namespace) -> int:
     for line in report(replay, found):
         print(line)
     if options.plot is not None:
-        draw(replay, found, options.plot)
+        draw(replay, found, options.plot, column=options.column)
         print(options.plot)
     return 0 if found.same else 1
