@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """How well `wheeled_motion` drives a robot in PyBullet, and how near it is to the original's recorded motions.
 
-Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--count M] [--world FILE]
-[--robot FILE] [--transport FILE] [--estimated] [--model] [--jobs N]`. A course is one of `driving_cases/courses.py`,
-`mixed`, which the seed draws, or a scenario file, which is played from where the robot is; default: all of the first.
-The robot is CENTAURO unless a file names another one. Plugins and PyBullet run in memory, faster than real time;
-progress is on stderr. A line has
+Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--count M] [--world FILE] [--engine
+NAME] [--robot FILE] [--transport FILE] [--estimated] [--model] [--jobs N]`. A course is one of
+`driving_cases/courses.py`, `mixed`, which the seed draws, or a scenario file, which is played from where the robot is;
+default: all of the first. The robot is CENTAURO unless a file names another one. Plugins and PyBullet run in memory,
+faster than real time; progress is on stderr. A line has
 
 - `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
 - `com_rms`, `vertex_rms`, `heading_rms`: errors of base and vertices [m, rad], vertices seen from the pelvis' heading;
@@ -64,6 +64,7 @@ from driving_cases.errors import wrong_robot
 from driving_cases.golden import compare
 from driving_cases.model import drive_model
 from driving_cases.pushes import compare as compare_pushes
+from form import add_engine
 
 from solfer.errors import SolferError, SolferErrors, UnknownName
 from solfer.middleware.memory import read_faults
@@ -140,10 +141,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of errors of the robot, and of `mixed`; 0: no errors")
     parser.add_argument("--count", type=int, default=1, help="of seeds, from that one on")
     parser.add_argument("--world", help="file of the world; default: a plane")
+    add_engine(parser)
     parser.add_argument("--robot", type=Path, help="robot.yaml of another robot, with plugins.yaml beside it")
-    parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between PyBullet and the plugins")
+    parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between simulator and plugins")
     parser.add_argument("--estimated", action="store_true", help="with the base of odometry and sensors that err")
-    parser.add_argument("--model", action="store_true", help="in the model alone, without PyBullet")
+    parser.add_argument("--model", action="store_true", help="in the model alone, without physics")
     parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
     parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")
     parser.add_argument("--jobs", type=int, default=1, help="processes")

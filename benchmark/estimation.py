@@ -2,15 +2,15 @@
 """How well odometry knows where CENTAURO is, and ground forces what carries it, on courses with sensors that err.
 
 Run with `./run exec python benchmark/estimation.py [--json] [--course NAME...] [--seed N] [--noise K] [--draws D]
-[--world FILE] [--transport FILE] [--method NAME...] [--logs DIR] [--jobs N] [--picture FILE]`. A course is one of
-`estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`; the robot follows it by
-where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is written of what joints,
-base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with the errors of
-`config/robots/centauro/robot.yaml`, times K (1 and 3), a cycle late, and radii of the wheels that
-differ by up to 0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D
-times. With `--transport` a file of faults, such as `config/transport/busy.yaml`, is between them and all methods, and
-the loops of these leave cycles out. Methods are those of `odometry`, of which `geometric` is the paper's, and two from
-the literature: `rolling_squares` and `point_contacts`. With `--json` each line is an object; progress is on stderr. The
+[--world FILE] [--engine NAME] [--transport FILE] [--method NAME...] [--logs DIR] [--jobs N] [--picture FILE]`. A course
+is one of `estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`; the robot
+follows it by where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is written of
+what joints, base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with the errors
+of `config/robots/centauro/robot.yaml`, times K (1 and 3), a cycle late, and radii of the wheels that differ by up to
+0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D times. With
+`--transport` a file of faults, such as `config/transport/busy.yaml`, is between them and all methods, and the loops of
+these leave cycles out. Methods are those of `odometry`, of which `geometric` is the paper's, and two from the
+literature: `rolling_squares` and `point_contacts`. With `--json` each line is an object; progress is on stderr. The
 exit code is 1 if `filter` misses a goal at the shipped noise.
 """
 
@@ -31,9 +31,11 @@ from estimation_cases.log import Log
 from estimation_cases.methods import require_topics
 from estimation_cases.picture import draw
 from estimation_cases.play import METHODS, Played
+from form import add_engine
 
 from solfer.errors import SolferError
 from solfer.middleware.memory import read_faults
+from solfer.simulation.engines import default_engine
 from solfer.simulation.world.world import read_world
 from solfer.supervision import supervise
 
@@ -62,6 +64,8 @@ def run(task: Task) -> list[dict[str, Any]]:
     chosen, stem = course_of(task.name, task.seed), Path(task.name).stem
     if task.world is not None:
         chosen, stem = chosen._replace(world=task.world), f"{stem}-{task.world.stem}"
+    if default_engine() != "bullet":
+        stem = f"{stem}-{default_engine()}"
     path, lines = task.logs / f"{stem}-{task.seed}.npz", []
     if not path.is_file():
         print(f"{stem}, seed {task.seed}: drives", file=sys.stderr, flush=True)
@@ -148,6 +152,7 @@ def main() -> int:
     parser.add_argument("--noise", type=float, help="factor of all errors; default: 1 and 3")
     parser.add_argument("--draws", type=int, default=1, help="how often sensors measure each log, of other seeds")
     parser.add_argument("--world", type=Path, help="file of the world; default: that of the course")
+    add_engine(parser)
     parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between sensors and methods")
     parser.add_argument("--method", nargs="+", choices=METHODS, default=METHODS, help="default: all")
     parser.add_argument("--logs", type=Path, metavar="DIR", help="folder in which logs are kept")

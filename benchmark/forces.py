@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """How well `ground_forces` knows what pushes CENTAURO, against PyBullet's contact forces.
 
-Run with `./run exec python benchmark/forces.py [COURSE...] [--seed N] [--noise K] [--count N] [--json]
-[--world FILE]`. Courses: `stand`, `drive` (0.5 m/s), `arms` (at their speed limits), `lifts` (of wheels, `--count`) and
-`push` (100 N at the pelvis, `--count` directions). Plugins, with their shipped configurations, and PyBullet run in
-memory; sensors err as in `config/robots/centauro/robot.yaml`, times K, 2 ms late. Progress is on
-stderr. A line has
+Run with `./run exec python benchmark/forces.py [COURSE...] [--seed N] [--noise K] [--count N] [--json] [--world FILE]
+[--engine NAME]`. Courses: `stand`, `drive` (0.5 m/s), `arms` (at their speed limits), `lifts` (of wheels, `--count`)
+and `push` (100 N at the pelvis, `--count` directions). Plugins, with their shipped configurations, and PyBullet run in
+memory; sensors err as in `config/robots/centauro/robot.yaml`, times K, 2 ms late. Progress is on stderr. A line has
 
 - `wheel_rms`: error of the worst wheel's normal force, `sum_rms`: of their sum, by the weight [%]; truth is the mean
   of the last 5 ms;
@@ -24,6 +23,7 @@ import json
 import sys
 
 from estimation_cases.forces import COURSES, missed, run
+from form import add_engine
 
 
 def main() -> int:
@@ -35,6 +35,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=20, help="lifts and pushes")
     parser.add_argument("--world", help="file of the world; default: a plane")
     parser.add_argument("--json", action="store_true", help="an object for each line")
+    add_engine(parser)
     given = parser.parse_args()
     if unknown := set(given.course) - set(COURSES):
         parser.error(f"no course {', '.join(sorted(unknown))}; expected some of {', '.join(COURSES)}")

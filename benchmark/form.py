@@ -2,7 +2,12 @@
 
 import argparse
 import json
+import os
+from collections.abc import Sequence
 from typing import Any
+
+from solfer.simulation.engines import ENGINE_VARIABLE
+from solfer.simulation.world.records import ENGINES
 
 WIDTH, TITLE = 11, 52
 """Least width of a figure, and that of the title of a row."""
@@ -16,6 +21,18 @@ def parser_of(documentation: str | None) -> argparse.ArgumentParser:
     )
     parser.add_argument("--json", action="store_true", help="print one object a line")
     return parser
+
+
+class _ChosenEngine(argparse.Action):
+    """Chooses the physics engine of this process, and of those that it starts."""
+
+    def __call__(self, parser: Any, namespace: Any, values: str | Sequence[Any] | None, option: Any = None) -> None:
+        os.environ[ENGINE_VARIABLE] = str(values)
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Add `--engine`, for all simulations whose world names none."""
+    parser.add_argument("--engine", choices=ENGINES, action=_ChosenEngine, help="physics engine")
 
 
 class Figures:

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """What inverse dynamics reaches on robots with wheels, soles and points: squats, pushes, and the time of a cycle.
 
-Run with `./run exec python benchmark/inverse_dynamics.py [--json] [--seed N] [--only CASES]`. Each figure is a line,
-with `--json` an object with `case`, `value`, `unit`, `goal` and `met`. The exit code is 1 if a goal is not met. 1 u is
-one `pinocchio.computeAllTerms` on CENTAURO in the same run; cycles are timed by the time of the processor, which other
-work does not lengthen. Robots are pushed at their base, in directions that the seed draws, while their masses are up to
-10 % wrong: with the seeds 1 to 3, or the one that is given. Robots with hands draw a circle with one while they squat;
-CENTAURO does the same once more where odometry
-estimates its base. TALOS and ANYmal come with `requirements-examples.txt`.
+Run with `./run exec python benchmark/inverse_dynamics.py [--json] [--seed N] [--only CASES] [--engine NAME]`. Each
+figure is a line, with `--json` an object with `case`, `value`, `unit`, `goal` and `met`. The exit code is 1 if a goal
+is not met. 1 u is one `pinocchio.computeAllTerms` on CENTAURO in the same run; cycles are timed by the time of the
+processor, which other work does not lengthen. Robots are pushed at their base, in directions that the seed draws, while
+their masses are up to 10 % wrong: with the seeds 1 to 3, or the one that is given. Robots with hands draw a circle with
+one while they squat; CENTAURO does the same once more where odometry estimates its base. TALOS and ANYmal come with
+`requirements-examples.txt`.
 """
 
 import argparse
@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio
+from form import add_engine
 from manipulation import Figure
 from points import ROOT
 from support.integration.carried import with_other_masses
@@ -241,6 +242,7 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="one object a line")
     parser.add_argument("--seed", type=int, help="of directions and wrong masses (default: 1, 2 and 3 in turn)")
     parser.add_argument("--only", default="squat,pushes,cycle", help="cases, with commas (default: %(default)s)")
+    add_engine(parser)
     arguments, is_met = parser.parse_args(), True
     seeds = SEEDS if arguments.seed is None else (arguments.seed,)
     for figure in figures(arguments.only.split(","), seeds):

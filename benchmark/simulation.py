@@ -1,6 +1,6 @@
 """Cost of a simulated millisecond of CENTAURO, in parts, and how much faster than real time it runs unthrottled.
 
-python benchmark/simulation.py [STEPS]
+python benchmark/simulation.py [STEPS] [--engine NAME]
 """
 
 import statistics
@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from form import Figures, parser_of
+from form import Figures, add_engine, parser_of
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.simulation import Simulation, SimulationServer
@@ -49,7 +49,7 @@ def measure_parts(steps: int, figures: Figures) -> None:
         "lower level (impedance law)": Stopwatch(simulation.lower_level, "update"),
         "  inertia M": Stopwatch(simulation.kinematics, "inertia"),
         "write torques and speeds": Stopwatch(simulation.body, "apply"),
-        "stepSimulation": Stopwatch(simulation._engine, "step"),
+        "step of the engine": Stopwatch(simulation._engine, "step"),
         "read state": Stopwatch(simulation.body, "read"),
     }
     for _ in range(steps):
@@ -77,6 +77,7 @@ def measure_factor(steps: int, figures: Figures) -> None:
 if __name__ == "__main__":
     parser = parser_of(__doc__)
     parser.add_argument("steps", nargs="?", type=int, default=5000, help="that are timed (default: %(default)s)")
+    add_engine(parser)
     given = parser.parse_args()
     measure_parts(given.steps, Figures(given.json))
     measure_factor(given.steps, Figures(given.json))

@@ -8,7 +8,8 @@ import pybullet
 from system import numbers
 
 from solfer.model import Description
-from solfer.simulation.bullet.body_urdf import body_urdf
+from solfer.simulation.bullet.robot import READER
+from solfer.simulation.loading.body_urdf import body_urdf
 
 
 class Bullet:
@@ -17,7 +18,7 @@ class Bullet:
     def __init__(self, description: str):
         self.client = pybullet.connect(pybullet.DIRECT)
         with tempfile.TemporaryDirectory() as folder:
-            self.urdf = body_urdf(Description.from_text(description), True, Path(folder))
+            self.urdf = body_urdf(Description.from_text(description), True, Path(folder), reader=READER)
             file = Path(folder, "robot.urdf")
             file.write_text(self.urdf.text)
             self.body = pybullet.loadURDF(str(file), physicsClientId=self.client)

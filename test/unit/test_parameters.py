@@ -32,8 +32,10 @@ KERNELS = {
 }
 """Compiled functions by the names under which they are called."""
 
-FOREIGN = re.compile(r"^(self\._)?(bullet|lapack|struct)\.|(\.|^)(warning|info|error|exception|debug)$|kernel\.")
-"""Calls of others: of PyBullet and LAPACK, which have no names, of `struct`, of loggers, and of kernels by module."""
+FOREIGN = re.compile(
+    r"^(self\._)?(bullet|lapack|struct)\.|\bmujoco\.mj_|(\.|^)(warning|info|error|exception|debug)$|kernel\."
+)
+"""Calls of others: of engines and LAPACK, which have no names, of `struct`, of loggers, of kernels by module."""
 
 
 def test_functions_with_more_parameters_are_few():

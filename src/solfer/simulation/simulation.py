@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from solfer.errors import SimulationError, UnknownName
-from solfer.simulation.bullet import BulletEngine
 from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.engines import make_engine
 from solfer.simulation.physics import STEP, PhysicsEngine
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
@@ -25,9 +25,10 @@ class Simulation:
 
     Args:
         bundle: The robot, and the state in which it begins.
-        gui: Open the window of PyBullet; no effect on `engine`.
+        gui: Open the window of PyBullet; no effect on an `engine` that is there.
         world: What the robot stands on and bumps into.
-        engine: What moves the robot, empty yet; it is closed with the simulation. None: PyBullet.
+        engine: What moves the robot: the name of an engine, or one that is empty yet, which is closed with the
+            simulation; None: the one of the world.
 
     Attributes:
         q, v: Position and velocity of the model's DoFs, those of a floating base included, shape (model size,).
@@ -54,7 +55,7 @@ class Simulation:
         gui: bool = False,
         world: WorldRecord = FLAT_WORLD,
         *,
-        engine: PhysicsEngine | None = None,
+        engine: PhysicsEngine | str | None = None,
     ):
         kinematics = self.kinematics = bundle.kinematics
         drives = bundle.lower_level.drives
@@ -62,7 +63,9 @@ class Simulation:
         self.start = bundle.start
         self._groups = bundle.groups
         self._count = 0
-        self._engine = engine or BulletEngine(gui)
+        if engine is None or isinstance(engine, str):
+            engine = make_engine(engine or world.engine, gui)
+        self._engine = engine
         try:
             self.body = Body(
                 self._engine,
@@ -114,6 +117,8 @@ class Simulation:
         state: str | None = None,
         description_text: str | None = None,
         world: str | Path | None = None,
+        *,
+        engine: str | None = None,
     ) -> "Simulation":
         """Make the simulation of a robot's bundle.
 
@@ -123,13 +128,14 @@ class Simulation:
             state: Named state in which the simulation begins instead of the bundle's own.
             description_text: URDF that is used instead of the bundle's.
             world: File of the world; None: a plane.
+            engine: Name of the physics engine; None: the one of the world.
 
         Raises:
             ConfigError, ModelError, UnknownName: A file of the bundle or of the world is wrong.
             SimulationError: The world or the robot in it cannot be made.
         """
         around = FLAT_WORLD if world is None else read_world(world)
-        simulation = cls(load_bundle(path, description_text), gui, around)
+        simulation = cls(load_bundle(path, description_text), gui, around, engine=engine)
         if state is not None:
             try:
                 simulation.reset(state)

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from solfer.config import FileRecord, Record
 from solfer.config.records.bounds import SEED, Bounds, Name, Offset
+from solfer.simulation.world.records import EngineName
 
 TIME: Bounds = {"ge": 0.0, "le": 1e5}
 """Times of a motion [s]."""
@@ -42,6 +43,7 @@ class SimulationRecord(Record):
 
     robot: Name = Field(default="centauro", description="robot of this package, or the file of one")
     world: Name = Field(default="flat", description="world of this package, or the file of one")
+    engine: EngineName | None = Field(default=None, description="physics engine; default: the one of the world")
     state: Name | None = Field(default=None, description="named state in which it begins")
     transport: FileRecord | None = Field(default=None, description="faults of the transport; default: it has none")
     perfect: bool = Field(default=False, description="whether sensors measure without errors and without delay")

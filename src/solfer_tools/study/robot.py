@@ -35,8 +35,9 @@ def simulation_of(record: SimulationRecord, bundle: BundleRecord, description: s
         SolferError: A link, a state, a world or a part of it does not exist, or the robot cannot be put into it.
     """
     changed = with_masses(description, record)
+    world = _found(record, "world")
     simulation = Simulation.from_file(
-        bundle, gui, record.state, description_text=changed, world=_found(record, "world")
+        bundle, gui, record.state, description_text=changed, world=world, engine=record.engine
     )
     try:
         for name, coefficient in record.friction.items():

@@ -227,14 +227,14 @@ def _warm_up(study: StudyFolder) -> None:
     """Import and load what every run needs, so that all runs of a worker are of one state of the code.
 
     Raises:
-        MissingDependency: PyBullet is missing.
+        MissingDependency: No physics engine is installed.
         SolferError: A configuration is wrong. SolferErrors: Several mistakes.
     """
     import solfer_tools.study.run  # noqa: F401
-    from solfer.simulation.bullet import load_pybullet
+    from solfer.simulation.engines import make_engine
     from solfer_tools.study.simulated_run import rehearse
 
-    load_pybullet()
+    make_engine().close()
     rehearse(study.study.record)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solfer.simulation.bullet.inertia import Inertias
+from solfer.simulation.loading.inertia import Inertias
 
 MOMENTS = np.ones((3, 3)) - np.eye(3)
 

@@ -7,7 +7,8 @@ from xml.etree import ElementTree
 import pytest
 
 from solfer.errors import SimulationError
-from solfer.simulation.bullet.meshes import Meshes
+from solfer.simulation.bullet.robot import READER
+from solfer.simulation.loading.meshes import Meshes
 
 
 def shape(tag, name):
@@ -51,7 +52,7 @@ def robot(tmp_path):
 )
 def test_a_mesh_is_found_from_the_urdf(robot, name):
     collision = shape("collision", name.format(robot=robot))
-    assert Meshes(str(robot / "urdf/robot.urdf"), robot).resolve(collision, "link 'leg'")
+    assert Meshes(str(robot / "urdf/robot.urdf"), robot, READER).resolve(collision, "link 'leg'")
     found = collision.find("geometry/mesh").get("filename")
     assert (robot / "urdf" / found).samefile(robot / "meshes/leg.stl")
 
@@ -65,13 +66,14 @@ def test_a_mesh_is_found_from_the_urdf(robot, name):
 )
 def test_a_missing_collision_mesh_names_the_link(robot, name, expected):
     with pytest.raises(SimulationError, match="is not there") as caught:
-        Meshes(str(robot / "urdf/robot.urdf"), robot).resolve(shape("collision", name), "robot.urdf: link 'arm'")
+        meshes = Meshes(str(robot / "urdf/robot.urdf"), robot, READER)
+        meshes.resolve(shape("collision", name), "robot.urdf: link 'arm'")
     assert caught.value.where == "robot.urdf: link 'arm'"
     assert expected in caught.value.expected
 
 
 def test_missing_visual_shapes_are_logged_once(robot, caplog):
-    meshes = Meshes(str(robot / "urdf/robot.urdf"), robot)
+    meshes = Meshes(str(robot / "urdf/robot.urdf"), robot, READER)
     assert not any(meshes.resolve(shape("visual", "arm.stl"), f"link '{link}'") for link in ("arm", "hand"))
     with caplog.at_level(logging.WARNING):
         meshes.warn()
@@ -87,7 +89,7 @@ def test_missing_visual_shapes_are_logged_once(robot, caplog):
 def test_an_stl_that_pybullet_does_not_read_is_written_for_it(robot, tmp_path, content):
     (robot / "urdf/arm.STL").write_bytes(content)
     (tmp_path / "made").mkdir()
-    meshes = Meshes(str(robot / "urdf/robot.urdf"), tmp_path / "made")
+    meshes = Meshes(str(robot / "urdf/robot.urdf"), tmp_path / "made", READER)
     collision = shape("collision", "arm.STL")
     assert meshes.resolve(collision, "link 'arm'")
     written = tmp_path / "made/0.stl"
@@ -109,7 +111,7 @@ def test_an_stl_that_pybullet_does_not_read_is_written_for_it(robot, tmp_path, c
 )
 def test_a_mesh_in_which_nothing_is_found_is_named(robot, name, content):
     (robot / "urdf" / name).write_bytes(content)
-    meshes = Meshes(str(robot / "urdf/robot.urdf"), robot)
+    meshes = Meshes(str(robot / "urdf/robot.urdf"), robot, READER)
     assert not meshes.resolve(shape("visual", name), "link 'arm'")
     with pytest.raises(SimulationError, match=f"'{name}' of a collision shape has nothing that PyBullet reads"):
         meshes.resolve(shape("collision", name), "link 'arm'")
@@ -119,5 +121,5 @@ def test_other_meshes_stay_where_they_are(robot):
     for name, content in (("a.OBJ", b"v 0 0 1\n"), ("a.dae", b"<COLLADA><float_array id='a'>")):
         (robot / "urdf" / name).write_bytes(content)
         collision = shape("collision", name)
-        assert Meshes(str(robot / "urdf/robot.urdf"), robot).resolve(collision, "link 'arm'")
+        assert Meshes(str(robot / "urdf/robot.urdf"), robot, READER).resolve(collision, "link 'arm'")
         assert collision.find("geometry/mesh").get("filename") == str(robot / "urdf" / name)

@@ -9,9 +9,11 @@ import numpy as np
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
 from solfer.simulation.bullet.base import BulletBase
-from solfer.simulation.bullet.body_urdf import body_urdf
 from solfer.simulation.bullet.client import STDERR, STDOUT, BulletClient, decimal_points, redirected
 from solfer.simulation.bullet.differences import warn_of_differences
+from solfer.simulation.loading.body_urdf import body_urdf
+from solfer.simulation.loading.friction import coefficients
+from solfer.simulation.loading.meshes import MeshReader
 from solfer.simulation.physics import (
     STEP,
     BaseState,
@@ -23,6 +25,10 @@ from solfer.simulation.physics import (
     Vector,
 )
 from solfer.simulation.world.records import Friction
+
+READER = MeshReader(
+    "PyBullet", {".obj": rb"(?m)^\s*v\s", ".dae": rb"<float_array\b"}, "triangles as STL, OBJ or COLLADA"
+)
 
 
 class BulletJoints(JointGroup):
@@ -80,7 +86,7 @@ class BulletRobot(RobotInEngine):
             what = f"the robot has {len(joints)} moving joints, more than PyBullet can take"
             raise SimulationError(what, where=description.where, expected="at most 127")
         with tempfile.TemporaryDirectory() as folder:
-            urdf = body_urdf(description, floats, Path(folder))
+            urdf = body_urdf(description, floats, Path(folder), reader=READER)
             self.owner = urdf.owner
             self.number = self._load(urdf.text, Path(folder, "robot.urdf"), description.where, floats=floats)
         self._name_links(urdf.base, joints)
@@ -207,13 +213,7 @@ class BulletRobot(RobotInEngine):
         self._indices = [by_name[name] for name in joints]
 
     def _set_dynamics(self, friction: Friction, owner: Mapping[str, str]) -> None:
-        unknown = [link for link in friction.links if link not in owner]
-        if unknown:
-            raise SimulationError(
-                f"friction of links that the robot does not have: {', '.join(unknown)}",
-                expected="links that the URDF of the robot has",
-            )
-        coefficients = {owner[link]: value for link, value in friction.links.items()}
+        of_links = coefficients(friction, owner)
         change = self._bullet.changeDynamics
         change(self.number, -1, linearDamping=0.0, angularDamping=0.0)
         # free light links reach Bullet's own default of 100 rad/s
@@ -223,7 +223,7 @@ class BulletRobot(RobotInEngine):
             change(
                 self.number,
                 index,
-                lateralFriction=coefficients.get(link, friction.default),
+                lateralFriction=of_links[link],
                 rollingFriction=0.0,
                 spinningFriction=0.0,
                 restitution=0.0,

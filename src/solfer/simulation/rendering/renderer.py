@@ -11,7 +11,7 @@ from solfer.errors import SimulationError, writing
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
 from solfer.numerics.rotations import rotation_from_quaternion
-from solfer.simulation.bullet import BulletEngine
+from solfer.simulation.engines import make_engine
 from solfer.simulation.physics import CameraView, Pose
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.simulation import Simulation
@@ -58,7 +58,7 @@ class Renderer:
         self._size = (width, height)
         self._angles = (yaw, pitch)
         self._chart = kinematics.base
-        self._engine = BulletEngine()
+        self._engine = make_engine(draws=True)
         self._body = Body(self._engine, description, kinematics, motors=np.zeros(0, dtype=np.intp), friction=Friction())
         self._first = kinematics.size - len(self._body.joints)
         self._world = World(self._engine, world)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -21,7 +21,7 @@ FRICTION: Bounds = {"ge": 0.0, "le": 10.0}
 
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb friction; Bullet multiplies the coefficients of the two bodies that touch.
+    """Coulomb friction; engines multiply the coefficients of the two bodies that touch.
 
     Attributes:
         default: Coefficient of a link of the robot.
@@ -35,6 +35,10 @@ class Friction:
 
 
 GROUND_NAME = "ground"
+
+EngineName = Literal["bullet", "mujoco"]
+ENGINES: tuple[str, ...] = get_args(EngineName)
+"""Names of the physics engines."""
 
 Length = Annotated[float, Field(**LENGTH)]
 Coordinate = Annotated[float, Field(**COORDINATE)]
@@ -79,6 +83,11 @@ class StairsRecord(Record):
 class WorldRecord(Record):
     """The surroundings of a robot. Friction coefficients of bodies that touch are multiplied."""
 
+    engine: EngineName | None = Field(
+        default=None,
+        description="physics engine; default: that of the environment variable SOLFER_ENGINE, or `bullet`, or `mujoco` "
+        "where PyBullet is not installed",
+    )
     ground: GroundRecord = Field(default_factory=GroundRecord, description="the plane below everything")
     stairs: dict[str, StairsRecord] = Field(default_factory=dict, description="stairs by name")
     boxes: dict[str, BoxRecord] = Field(default_factory=dict, description="boxes by name")

@@ -111,8 +111,10 @@ def choices(known: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
     """Return the arguments with few values."""
     # imported here: the command starts before anything else does
     from solfer.config.records.middlewares import MIDDLEWARES
+    from solfer.simulation.world.records import ENGINES
 
     return {
+        "engine": ENGINES,
         "middleware": tuple(MIDDLEWARES),
         "system": ("SM", "HW"),
         "layer": ("NRT", "RT"),

@@ -192,8 +192,8 @@ def _reason(block, is_short, speed):
     steering = 0.0
     for index in range(block.turning_count):
         steering = max(steering, abs(velocity[block.turning[index]]))
-    # a leg is nearly straight whose joint is faster than 0.5 rad/s, 25 rad/m by the speed of the motion, and a quarter
-    # of the speed of joints that steer: wheels that tilt and turn move their legs
+    # a leg is nearly straight whose joint is faster than 0.5 rad/s, 25 rad/m by the speed of the motion and of errors
+    # that go away, and a quarter of the speed of joints that steer: wheels that tilt and turn move their legs
     if fastest > max(0.5, 25.0 * speed, 0.25 * steering):
         return FIRST_ROW + block.watched_count + place, fastest, 1.0
     return NOTHING, 0.0, 0.0
@@ -207,14 +207,16 @@ def _guard(block, is_short, pace, passed):
     state = block.state
     size = 0.0
     along = 0.0
+    speed = 0.0
     for k in range(block.rows):
         size += forward[k] * forward[k]
         along += forward[k] * held[k]
+        speed += (pace * forward[k] + block.away[k]) ** 2
     size = math.sqrt(size)
     if size == 0.0:
         return False
     is_other = along < 0.5 * size  # at an angle of more than 60 degrees to the way that is held
-    why, amount, worst = _reason(block, is_short, pace * size)
+    why, amount, worst = _reason(block, is_short, math.sqrt(speed))
     if why != NOTHING and worst > (1.1 * state[WORST] if state[REASON] != NOTHING and is_other else 0.0):
         state[REASON] = why
         state[AMOUNT] = amount

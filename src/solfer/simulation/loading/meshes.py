@@ -2,7 +2,9 @@
 
 import logging
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -16,17 +18,33 @@ TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribu
 logger = logging.getLogger(__name__)
 
 
+class MeshReader(NamedTuple):
+    """An engine as far as it reads meshes; all read binary STL.
+
+    Attributes:
+        name: Its name.
+        kinds: Suffixes of the other files that it reads, each with a pattern that is in all of them.
+        expected: What it reads, for errors.
+    """
+
+    name: str
+    kinds: Mapping[str, bytes]
+    expected: str
+
+
 class Meshes:
-    """Finds the meshes that a URDF names, see `find_mesh`, and makes PyBullet read them.
+    """Finds the meshes that a URDF names, see `find_mesh`, and makes an engine read them.
 
     Args:
         where: The URDF's file, or another name of its text.
-        folder: Folder for meshes in a format that PyBullet reads.
+        folder: Folder for meshes in a format that the engine reads.
+        reader: The engine.
     """
 
-    def __init__(self, where: str, folder: Path):
+    def __init__(self, where: str, folder: Path, reader: MeshReader):
         self._urdf = where
         self._folder = folder
+        self._reader = reader
         self._absent: list[str] = []
 
     def resolve(self, shape: Element, where: str) -> bool:
@@ -40,7 +58,7 @@ class Meshes:
             False: the mesh of a `<visual>` is missing or not read, so that it has to be left out; `warn` logs it.
 
         Raises:
-            SimulationError: The mesh of a `<collision>` is missing, or PyBullet reads nothing of it.
+            SimulationError: The mesh of a `<collision>` is missing, or the engine reads nothing of it.
             ModelError: The unit of a mesh is no number.
         """
         for mesh in shape.iter("mesh"):
@@ -58,9 +76,9 @@ class Meshes:
                 )
             else:
                 raise SimulationError(
-                    f"the mesh '{name}' of a collision shape has nothing that PyBullet reads",
+                    f"the mesh '{name}' of a collision shape has nothing that {self._reader.name} reads",
                     where=where,
-                    expected="triangles as STL, OBJ or COLLADA",
+                    expected=self._reader.expected,
                 )
         return True
 
@@ -71,15 +89,15 @@ class Meshes:
             logger.warning("visual shapes without their meshes are left out: %s%s", self._absent[0], more)
 
     def _readable(self, path: Path) -> Path | None:
-        """Return the path of a mesh that PyBullet reads: an STL only if it is binary with no byte behind its triangles.
+        """Return the path of a mesh that the engine reads; None: the engine finds nothing in the file.
 
-        None: PyBullet finds nothing in the file.
+        An STL is binary then, with no byte behind its triangles.
         """
         unit_of(path)
         kind = path.suffix.lower()
         content = path.read_bytes()
         if kind != ".stl":
-            contained = {".obj": rb"(?m)^\s*v\s", ".dae": rb"<float_array\b"}  # in each file that PyBullet reads
+            contained = self._reader.kinds
             return path if kind in contained and re.search(contained[kind], content) else None
         size = 84 + TRIANGLE.itemsize * int.from_bytes(content[80:84], "little")
         if len(content) == size > 84:

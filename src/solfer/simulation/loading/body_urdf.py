@@ -1,6 +1,6 @@
-"""The URDF that PyBullet gets: links that cannot move against each other are one link.
+"""The URDF that an engine gets: links that cannot move against each other are one link.
 
-PyBullet gives a link without `<inertial>` the mass 1 kg, and simulates fixed links at the price of moving ones.
+PyBullet gives a link without `<inertial>` the mass 1 kg, and engines simulate fixed links at the price of moving ones.
 """
 
 import copy
@@ -15,8 +15,8 @@ import numpy as np
 from solfer.model.documents import parse
 from solfer.model.urdf.description import Description, JointInfo, LinkInfo
 from solfer.numerics.rotations import rotation_from_rpy
-from solfer.simulation.bullet.inertia import Inertias
-from solfer.simulation.bullet.meshes import Meshes
+from solfer.simulation.loading.inertia import Inertias
+from solfer.simulation.loading.meshes import Meshes, MeshReader
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Transform:
 
 @dataclass(frozen=True)
 class BodyUrdf:
-    """A URDF for PyBullet.
+    """A URDF for an engine.
 
     Attributes:
         text: The URDF.
-        base: Link that is PyBullet's base.
+        base: Link that is the engine's base.
         owner: For each link of the description, the link of the text that it became part of.
     """
 
@@ -54,7 +54,7 @@ class BodyUrdf:
     owner: dict[str, str]
 
 
-def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrdf:
+def body_urdf(description: Description, floating: bool, folder: Path, reader: MeshReader) -> BodyUrdf:
     """Lump all fixed links of a robot, with exact inertia; one that no body has is repaired with a warning.
 
     Args:
@@ -62,6 +62,7 @@ def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrd
         floating: Whether its base floats: a floating joint and what lies above it are dropped. Else a floating joint
             counts as fixed.
         folder: Folder for meshes that have to be written in another format; the URDF names them there.
+        reader: The engine that reads the meshes.
 
     Raises:
         SimulationError: A collision shape's mesh is missing.
@@ -71,7 +72,7 @@ def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrd
     owner = {link: own for own, links in members.items() for link in links}
     robot = Element("robot", name=description.name)
     robot.extend(parse(description.text).findall("material"))
-    meshes = Meshes(description.where, folder)
+    meshes = Meshes(description.where, folder, reader)
     inertias = Inertias(description.where)
     for own, links in members.items():
         link = _link(description, own, links, inertias=inertias)
