@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.modules import forget
 from support.processes import SOURCES
 
 from solfer_tools.cli.main import main
@@ -20,7 +21,7 @@ def test_a_recording_is_replayed_to_the_same_commands(capsys):
 
 
 @pytest.mark.slow
-def test_a_package_of_a_component_passes(repository, tmp_path):
+def test_a_package_of_a_component_passes(repository, tmp_path, monkeypatch):
     """The tests and the configuration of a package that an earlier version wrote still pass."""
     shutil.unpack_archive(FILES / "swing_joint.zip", tmp_path)
     package = tmp_path / "swing_joint"
@@ -28,13 +29,11 @@ def test_a_package_of_a_component_passes(repository, tmp_path):
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
     for name, path in paths.items():
         environment[name] = os.pathsep.join(filter(None, [path, os.environ.get(name)]))
-    for command in (["-m", "pytest", "-q", "."], [repository / "nodes/solfer", "check", "config/swing_joint.yaml"]):
-        done = subprocess.run(
-            [sys.executable, *map(str, command)],
-            cwd=package,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=200,
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
+    command = [sys.executable, "-m", "pytest", "-q", "."]
+    done = subprocess.run(command, cwd=package, env=environment, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stdout + done.stderr
+    monkeypatch.syspath_prepend(package / "src")
+    try:
+        assert main(["check", str(package / "config/swing_joint.yaml")]) == 0
+    finally:
+        forget("swing_joint")

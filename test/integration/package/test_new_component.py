@@ -57,12 +57,11 @@ def test_it_is_drawn_before_it_is_built(package, capsys, caplog):
     assert "SwingJoint" in capsys.readouterr().out and not caplog.records
 
 
-def test_its_configuration_is_right(repository, package, environment):
-    command = [sys.executable, str(repository / "nodes" / "solfer"), "check", "config/swing_joint.yaml"]
-    built = {**environment, "PYTHONPATH": os.pathsep.join([environment["PYTHONPATH"], str(package / "src")])}
-    done = run(command, package, built)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "config/swing_joint.yaml: 1 configuration, no errors, no warnings\n"
+@pytest.mark.usefixtures("importable")
+def test_its_configuration_is_right(package, monkeypatch, capsys):
+    monkeypatch.chdir(package)
+    assert main(["check", "config/swing_joint.yaml"]) == 0
+    assert capsys.readouterr() == ("config/swing_joint.yaml: 1 configuration, no errors, no warnings\n", "")
 
 
 class FileLayer(Layer):

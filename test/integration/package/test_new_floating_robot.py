@@ -48,6 +48,7 @@ def test_a_floating_base_is_free_of_mistakes(floating, capsys):
     assert "point: pose" in capsys.readouterr().out
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("served", [True, False], ids=["simulator", "raw"])
 def test_a_floating_base_follows_its_task(floating, served, repository):
     """The base goes where the page asks it to go, by the truth of the simulation.

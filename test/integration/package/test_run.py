@@ -50,7 +50,7 @@ def test_bytecode_is_kept_whatever_the_caller_sets(repository, tmp_path):
     assert done.stdout == "True\n", done.stderr
 
 
-@pytest.mark.daily(1)
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("text", "finding"),
     [
@@ -68,6 +68,7 @@ def test_check_finds_each_kind_of_mistake(repository, tmp_path, text, finding):
 
 def test_check_goes_on_after_a_mistake(repository, tmp_path):
     done = checked(repository, tmp_path, "import os\nvalue: int = 'one'\n")
+    assert done.returncode == 1
     assert [step for step in ("ruff check", "ruff format", "mypy") if f"solfer: {step}\n" not in done.stderr] == []
     assert all(finding in done.stdout for finding in ("F401", "would be reformatted", "[assignment]"))
 

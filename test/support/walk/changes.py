@@ -10,6 +10,7 @@ from support.walk import benches, estimators, wheels
 from support.walk.files import DATA
 
 from solfer.components.support_shaping import SupportShaping
+from solfer.config.yaml.compose import LOADER
 
 BENCHES: dict[str, Callable[[Path], str]] = {
     bench.__name__: bench
@@ -75,7 +76,7 @@ def _of(part: str) -> dict[str, dict[str, Change]]:
     return {section: dict(_changes(group, Change(benches.layer, {}))) for section, group in TABLE[part].items()}
 
 
-TABLE = yaml.safe_load((DATA / "changes.yaml").read_text())
+TABLE = yaml.load((DATA / "changes.yaml").read_text(), LOADER)
 RUNS = _of("runs")
 REFUSED = {(section, tag): change for section, changes in _of("refused").items() for tag, change in changes.items()}
 ONE_VALUE = {(section, tag): reason for section, tags in TABLE["one_value"].items() for tag, reason in tags.items()}

@@ -7,11 +7,12 @@ from typing import Any
 
 import yaml
 
+from solfer.config.yaml.compose import LOADER
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 
 DATA = Path(__file__).parents[2] / "data" / "walk"
-FILES = {path.stem: yaml.safe_load(path.read_text()) for path in DATA.glob("*.yaml") if path.stem != "changes"}
+FILES = {path.stem: yaml.load(path.read_text(), LOADER) for path in DATA.glob("*.yaml") if path.stem != "changes"}
 FILES["fixed"] = FILES["bundle"] | {"floating_base": False}
 URDF = (DATA / "cart.urdf").read_text()
 SRDF = (DATA / "cart.srdf").read_text()

@@ -51,7 +51,7 @@ def test_the_whole_shipped_file_can_be_used(capsys):
     assert main(["check", str(CENTAURO)]) == 0
     out, err = capsys.readouterr()
     assert re.match(rf"{re.escape(str(CENTAURO))}: \d+ configurations, no errors, ", out)
-    assert "error" not in err
+    assert not err
 
 
 MISTAKES = (
@@ -179,17 +179,12 @@ def test_what_is_logged_twice_is_shown_once(capsys, caplog):
 
 
 @pytest.mark.slow
-def test_the_shipped_file_needs_no_word(capsys):
-    assert main(["check", str(CENTAURO)]) == 0
-    assert not capsys.readouterr().err
-
-
-@pytest.mark.slow
 def test_files_are_found_below_the_search_path(copy, capsys):
     file = copy(("{file: support/NRT.yaml}", "{path: /opt/elsewhere, file: support/NRT.yaml}"))
-    assert main(["check", str(file)]) == 2
+    command = ["check", str(file), "-n", "joint_states"]
+    assert main(command) == 2
     assert "/opt/elsewhere/support/NRT.yaml" in capsys.readouterr().err
-    assert main(["check", str(file), "--search-path", str(file.parent)]) == 0
+    assert main([*command, "--search-path", str(file.parent)]) == 0
 
 
 def test_the_system_may_be_another_one(copy, capsys):

@@ -8,11 +8,12 @@ import pytest
 import yaml
 
 from solfer.config import load
+from solfer.config.yaml.compose import LOADER
 from solfer.errors import SolferError, SolferErrors
 from solfer.plugins import check_file
 
 DATA = Path(__file__).parents[2] / "data"
-MISTAKES = [each for file in sorted((DATA / "mistakes").glob("*.yaml")) for each in yaml.safe_load(file.read_text())]
+MISTAKES = [each for file in sorted((DATA / "mistakes").glob("*.yaml")) for each in yaml.load(file.read_text(), LOADER)]
 
 
 @pytest.fixture
