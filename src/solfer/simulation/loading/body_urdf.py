@@ -78,7 +78,8 @@ def body_urdf(description: Description, floating: bool, folder: Path, reader: Me
         link = _link(description, own, links, inertias=inertias)
         for name, place in links.items():
             where = f"{description.where}: link '{name}'"
-            moved = (_shape(shape, place) for shape in description.links[name].shapes)
+            shapes = [each for each in description.links[name].shapes if reader.draws or each.tag == "collision"]
+            moved = (_shape(shape, place) for shape in shapes)
             link.extend(
                 [shape for shape in moved if meshes.resolve(shape, where)]
             )  # `extend` hides errors of iterators
