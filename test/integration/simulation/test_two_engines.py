@@ -29,7 +29,7 @@ def standing():
 
 
 def test_the_robot_stands_alike(standing):
-    """Joints are equal to 2 mrad, by which the soft friction of MuJoCo lets wheels creep, and forces of wheels to 3 N."""
+    """Joints are equal to 2 mrad, since wheels creep in MuJoCo, and forces of wheels to 3 N."""
     (one, forces), (other, other_forces) = standing.values()
     np.testing.assert_allclose(one, other, atol=2e-3)
     assert forces.keys() == other_forces.keys() == {f"wheel_{leg}" for leg in (1, 2, 3, 4)}
