@@ -69,7 +69,7 @@ class BulletEngine(PhysicsEngine):
         (x, y, z), orientation = pose
         middle = 0.5 * float(heights.min() + heights.max())
         body = self._add(0.0, shape, NO_SHAPE, pose=((x, y, z + middle), orientation), friction=friction)
-        bullet.changeVisualShape(body, -1, rgbaColor=colour)
+        bullet.changeVisualShape(body, -1, rgbaColor=colour, textureUniqueId=-1)  # without its blue squares
         return body
 
     def add_tiles(self, size: Sequence[float], colours: Iterable[Colour]) -> list[int]:
