@@ -197,6 +197,7 @@ def simulation(folder: Path) -> str:
             bodies = [bullet.getBodyUniqueId(index, client) for index in range(bullet.getNumBodies(client))]
             digest.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
             digest.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])
+            digest.add([bullet.getAABB(body, -1, client) for body in bodies])
             digest.add([bullet.getCollisionShapeData(body, -1, client) for body in bodies])
             digest.add([robot.q, robot.v, robot.torque, robot._groups, robot.lower_level, robot.body.links])
             digest.add([server.inbox, server._lower_level])

@@ -112,7 +112,8 @@ class MujocoWorld:
 
     def probe(self) -> Any:
         """Compute where all bodies are, in a state of its own that knows no forces, and return it."""
-        np.copyto(self._probe.qpos, self.data.qpos)
+        places = self.data.qpos
+        np.copyto(self._probe.qpos, places)
         self.mujoco.mj_kinematics(self._model, self._probe)
         return self._probe
 
