@@ -123,8 +123,11 @@ def _binary(text: bytes) -> bytes:
         corners = np.array(vertices).astype("<f4").reshape(-1, 3, 3)
     except ValueError:
         return b""
-    if not len(corners):
-        return b""
+    return binary_stl(corners) if len(corners) else b""
+
+
+def binary_stl(corners: np.ndarray) -> bytes:
+    """Write triangles, shape (n, 3, 3) [m], as a binary STL without normals, which readers compute."""
     triangles = np.zeros(len(corners), TRIANGLE)
     triangles["corners"] = corners
     return bytes(80) + len(corners).to_bytes(4, "little") + triangles.tobytes()
