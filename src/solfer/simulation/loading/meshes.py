@@ -132,11 +132,19 @@ def _binary(text: bytes) -> bytes:
         corners = np.array(vertices).astype("<f4").reshape(-1, 3, 3)
     except ValueError:
         return b""
+<<<<<<< HEAD
     return _stl(corners) if len(corners) else b""
 
 
 def _stl(corners: np.ndarray) -> bytes:
     """Write triangles, shape (n, 3, 3) [m], as a binary STL."""
+=======
+    return binary_stl(corners) if len(corners) else b""
+
+
+def binary_stl(corners: np.ndarray) -> bytes:
+    """Write triangles, shape (n, 3, 3) [m], as a binary STL without normals, which readers compute."""
+>>>>>>> mjcf
     triangles = np.zeros(len(corners), TRIANGLE)
     triangles["corners"] = corners
     return bytes(80) + len(corners).to_bytes(4, "little") + triangles.tobytes()
