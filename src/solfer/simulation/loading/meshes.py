@@ -103,7 +103,7 @@ class Meshes:
             if kind in contained and re.search(contained[kind], content):
                 return path
             triangles = triangles_of(path) if kind in self._reader.converted else ()
-            return self._written(_stl(np.array(triangles))) if len(triangles) else None
+            return self._written(binary_stl(np.array(triangles))) if len(triangles) else None
         size = 84 + TRIANGLE.itemsize * int.from_bytes(content[80:84], "little")
         if len(content) == size > 84:
             return path
@@ -132,19 +132,11 @@ def _binary(text: bytes) -> bytes:
         corners = np.array(vertices).astype("<f4").reshape(-1, 3, 3)
     except ValueError:
         return b""
-<<<<<<< HEAD
-    return _stl(corners) if len(corners) else b""
-
-
-def _stl(corners: np.ndarray) -> bytes:
-    """Write triangles, shape (n, 3, 3) [m], as a binary STL."""
-=======
     return binary_stl(corners) if len(corners) else b""
 
 
 def binary_stl(corners: np.ndarray) -> bytes:
     """Write triangles, shape (n, 3, 3) [m], as a binary STL without normals, which readers compute."""
->>>>>>> mjcf
     triangles = np.zeros(len(corners), TRIANGLE)
     triangles["corners"] = corners
     return bytes(80) + len(corners).to_bytes(4, "little") + triangles.tobytes()

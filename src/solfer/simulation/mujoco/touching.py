@@ -31,10 +31,10 @@ class Touching(IntEnum):
         shape.condim = 3
         shape.priority = 1 if self == Touching.ROBOT else 0
         # Measured on CENTAURO, docs/measurements/engines.md: it sinks in by 0.2 mm. Wheels that roll leave the ground,
-        # at 51 Hz, with 0.97 or more in place of 0.95, and where friction is stiffer than the normal force; with less
+        # at 51 Hz, with 0.93 or more in place of 0.9, and where friction is stiffer than the normal force; with less
         # they creep sideways.
         shape.solref[:] = 0.004, 1.0
-        shape.solimp[:] = 0.95, 0.95, 0.001, 0.5, 2.0
+        shape.solimp[:] = 0.9, 0.9, 0.001, 0.5, 2.0
 
 
 class Frictions:
