@@ -107,8 +107,9 @@ def add_robot_files(parser: argparse.ArgumentParser, source: bool = False) -> No
         where.add_argument(
             "--from",
             dest="source",
-            metavar="COLLECTION:NAME",
-            help="a robot of example-robot-data, pybullet_data or robot_descriptions",
+            metavar="SOURCE",
+            help="a robot as MJCF (FILE.xml), or COLLECTION:NAME of example-robot-data, pybullet_data or "
+            "robot_descriptions",
         )
     parser.add_argument("--srdf", type=Path, metavar="FILE", help="the robot's SRDF")
 

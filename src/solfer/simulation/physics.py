@@ -219,6 +219,17 @@ class PhysicsEngine(Protocol):
     def add_box(self, size: Sequence[float], pose: Pose, mass: float, friction: float, colour: Colour) -> int:
         """Add a box with these edges [m]; return its number. Without mass it does not move."""
 
+    def add_grid(self, heights: np.ndarray, spacing: float, pose: Pose, friction: float, colour: Colour) -> int:
+        """Add a surface that does not move; return its number. What is below it is not solid.
+
+        Args:
+            heights: Its z at the corners of squares, rows along its x of numbers along its y, shape (n, m) [m].
+            spacing: Edges of the squares [m]; each is two triangles.
+            pose: Its middle, and its axes, of which z is that of the world.
+            friction: Friction coefficient.
+            colour: Its colour.
+        """
+
     def add_tiles(self, size: Sequence[float], colours: Iterable[Colour]) -> list[int]:
         """Add boxes with these edges [m] that can only be seen, one for each colour; return their numbers."""
 

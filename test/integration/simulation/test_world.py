@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from solfer.errors import ModelError, SimulationError, UnknownName
+from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.simulation import Simulation
 from solfer.simulation.robot_body.placement import StartPlacement
+from solfer.simulation.world.records import ENGINES
 
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 ROBOT, WORLDS = CONFIG / "robots/centauro/robot.yaml", CONFIG / "worlds"
@@ -153,6 +155,21 @@ def test_it_is_put_on_what_is_under_it():
         simulation.reset(placement=StartPlacement(x=x))
         assert simulation.body.position[0] == pytest.approx(x, abs=1e-6)
         assert simulation.body.position[2] - ground == pytest.approx(height, abs=2e-5)
+    simulation.close()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_stands_on_uneven_ground(engine):
+    """It begins upright at its first contact, and settles on four wheels that carry its weight."""
+    simulation = Simulation.from_file(ROBOT, world=WORLDS / "uneven.yaml", engine=engine)
+    begin = simulation.body.position[2]
+    run(simulation, 1.0)
+    assert simulation.contact_links() == WHEELS
+    assert 0.0 < begin - simulation.body.position[2] < 0.05
+    upright = rotation_from_quaternion(simulation.body.orientation)[2, 2]
+    assert np.degrees(np.arccos(upright)) < 5.0
+    weight = simulation.kinematics.mass * 9.81
+    np.testing.assert_allclose(sum(simulation.contacts().values()), [0.0, 0.0, weight], atol=0.03 * weight)
     simulation.close()
 
 

@@ -22,6 +22,7 @@ from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
 from solfer.realtime.schedule import ScheduleRequest
 from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.bullet import BulletEngine
 from solfer.simulation.bundle import load_bundle, read_bundle
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
 from solfer.simulation.server.publications import robot_parameters
@@ -193,11 +194,13 @@ def simulation(folder: Path) -> str:
             for _ in range(STEPS):
                 command.write(JointMessage(("roll",), velocity=np.array([2.0])))
                 server.cycle()
-            bullet, client, *_ = raw_bullet(robot)
-            bodies = [bullet.getBodyUniqueId(index, client) for index in range(bullet.getNumBodies(client))]
-            digest.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
-            digest.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])
-            digest.add([bullet.getCollisionShapeData(body, -1, client) for body in bodies])
+            if isinstance(robot._engine, BulletEngine):
+                bullet, client, *_ = raw_bullet(robot)
+                bodies = [bullet.getBodyUniqueId(index, client) for index in range(bullet.getNumBodies(client))]
+                digest.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
+                digest.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])
+                digest.add([bullet.getAABB(body, -1, client) for body in bodies])
+                digest.add([bullet.getCollisionShapeData(body, -1, client) for body in bodies])
             digest.add([robot.q, robot.v, robot.torque, robot._groups, robot.lower_level, robot.body.links])
             digest.add([server.inbox, server._lower_level])
     return digest.text()

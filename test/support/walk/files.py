@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from solfer.config.yaml.compose import LOADER
@@ -41,6 +42,7 @@ def write(folder: Path, changes: Mapping[str, Any]) -> None:
         path.unlink()
     for name, text in ROBOT.items():
         (folder / name).write_text(text)
+    np.save(folder / "hill", [[0.0, 0.1], [0.2, 0.5]])
     (folder / "soft").mkdir(exist_ok=True)
     files = FILES
     for place, value in changes.items():

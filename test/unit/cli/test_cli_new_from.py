@@ -1,13 +1,17 @@
-"""`solfer new robot --from`: robots of collections."""
+"""`solfer new robot --from`: robots of collections, and of MJCF."""
 
 import sys
+from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pybullet_data
 import pytest
 
 from solfer.errors import MissingDependency
+from solfer.simulation import Simulation
 from solfer.simulation.bundle import read_bundle
+from solfer.simulation.mujoco import load_mujoco
 from solfer_tools.cli.main import main
 from solfer_tools.cli.skeletons import collections
 
@@ -51,10 +55,18 @@ def test_a_robot_that_no_collection_has(source, message, capsys, folder):
     assert not list(folder.iterdir())
 
 
+BIPED = """<mujoco><worldbody><body name="trunk" pos="0 0 1"><freejoint/><geom type="box" size="0.1 0.2 0.1" mass="5"/>
+  <body name="left" pos="0 0.1 0"><joint name="left_hip" axis="0 1 0" range="-1 1"/>
+    <joint name="left_ankle" axis="1 0 0" range="-1 1" pos="0 0 -0.3"/>
+    <geom type="box" size="0.15 0.08 0.02" pos="0 0 -0.4" mass="1"/></body>
+  <body name="right" pos="0 -0.1 0"><joint name="right_hip" axis="0 1 0" range="-1 1"/>
+    <geom type="box" size="0.15 0.08 0.02" pos="0 0 -0.4" mass="1"/></body></body></worldbody>
+  <keyframe><key name="home" qpos="0 0 0 1 0 0 0 0.01 0 0.01"/></keyframe></mujoco>"""
+
 DESCRIPTIONS = {
     "__init__": "",
     "arm_description": "URDF_PATH = {urdf!r}",
-    "mujoco_description": "MJCF_PATH = 'a.xml'",
+    "mujoco_description": "MJCF_PATH = {mjcf!r}",
     "far_description": "raise OSError('Cmd(git) failed\\nCould not resolve host: github.com')",
 }
 
@@ -63,7 +75,7 @@ DESCRIPTIONS = {
     "name, message",
     [
         ("arm_description", ""),
-        ("mujoco_description", "the robot has no URDF"),
+        ("mujoco_description", ""),
         (
             "far_description",
             "robot_descriptions cannot get the robot: Could not resolve host: github.com\n  expected: the",
@@ -75,8 +87,10 @@ def test_a_robot_of_robot_descriptions(name, message, folder, tmp_path_factory, 
     package = tmp_path_factory.mktemp("packages") / f"robot_descriptions_of_{name}"
     package.mkdir()
     urdf = str(Path(pybullet_data.getDataPath(), "xarm/xarm6_robot.urdf"))
+    mjcf = package / "biped.xml"
+    mjcf.write_text(BIPED)
     for module, text in DESCRIPTIONS.items():
-        (package / f"{module}.py").write_text(text.format(urdf=urdf))
+        (package / f"{module}.py").write_text(text.format(urdf=urdf, mjcf=str(mjcf)))
     monkeypatch.syspath_prepend(str(package.parent))
     monkeypatch.setattr(collections, "DESCRIPTIONS_PACKAGE", package.name)
     monkeypatch.setattr(collections, "COLLECTIONS", (package.name,))
@@ -97,5 +111,51 @@ def test_a_collection_that_is_not_installed(collection, monkeypatch):
     monkeypatch.setattr(collections.importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(collections.importlib, "import_module", nothing)
     with pytest.raises(MissingDependency, match=f"{collection} is not installed") as caught:
-        collections.find_in_collection(f"{collection}:arm")
+        collections.find_robot(f"{collection}:arm")
     assert caught.value.expected == f"{sys.executable} -m pip install {collection}"
+
+
+@pytest.mark.needs("simulation")
+@pytest.mark.parametrize("name", ["biped.xml", "biped.mjcf"])
+def test_a_robot_of_an_mjcf(name, folder, capsys):
+    """The package has the URDF, begins in the keyframe `home`, and `solfer check` finds nothing to say of it."""
+    (folder / name).write_text(BIPED)
+    assert main(["new", "robot", "biped", "--from", name]) == 0
+    assert "the robot biped of 9 DoFs" in capsys.readouterr().out
+    with closing(Simulation.from_file(folder / "biped/config/robots/biped/robot.yaml")) as simulation:
+        np.testing.assert_allclose(simulation.q[6:], (0.01, 0.0, 0.01), atol=1e-3)
+    assert main(["check", "biped/config/biped.yaml"]) == 0
+    assert "no errors, no warnings" in capsys.readouterr().out
+
+
+@pytest.mark.needs("simulation")
+def test_an_srdf_replaces_the_keyframes_of_an_mjcf(folder, caplog):
+    (folder / "biped.xml").write_text(BIPED)
+    state = '<group_state name="low" group="g"><joint name="left_hip" value="0"/></group_state>'
+    (folder / "own.srdf").write_text(f'<robot name="a"><group name="g"><joint name="left_hip"/></group>{state}</robot>')
+    assert main(["new", "robot", "biped", "--from", "biped.xml", "--srdf", "own.srdf"]) == 0
+    assert "its keyframes are left out: --srdf has the states" in caplog.text
+    assert not list(folder.glob("biped/**/*.srdf"))
+
+
+def test_a_urdf_that_is_called_xml(folder):
+    source = Path(pybullet_data.getDataPath(), "xarm/xarm6_robot.urdf").read_text()
+    (folder / "arm.xml").write_text(source)
+    assert main(["new", "robot", "arm", "--from", "arm.xml"]) == 0
+    assert Path(read_bundle(folder / "arm/config/robots/arm/robot.yaml").urdf.location).samefile(folder / "arm.xml")
+
+
+def test_an_mjcf_without_mujoco(folder, monkeypatch, capsys):
+    (folder / "biped.xml").write_text(BIPED)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    load_mujoco.cache_clear()
+    assert main(["new", "robot", "biped", "--from", "biped.xml"]) == 2
+    assert "the simulation needs MuJoCo\n  expected: " in capsys.readouterr().err
+    assert not (folder / "biped").exists()
+    load_mujoco.cache_clear()
+
+
+@pytest.mark.parametrize("name", ["absent.xml", "absent.mjcf"])
+def test_a_file_that_is_not_there(name, folder, capsys):
+    assert main(["new", "robot", "arm", "--from", name]) == 2
+    assert f"error: {name}: the URDF cannot be read: No such file" in capsys.readouterr().err

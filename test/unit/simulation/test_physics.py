@@ -314,6 +314,96 @@ def test_boxes_stand_are_put_and_stopped(engine):
     engine.set_friction(crate, 0.2)
 
 
+GRID = np.array([[0.0, 0.1, 0.3, 0.2], [0.05, 0.2, 0.1, 0.4], [0.3, 0.1, 0.0, 0.6]]) + 1.0
+"""Heights that differ along both axes, in squares of half a metre [m]."""
+
+
+def add_grid(engine, heights, spacing=0.5, pose=((0.0, 0.0, 0.0), UPRIGHT)):
+    return engine.add_grid(heights, spacing, pose, friction=1.0, colour=GREY)
+
+
+def lowered(robot, body, place):
+    """Put a ball above a place and move it down by its distance until it touches; return the point that it touches."""
+    height = 3.0
+    for _ in range(500):
+        robot.place_base((*place, height), UPRIGHT)
+        nearest = min(robot.closest_points(body, 5.0), key=lambda point: point.distance)
+        if abs(nearest.distance) < 1e-6:
+            break
+        height -= nearest.distance
+    return nearest.position
+
+
+def heights_at(x, y):
+    """Interpolate GRID linearly in the triangles by both diagonals; (x, y) in squares from its first height."""
+    i, j = min(int(x), 1), min(int(y), 2)
+    u, v = x - i, y - j
+    low, right, up, far = GRID[i, j], GRID[i + 1, j], GRID[i, j + 1], GRID[i + 1, j + 1]
+    rising = low + u * (right - low) + v * (far - right) if u > v else low + v * (up - low) + u * (far - up)
+    falling = low + u * (right - low) + v * (up - low)
+    if u + v > 1.0:
+        falling = far + (1.0 - u) * (up - far) + (1.0 - v) * (right - far)
+    return rising, falling
+
+
+@pytest.mark.parametrize("place", [(0.1, 0.1), (-0.3, -0.6), (0.35, 0.55), (-0.2, 0.4), (0.3, -0.3)])
+def test_a_ball_touches_a_grid_where_its_heights_are(engine, place):
+    """A turned and moved grid is the same one in its own axes."""
+    yaw = 0.5
+    turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    pose = (2.0, -1.0, 0.3), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
+    body = add_grid(engine, GRID, pose=pose)
+    x, y, z = lowered(load_ball(engine, 1.0), body, turn @ place + pose[0][:2])
+    own = (np.array([x, y]) - pose[0][:2]) @ turn / 0.5 + (1.0, 1.5)
+    assert min(abs(z - 0.3 - height) for height in heights_at(*own)) < 2e-3
+
+
+def test_a_grid_has_the_extent_of_its_heights(engine):
+    low, high = engine.box_around(add_grid(engine, GRID))
+    assert low[:2] == pytest.approx((-0.5, -0.75), abs=0.02) and low[2] <= 1.001
+    assert high == pytest.approx((0.5, 0.75, 1.6), abs=0.02)
+
+
+def test_a_ball_rests_in_a_bowl(engine):
+    x, y = np.meshgrid(*[np.arange(-10, 11) * 0.1] * 2, indexing="ij")
+    add_grid(engine, 0.5 * (abs(x) + abs(y)), spacing=0.1)
+    robot = load_ball(engine, 1.0)
+    robot.place_base((0.0, 0.0, 0.15), UPRIGHT)
+    run(engine, 1000)
+    state = robot.base_state()
+    assert np.linalg.norm(state.linear) < 0.01
+    np.testing.assert_allclose(state.position, (0.0, 0.0, 0.1 * math.sqrt(1.5)), atol=2e-3)
+
+
+def test_a_ball_rolls_down_a_slanted_grid(engine):
+    """As on a plane: its squares have no edges that brake it."""
+    angle = 0.1
+    heights = math.tan(angle) * 0.1 * np.repeat(np.arange(61.0)[:, None], 11, axis=1)
+    add_grid(engine, heights, spacing=0.1, pose=((-3.0, 0.0, 0.0), UPRIGHT))
+    robot = load_ball(engine, 1.0)
+    robot.place_base(np.array([-1.0, 0.03, 5.0 * math.tan(angle)]) + np.multiply(slope(angle), 0.1), UPRIGHT)
+    run(engine, 1000)
+    speed = np.linalg.norm(robot.base_state().linear)
+    assert speed == pytest.approx(5.0 / 7.0 * GRAVITY * math.sin(angle), rel=0.02)
+
+
+def test_a_ball_falls_into_a_gap_between_grids(engine):
+    for y in (-1.0, 1.0):
+        add_grid(engine, np.zeros((3, 3)), pose=((0.0, y, 0.0), UPRIGHT))
+    robot = load_ball(engine, 1.0)
+    for y, falls in ((0.0, True), (0.8, False), (-0.8, False)):
+        robot.place_base((0.2, y, 0.1), UPRIGHT)
+        run(engine, 500)
+        assert (robot.base_state().position[2] < -0.5) == falls
+
+
+def test_a_camera_sees_a_grid(engine):
+    engine.add_grid(GRID, 0.5, ((0.0, 0.0, 0.0), UPRIGHT), friction=1.0, colour=(1.0, 0.0, 0.0, 1.0))
+    picture = engine.render(CameraView((0.0, 0.0, 1.2), 2.0, 0.0, pitch=-90.0, field_of_view=60.0, size=(40, 30)))
+    red, green, _ = picture.colours[15, 20].astype(int)
+    assert red > green + 50 and not picture.is_empty[15, 20] and picture.is_empty[0, 0]
+
+
 def test_a_camera_sees_colours_and_distances(engine):
     engine.add_tiles((1.0, 1.0, 0.2), [(1.0, 0.0, 0.0, 1.0)])
     picture = engine.render(CameraView((0.0, 0.0, 0.1), 2.0, 0.0, pitch=-90.0, field_of_view=60.0, size=(40, 30)))

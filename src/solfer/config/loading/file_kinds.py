@@ -7,9 +7,10 @@ _KINDS = (
     ({"urdf"}, "the bundle of a robot", "`solfer view --robot {file}`, which loads it"),
     ({"plugins", "configuration"}, "a study", "`solfer study {file} --dry`, which checks it"),
     ({"base now"}, "a scenario", "`solfer scenario {file}`, which checks it"),
-    ({"ground"}, "a world", "`rosrun solfer simulator --world {file}`, which loads it"),
-    ({"boxes"}, "a world", "`rosrun solfer simulator --world {file}`, which loads it"),
-    ({"stairs"}, "a world", "`rosrun solfer simulator --world {file}`, which loads it"),
+    *(
+        ({key}, "a world", "`rosrun solfer simulator --world {file}`, which loads it")
+        for key in ("ground", "grids", "stairs", "boxes")
+    ),
     ({"topics"}, "the faults of a transport", "`solfer study` of a study that names it"),
 )
 """Keys that a kind of file has at its top, what it is, and what would have been right."""

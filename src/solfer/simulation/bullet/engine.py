@@ -55,6 +55,23 @@ class BulletEngine(PhysicsEngine):
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half)
         return self._add(mass, shape, self._seen(half, colour), pose=pose, friction=friction)
 
+    def add_grid(self, heights: np.ndarray, spacing: float, pose: Pose, friction: float, colour: Colour) -> int:
+        """See `PhysicsEngine.add_grid`; PyBullet has the origin halfway between the lowest and the highest point."""
+        bullet = self._bullet
+        rows, columns = heights.shape
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_HEIGHTFIELD,
+            meshScale=[spacing, spacing, 1.0],
+            heightfieldData=heights.T.ravel().tolist(),
+            numHeightfieldRows=rows,
+            numHeightfieldColumns=columns,
+        )
+        (x, y, z), orientation = pose
+        middle = 0.5 * float(heights.min() + heights.max())
+        body = self._add(0.0, shape, NO_SHAPE, pose=((x, y, z + middle), orientation), friction=friction)
+        bullet.changeVisualShape(body, -1, rgbaColor=colour, textureUniqueId=-1)  # without its blue squares
+        return body
+
     def add_tiles(self, size: Sequence[float], colours: Iterable[Colour]) -> list[int]:
         """See `PhysicsEngine.add_tiles`."""
         half = [edge / 2.0 for edge in size]

@@ -26,9 +26,7 @@ from solfer.simulation.physics import (
 )
 from solfer.simulation.world.records import Friction
 
-READER = MeshReader(
-    "PyBullet", {".obj": rb"(?m)^\s*v\s", ".dae": rb"<float_array\b"}, "triangles as STL, OBJ or COLLADA"
-)
+READER = MeshReader("PyBullet", ((".obj", rb"(?m)^\s*v\s"), (".dae", rb"<float_array\b")))
 
 
 class BulletJoints(JointGroup):

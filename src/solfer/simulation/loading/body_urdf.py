@@ -5,6 +5,7 @@ PyBullet gives a link without `<inertial>` the mass 1 kg, and engines simulate f
 
 import copy
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -36,7 +37,7 @@ class Transform:
 
     def origin(self) -> dict[str, str]:
         """Format the attributes of a URDF `<origin>`."""
-        return {"xyz": _text(self.translation), "rpy": _text(_rpy(self.rotation))}
+        return {"xyz": text_of(self.translation), "rpy": text_of(_rpy(self.rotation))}
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,8 @@ def body_urdf(description: Description, floating: bool, folder: Path, reader: Me
         link = _link(description, own, links, inertias=inertias)
         for name, place in links.items():
             where = f"{description.where}: link '{name}'"
-            moved = (_shape(shape, place) for shape in description.links[name].shapes)
+            shapes = [each for each in description.links[name].shapes if reader.draws or each.tag == "collision"]
+            moved = (_shape(shape, place) for shape in shapes)
             link.extend(
                 [shape for shape in moved if meshes.resolve(shape, where)]
             )  # `extend` hides errors of iterators
@@ -111,7 +113,7 @@ def _link(description: Description, own: str, members: dict[str, Transform], ine
     """Make a link with the inertia of all its members, without shapes."""
     link = Element("link", name=own)
     mass, com, inertia = _lump([(description.links[name], place) for name, place in members.items()])
-    link.append(_inertial(mass, com, inertias.physical(own, mass, inertia) if mass > 0.0 else inertia))
+    link.append(inertial(mass, com, inertias.physical(own, mass, inertia) if mass > 0.0 else inertia))
     return link
 
 
@@ -134,9 +136,10 @@ def _lump(parts: list[tuple[LinkInfo, Transform]]) -> tuple[float, np.ndarray, n
     return mass, com, inertia
 
 
-def _inertial(mass: float, com: np.ndarray, inertia: np.ndarray) -> Element:
+def inertial(mass: float, com: np.ndarray, inertia: np.ndarray) -> Element:
+    """Make an `<inertial>`: mass [kg], centre (3,) [m], inertia about it (3, 3) [kg m^2] in the axes of the link."""
     element = Element("inertial")
-    SubElement(element, "origin", xyz=_text(com), rpy="0 0 0")
+    SubElement(element, "origin", xyz=text_of(com), rpy="0 0 0")
     SubElement(element, "mass", value=repr(float(mass)))
     upper = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -165,24 +168,27 @@ def _joint(joint: JointInfo, parent: str, place: Transform) -> Element:
     SubElement(element, "parent", link=parent)
     SubElement(element, "child", link=joint.child)
     SubElement(element, "origin", (place @ Transform.from_rpy(joint.xyz, joint.rpy)).origin())
-    SubElement(element, "axis", xyz=_text(joint.axis))
+    SubElement(element, "axis", xyz=text_of(joint.axis))
     limits = {name: getattr(joint, name) for name in ("lower", "upper", "effort", "velocity")}
     SubElement(element, "limit", {name: repr(float(value)) for name, value in limits.items() if value is not None})
     return element
 
 
 def _rpy(rotation: np.ndarray) -> tuple[float, float, float]:
-    """Compute roll, pitch, yaw [rad] of Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 if only its sum with roll is defined."""
+    """Compute roll, pitch, yaw [rad] of Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 if only its sum with roll is defined.
+
+    Roll is what the yaw leaves, so that both are exact together where each of them is not, near a pitch of 90 degrees.
+    """
     cosine = math.hypot(rotation[0, 0], rotation[1, 0])
-    pitch = math.atan2(-rotation[2, 0], cosine)
-    if cosine < 1e-9:
-        return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
-    return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if cosine >= 1e-9 else 0.0
+    across = math.cos(yaw) * rotation[1] - math.sin(yaw) * rotation[0]
+    return math.atan2(-across[2], across[1]), math.atan2(-rotation[2, 0], cosine), yaw
 
 
 def _numbers(text: str | None) -> tuple[float, ...]:
     return tuple(float(word) for word in text.split()) if text else (0.0, 0.0, 0.0)
 
 
-def _text(values: np.ndarray | tuple[float, ...]) -> str:
-    return " ".join(repr(float(value)) for value in values)
+def text_of(values: Iterable[float]) -> str:
+    """Format numbers as an attribute of XML, exactly."""
+    return " ".join(repr(float(value) + 0.0) for value in values)  # no -0.0

@@ -2,7 +2,6 @@
 
 import logging
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -10,6 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from solfer.errors import SimulationError
+from solfer.model.collisions.mesh_triangles import triangles_of
 from solfer.model.urdf.mesh_files import PACKAGE_SCHEME, find_mesh, mesh_candidates, unit_of
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -24,12 +24,14 @@ class MeshReader(NamedTuple):
     Attributes:
         name: Its name.
         kinds: Suffixes of the other files that it reads, each with a pattern that is in all of them.
-        expected: What it reads, for errors.
+        converted: Suffixes of those that are written as STL for it.
+        draws: Whether it has to read the shapes by which robots are seen.
     """
 
     name: str
-    kinds: Mapping[str, bytes]
-    expected: str
+    kinds: tuple[tuple[str, bytes], ...]
+    converted: tuple[str, ...] = ()
+    draws: bool = True
 
 
 class Meshes:
@@ -78,7 +80,7 @@ class Meshes:
                 raise SimulationError(
                     f"the mesh '{name}' of a collision shape has nothing that {self._reader.name} reads",
                     where=where,
-                    expected=self._reader.expected,
+                    expected="triangles as STL, OBJ or COLLADA",
                 )
         return True
 
@@ -97,14 +99,21 @@ class Meshes:
         kind = path.suffix.lower()
         content = path.read_bytes()
         if kind != ".stl":
-            contained = self._reader.kinds
-            return path if kind in contained and re.search(contained[kind], content) else None
+            contained = dict(self._reader.kinds)
+            if kind in contained and re.search(contained[kind], content):
+                return path
+            triangles = triangles_of(path) if kind in self._reader.converted else ()
+            return self._written(binary_stl(np.array(triangles))) if len(triangles) else None
         size = 84 + TRIANGLE.itemsize * int.from_bytes(content[80:84], "little")
         if len(content) == size > 84:
             return path
         content = content[:size] if len(content) > size > 84 else _binary(content)
         if not content:
             return None
+        return self._written(content)
+
+    def _written(self, content: bytes) -> Path:
+        """Write an STL to the folder."""
         written = self._folder / f"{len(list(self._folder.iterdir()))}.stl"
         written.write_bytes(content)
         return written
@@ -123,8 +132,11 @@ def _binary(text: bytes) -> bytes:
         corners = np.array(vertices).astype("<f4").reshape(-1, 3, 3)
     except ValueError:
         return b""
-    if not len(corners):
-        return b""
+    return binary_stl(corners) if len(corners) else b""
+
+
+def binary_stl(corners: np.ndarray) -> bytes:
+    """Write triangles, shape (n, 3, 3) [m], as a binary STL without normals, which readers compute."""
     triangles = np.zeros(len(corners), TRIANGLE)
     triangles["corners"] = corners
     return bytes(80) + len(corners).to_bytes(4, "little") + triangles.tobytes()

@@ -56,6 +56,20 @@ class MujocoEngine(PhysicsEngine):
         """See `PhysicsEngine.add_box`."""
         return self._add(pose, friction, mass=mass, **self._box(size, colour))
 
+    def add_grid(self, heights: np.ndarray, spacing: float, pose: Pose, friction: float, colour: Colour) -> int:
+        """See `PhysicsEngine.add_grid`. MuJoCo begins at the lowest point, and has a plate below it."""
+        rows, columns = heights.shape
+        name = f"grid {len(self._bodies)}"
+        lowest = float(heights.min())
+        height = max(float(heights.max()) - lowest, 1e-6)  # [m]; MuJoCo wants one, also where all is level
+        plate = 0.1  # [m]; what sinks in by more than half of it comes out below
+        half = 0.5 * spacing * (rows - 1), 0.5 * spacing * (columns - 1)
+        self._world.spec.add_hfield(
+            name=name, size=(*half, height, plate), nrow=columns, ncol=rows, userdata=heights.T.ravel()
+        )
+        kind = self._mujoco.mjtGeom.mjGEOM_HFIELD
+        return self._add(pose, friction, type=kind, hfieldname=name, pos=(0.0, 0.0, lowest), rgba=colour, group=SEEN)
+
     def add_tiles(self, size: Sequence[float], colours: Iterable[Colour]) -> list[int]:
         """See `PhysicsEngine.add_tiles`."""
         pose = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)

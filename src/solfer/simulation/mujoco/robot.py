@@ -17,7 +17,7 @@ from solfer.simulation.loading.friction import coefficients
 from solfer.simulation.loading.meshes import MeshReader
 from solfer.simulation.mujoco.motors import RIGID
 from solfer.simulation.mujoco.shapes import box_around, closest_points
-from solfer.simulation.mujoco.touching import ROBOT, Touching
+from solfer.simulation.mujoco.touching import BODY, LINK, ROBOT, Touching
 from solfer.simulation.mujoco.world import MujocoWorld, Push
 from solfer.simulation.physics import (
     STEP,
@@ -30,7 +30,7 @@ from solfer.simulation.physics import (
 )
 from solfer.simulation.world.records import Friction
 
-READER = MeshReader("MuJoCo", {".obj": rb"(?m)^\s*v\s"}, "triangles as STL or OBJ")
+READER = MeshReader("MuJoCo", ((".obj", rb"(?m)^\s*v\s"),), converted=(".dae",))
 
 
 class MujocoJoints(JointGroup):
@@ -82,7 +82,7 @@ class MujocoRobot(RobotInEngine):
         self._world = world
         self.number = len(world.bodies)
         with tempfile.TemporaryDirectory() as folder:
-            urdf = body_urdf(description, floats, Path(folder), reader=READER)
+            urdf = body_urdf(description, floats, Path(folder), reader=READER._replace(draws=draws))
             text, assets = _with_assets(urdf.text, draws=draws)
         self.owner = urdf.owner
         of_links = coefficients(friction, urdf.owner)
@@ -98,9 +98,9 @@ class MujocoRobot(RobotInEngine):
                 expected="a robot that MuJoCo can load",
             ) from error
         self._find(urdf.base, joints, floats=floats)
-        world.bodies.append(ROBOT + urdf.base)
+        world.bodies.append(BODY + urdf.base)
         for link in self.links:
-            world.set_friction(ROBOT + link, of_links[link])
+            world.set_friction(BODY + link, of_links[link])
 
     def joint_states(self) -> SimulatedJoints:
         """See `RobotInEngine.joint_states`."""
@@ -173,7 +173,7 @@ class MujocoRobot(RobotInEngine):
 
     def set_friction(self, link: str, coefficient: float) -> None:
         """See `RobotInEngine.set_friction`."""
-        self._world.set_friction(ROBOT + self.owner[link], coefficient)
+        self._world.set_friction(BODY + self.owner[link], coefficient)
 
     def push(self, link: str, force: Sequence[float], torque: Sequence[float], position: Sequence[float]) -> None:
         """See `RobotInEngine.push`."""
@@ -187,11 +187,11 @@ class MujocoRobot(RobotInEngine):
     def closest_points(self, body: int, reach: float, link: str | None = None) -> list[ClosestPoint]:
         """See `RobotInEngine.closest_points`."""
         only = self.links if link is None else (link,)
-        return closest_points(self._world, [ROBOT + link for link in only], self._world.bodies[body], reach=reach)
+        return closest_points(self._world, [BODY + link for link in only], self._world.bodies[body], reach=reach)
 
     def box_around(self) -> tuple[np.ndarray, np.ndarray]:
         """See `RobotInEngine.box_around`."""
-        return box_around(self._world, [ROBOT + link for link in self.links])
+        return box_around(self._world, [BODY + link for link in self.links])
 
     def center_of_mass(self) -> np.ndarray:
         """See `RobotInEngine.center_of_mass`."""
@@ -206,7 +206,7 @@ class MujocoRobot(RobotInEngine):
         """Read a URDF, for bodies with motors, without contacts among them, with a base that is free."""
         spec = self._world.mujoco.MjSpec.from_string(text, assets=assets)
         if floats:
-            spec.body(base).add_freejoint(name=FREE)
+            spec.body(LINK + base).add_freejoint(name=FREE)
         for joint in spec.joints:
             joint.solref_limit[:] = 2.0 * STEP, 1.0
             joint.solimp_limit[:] = RIGID
@@ -229,7 +229,7 @@ class MujocoRobot(RobotInEngine):
         self._floating = None if free is None else (int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free]))
         own = dict.fromkeys(self.owner.values())
         self.links = (*(link for link in own if link != base), base)
-        self._numbers = {link: int(model.body(ROBOT + link).id) for link in self.links}
+        self._numbers = {link: int(model.body(BODY + link).id) for link in self.links}
 
 
 FREE = "the base's freedom"
@@ -237,8 +237,15 @@ FREE = "the base's freedom"
 
 
 def _with_assets(text: str, draws: bool) -> tuple[str, dict[str, bytes]]:
-    """Read the meshes of a URDF, which it names by numbers then, and add how MuJoCo compiles it."""
+    """Read the meshes of a URDF, which it names by numbers then, and add how MuJoCo compiles it.
+
+    Links get a prefix: MuJoCo has a body `world` of its own.
+    """
     robot = ElementTree.fromstring(text)
+    for link in robot.findall("link"):
+        link.set("name", LINK + link.get("name", ""))
+    for end in (*robot.iter("parent"), *robot.iter("child")):
+        end.set("link", LINK + end.get("link", ""))
     compiler = {"fusestatic": "false", "alignfree": "false", "discardvisual": "false" if draws else "true"}
     SubElement(SubElement(robot, "mujoco"), "compiler", compiler)
     assets = {}

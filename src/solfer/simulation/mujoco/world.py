@@ -53,7 +53,6 @@ class MujocoWorld:
         option.timestep = STEP
         option.integrator = self.mujoco.mjtIntegrator.mjINT_EULER
         option.cone = self.mujoco.mjtCone.mjCONE_ELLIPTIC
-        option.impratio = 10.0  # friction is that much stiffer than the normal force: wheels do not creep
         option.tolerance = 1e-10
         option.disableflags |= self.mujoco.mjtDisableBit.mjDSBL_AUTORESET  # the simulation finds a divergence
         self.bodies: list[str] = []
@@ -113,7 +112,8 @@ class MujocoWorld:
 
     def probe(self) -> Any:
         """Compute where all bodies are, in a state of its own that knows no forces, and return it."""
-        np.copyto(self._probe.qpos, self.data.qpos)
+        places = self.data.qpos
+        np.copyto(self._probe.qpos, places)
         self.mujoco.mj_kinematics(self._model, self._probe)
         return self._probe
 

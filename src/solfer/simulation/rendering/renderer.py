@@ -118,7 +118,9 @@ class Renderer:
         self._engine.close()
 
     def _make_floor(self) -> list[int]:
-        """Add tiles below the plane of the ground, which are visual only; return their bodies."""
+        """Add tiles below the plane of the ground, if there is one, which are visual only; return their bodies."""
+        if not self._world.record.ground.exists:
+            return []
         pair = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
         colours = [pair[(row + column) % 2] for row in range(TILE_COUNT) for column in range(TILE_COUNT)]
         return self._engine.add_tiles((TILE_SIZE, TILE_SIZE, TILE_HEIGHT), colours)

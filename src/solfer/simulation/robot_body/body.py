@@ -15,8 +15,8 @@ from solfer.simulation.robot_body.base import FloatingBase
 from solfer.simulation.robot_body.motors import BodyMotors
 from solfer.simulation.world.records import Friction
 
-SEARCH_DISTANCE = 100.0
-"""How far away other bodies are searched for [m]."""
+SEARCH_DISTANCES = (0.005, 0.05, 0.5, 100.0)
+"""How far away other bodies are searched for, one after the other [m]: of a grid, each triangle is a find."""
 
 
 class Body:
@@ -89,8 +89,11 @@ class Body:
 
     def distance(self, others: Sequence[int]) -> float:
         """Compute the distance to the nearest of other bodies [m]; negative in an overlap, infinity without any."""
-        found = (self.robot.closest_points(other, SEARCH_DISTANCE) for other in others)
-        return min((point.distance for points in found for point in points), default=math.inf)
+        for reach in SEARCH_DISTANCES:
+            found = [point.distance for other in others for point in self.robot.closest_points(other, reach)]
+            if found:
+                return min(found)
+        return math.inf
 
     def near(self, other: int, reach: float) -> np.ndarray:
         """Find the points on the body that are not farther than `reach` [m] from another one, shape (n, 3) [m]."""

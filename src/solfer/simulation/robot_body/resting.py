@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
-from solfer.simulation.robot_body.body import SEARCH_DISTANCE, Body
+from solfer.simulation.robot_body.body import SEARCH_DISTANCES, Body
 
 TOUCH_HEIGHT = 1e-4
 """Height up to which a point counts as touching the ground [m]."""
@@ -66,7 +66,7 @@ def resting_orientation(
 
 def _lowest(body: Body, ground: int, normal: np.ndarray) -> np.ndarray:
     """Find the lowest points of the robot above a plane with this normal, shape (n, 3) [m]."""
-    points = body.near(ground, SEARCH_DISTANCE)
+    points = body.near(ground, SEARCH_DISTANCES[-1])
     heights = points @ normal
     return points[heights < heights.min() + TOUCH_HEIGHT]
 

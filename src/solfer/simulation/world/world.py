@@ -10,10 +10,13 @@ from solfer.config import read
 from solfer.config.yaml.files import located
 from solfer.errors import UnknownName
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_rpy
-from solfer.simulation.physics import PhysicsEngine, Pose
-from solfer.simulation.world.records import GROUND_NAME, BoxRecord, StairsRecord, WorldRecord
+from solfer.simulation.physics import Colour, PhysicsEngine, Pose
+from solfer.simulation.world.grids import Grid
+from solfer.simulation.world.records import GROUND_NAME, BoxRecord, GridRecord, StairsRecord, WorldRecord
 
 FLAT_WORLD = WorldRecord()
+COLOUR: Colour = (0.58, 0.55, 0.50, 1.0)
+"""What is seen of a world."""
 
 
 def find_world(name: str) -> Path:
@@ -35,9 +38,12 @@ def read_world(path: str | Path) -> WorldRecord:
     """Read the file of a world.
 
     Raises:
-        ConfigError, UnknownName, SolferErrors: The file is missing, or something in it is wrong.
+        ConfigError, UnknownName, SolferErrors: The file or one of its grids is missing, or something in them is wrong.
     """
-    return read(path, WorldRecord)
+    world = read(path, WorldRecord)
+    for grid in world.grids.values():
+        Grid(grid)
+    return world
 
 
 class World:
@@ -58,10 +64,13 @@ class World:
         self._slope = record.ground.slope
         self._bodies: dict[str, list[int]] = {}
         self._movable: list[tuple[int, Pose]] = []
-        if ground_friction is not None:
+        self._grids: dict[int, Grid] = {}
+        if ground_friction is not None and record.ground.exists:
             given = record.ground.friction
             normal = [-math.sin(self._slope), 0.0, math.cos(self._slope)]
             self._bodies[GROUND_NAME] = [engine.add_plane(normal, ground_friction if given is None else given)]
+        for name, grid in record.grids.items():
+            self._bodies[name] = [self._grid(grid)]
         for name, stairs in record.stairs.items():
             self._bodies[name] = [self._box(step) for step in steps_of(stairs)]
         for name, box in record.boxes.items():
@@ -125,6 +134,11 @@ class World:
             for body in ids:
                 if name == GROUND_NAME:
                     top = math.tan(self._slope) * (high[0] if self._slope > 0.0 else low[0])
+                elif body in self._grids:
+                    highest = self._grids[body].top(low, high)
+                    if highest is None:
+                        continue
+                    top = highest
                 else:
                     (x, y, _), (far_x, far_y, top) = self._engine.box_around(body)
                     if x > high[0] or far_x < low[0] or y > high[1] or far_y < low[1]:
@@ -135,10 +149,16 @@ class World:
 
     def _box(self, box: BoxRecord) -> int:
         pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))
-        colour = (0.58, 0.55, 0.50, 1.0)
-        body = self._engine.add_box(box.size, pose, box.mass or 0.0, friction=box.friction, colour=colour)
+        body = self._engine.add_box(box.size, pose, box.mass or 0.0, friction=box.friction, colour=COLOUR)
         if box.mass is not None:
             self._movable.append((body, pose))
+        return body
+
+    def _grid(self, record: GridRecord) -> int:
+        grid = Grid(record)
+        pose = record.position, quaternion_from_rotation(rotation_from_rpy((0.0, 0.0, record.yaw)))
+        body = self._engine.add_grid(grid.heights, record.spacing, pose, friction=record.friction, colour=COLOUR)
+        self._grids[body] = grid
         return body
 
 

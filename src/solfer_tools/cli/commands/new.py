@@ -5,7 +5,8 @@ launch file, and a test that passes at once and needs no ROS master. Change the 
 
 `solfer new robot NAME --urdf FILE` makes one for a robot: the file that describes it, a configuration with one plugin
 that moves its joints, a launch file, and a test that simulates it. `--from COLLECTION:NAME` takes a robot of
-example-robot-data, pybullet_data or robot_descriptions instead of a file.
+example-robot-data, pybullet_data or robot_descriptions instead, `--from FILE.xml` one that MJCF describes,
+which becomes a URDF.
 """
 
 import argparse
@@ -62,11 +63,23 @@ def _write_component(name: str, folder: Path, options: argparse.Namespace) -> No
 
 
 def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
-    from solfer_tools.cli.skeletons.collections import find_in_collection
+    from solfer.simulation.mujoco.mjcf import convert_mjcf, is_mjcf
+    from solfer_tools.cli.skeletons.collections import find_robot
     from solfer_tools.cli.skeletons.robot import RobotSkeleton
 
-    urdf = options.urdf if options.source is None else find_in_collection(options.source)
-    skeleton = RobotSkeleton(name, folder, urdf, srdf=options.srdf, floating_base=options.floating_base)
+    urdf = options.urdf if options.source is None else find_robot(options.source)
+    srdf = options.srdf
+    made: dict[str, bytes] = {}
+    if options.source is not None and is_mjcf(urdf):
+        made = convert_mjcf(urdf, name)
+        urdf = Path(f"{name}.urdf")
+        states = Path(f"{name}.srdf")
+        if states.name in made and srdf is None:
+            srdf = states
+        elif states.name in made:
+            del made[states.name]
+            logger.warning("%s: its keyframes are left out: --srdf has the states", options.source)
+    skeleton = RobotSkeleton(name, folder, urdf, srdf=srdf, floating_base=options.floating_base, made=made)
     skeleton.write()
     _simulate(skeleton.bundle)
     print(f"{folder} is a catkin package now, with the robot {name} of {skeleton.dofs} DoFs.\n")

@@ -15,19 +15,25 @@ DESCRIPTIONS_PACKAGE = "robot_descriptions"
 COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS_PACKAGE)
 
 
-def find_in_collection(source: str) -> Path:
-    """Find the URDF of a robot.
+SUFFIXES = (".xml", ".mjcf", ".urdf")
+"""Ends of files that are named in place of a collection."""
+
+
+def find_robot(source: str) -> Path:
+    """Find the URDF or the MJCF of a robot.
 
     Args:
-        source: `COLLECTION:NAME`. The name is that of the URDF without its end, with its folders where several have
-            one name, or, of robot_descriptions, that of the module.
+        source: A file, or `COLLECTION:NAME`. The name is that of the URDF without its end, with its folders where
+            several have one name, or, of robot_descriptions, that of the module.
 
     Raises:
         UnknownName: There is no such collection, or it has no such robot.
         MissingDependency: The collection is not installed.
         ModelError: The name stands for several files, or robot_descriptions cannot get the robot.
     """
-    collection, _, name = source.partition(":")
+    collection, colon, name = source.partition(":")
+    if not colon and source.lower().endswith(SUFFIXES):
+        return Path(source)
     if collection not in COLLECTIONS:
         raise UnknownName("collection of robots", collection, COLLECTIONS, where=f"--from {source}")
     if collection == DESCRIPTIONS_PACKAGE:
@@ -81,9 +87,7 @@ def _described(name: str, source: str) -> Path:
             where=f"--from {source}",
             expected="the robot in its cache (~/.cache/robot_descriptions), or a network",
         ) from error
-    if not hasattr(module, "URDF_PATH"):
-        raise ModelError("the robot has no URDF", where=f"--from {source}", expected="one that is not for MuJoCo alone")
-    return Path(module.URDF_PATH)
+    return Path(module.URDF_PATH if hasattr(module, "URDF_PATH") else module.MJCF_PATH)
 
 
 def _missing(collection: str) -> MissingDependency:

@@ -1,10 +1,13 @@
 """The package of a new robot."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from xml.sax.saxutils import escape
 
 from solfer.errors import ConfigError
+from solfer.model.documents import read_text
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 from solfer.model.srdf.semantics import Semantics
@@ -93,7 +96,7 @@ TIP_STACK = """\
 
 
 class RobotSkeleton(Skeleton):
-    """The package of a new robot, whose URDF and SRDF stay where they are.
+    """The package of a new robot, whose URDF and SRDF stay where they are unless they are made for it.
 
     Args:
         name: Name of the robot.
@@ -101,6 +104,7 @@ class RobotSkeleton(Skeleton):
         urdf: The URDF.
         srdf: The SRDF, if there is one.
         floating_base: Whether the base floats; None: as in the URDF.
+        made: Contents of files that are put beside `robot.yaml`, by name; `urdf` and `srdf` may be two of them.
 
     Attributes:
         dofs: Number of its DoFs.
@@ -111,20 +115,32 @@ class RobotSkeleton(Skeleton):
         ModelError, UnknownName: URDF or SRDF cannot be used.
     """
 
-    def __init__(self, name: str, folder: Path, urdf: Path, srdf: Path | None, floating_base: bool | None):
+    def __init__(
+        self,
+        name: str,
+        folder: Path,
+        urdf: Path,
+        srdf: Path | None,
+        floating_base: bool | None,
+        *,
+        made: Mapping[str, bytes] = MappingProxyType({}),
+    ):
         super().__init__("robot", name, folder)
         if name in shipped_robots():
             raise ConfigError(f"'{name}' is a robot that solfer ships", expected="another name")
-        description = Description.from_file(urdf)
+        self.bundle = folder / BUNDLE.replace("@NAME@", name) / "robot.yaml"
+        self._made = {self.bundle.parent / file: content for file, content in made.items()}
+        urdf = self._place(urdf)
+        description = Description.from_text(self._text(urdf, "URDF"), where=str(urdf))
         warn_of_fixed_base(description, floating_base)
         kinematics = Kinematics(description, floating_base)
         check_masses(description, kinematics.base is not None)
         warn_of_unfit(description, kinematics.base is not None)
         self.dofs = kinematics.size
-        self.bundle = folder / BUNDLE.replace("@NAME@", name) / "robot.yaml"
         if srdf is not None:
-            Semantics.from_file(srdf, description)
-        seen = self._seen_from_bundle(urdf, name)
+            srdf = self._place(srdf)
+            Semantics.from_text(self._text(srdf, "SRDF"), description, where=str(srdf))
+        seen = self._seen_from_bundle(urdf)
         quotes = {'"': "&quot;"}
         self._words = {
             "@URDF@": scalar(seen),
@@ -145,17 +161,25 @@ class RobotSkeleton(Skeleton):
             module = {"what": "the tip of an arm", "robot": "whole_body", "stack": stack}
         self._words["@TASKS@"] = f", and inverse_kinematics {module['what']}" if feet or tip else ""
         self._words["@TASKS_MODULE@"] = MODULE.format(**module) if feet or tip else ""
-        seen = "" if srdf is None else self._seen_from_bundle(srdf, name)
+        seen = "" if srdf is None else self._seen_from_bundle(srdf)
         for word, line in SRDF_LINES.items():
             self._words[word] = line.format(srdf=scalar(seen), file=escape(seen, quotes)) if seen else ""
         self._words |= {"@NAME@": name, "@PACKAGE@": self.package}
 
     def write(self) -> None:
         """Make the folder and all files; see `Skeleton.fill`."""
-        self.fill(TEMPLATES, self._words)
+        self.fill(TEMPLATES, self._words, self._made)
 
-    def _seen_from_bundle(self, file: Path, name: str) -> str:
-        return os.path.relpath(file.resolve(), self.folder.resolve() / BUNDLE.replace("@NAME@", name))
+    def _place(self, file: Path) -> Path:
+        """Return where a file is, or will be if it is made."""
+        place = self.bundle.parent / file
+        return place if place in self._made else file
+
+    def _text(self, file: Path, kind: str) -> str:
+        return self._made[file].decode() if file in self._made else read_text(file, kind)
+
+    def _seen_from_bundle(self, file: Path) -> str:
+        return os.path.relpath(file.resolve(), self.bundle.parent.resolve())
 
 
 def feet_of(kinematics: Kinematics) -> list[str]:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 
 from solfer.errors import ConfigError, SolferError
 
@@ -35,12 +36,15 @@ class Skeleton:
         if folder.exists() or folder.is_symlink():
             raise ConfigError("this exists already", where=str(folder), expected=ANOTHER)
 
-    def fill(self, templates: Mapping[str, str], words: Mapping[str, str]) -> None:
+    def fill(
+        self, templates: Mapping[str, str], words: Mapping[str, str], made: Mapping[Path, bytes] = MappingProxyType({})
+    ) -> None:
         """Make the folder and all files.
 
         Args:
             templates: Template of each file, without its ending `.in`.
             words: What words like @NAME@ are replaced by, in the files and their names.
+            made: Contents of further files by path.
 
         Raises:
             SolferError: The files cannot be written.
@@ -51,6 +55,9 @@ class Skeleton:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 text = (self._templates / f"{template}.in").read_text(encoding="utf-8")
                 path.write_text(_filled(text, words), encoding="utf-8")
+            for path, content in made.items():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
         except OSError as error:
             what = f"the package cannot be written: {error.strerror}"
             where = str(error.filename or self.folder)
