@@ -23,10 +23,10 @@ from solfer.simulation.bundle import load_bundle
 from solfer.simulation.engines import default_engine, make_engine
 from solfer.simulation.physics import STEP
 from solfer.simulation.world.records import ENGINES
+from solfer_tools.cli.skeletons.collections import EXAMPLES, folder_of
 
 CENTAURO = Path(__file__).resolve().parent.parent / "config" / "robots" / "centauro" / "robot.yaml"
 WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
-SHARE = Path(pinocchio.__file__).parents[4] / "share/example-robot-data/robots"
 ROBOTS = {
     "solo_description/robots/solo12.urdf": True,
     "hyq_description/robots/hyq_no_sensors.urdf": True,
@@ -86,11 +86,12 @@ def weight_ratio(engine: str, path: Path) -> float:
 
 def robots(given: Namespace, figures: Figures) -> None:
     """Compare the engines on robots of others."""
+    folder = folder_of(EXAMPLES)
     for name, floats in ROBOTS.items():
         row: dict[str, float | None] = {}
         for engine in ENGINES:
-            row[f"{engine}_acceleration"] = acceleration_error(engine, SHARE / name, floats)
-            row[f"{engine}_weight"] = weight_ratio(engine, SHARE / name) if floats else None
+            row[f"{engine}_acceleration"] = acceleration_error(engine, folder / name, floats)
+            row[f"{engine}_weight"] = weight_ratio(engine, folder / name) if floats else None
         figures.row(Path(name).stem, **row)
 
 

@@ -36,7 +36,7 @@ from solfer.plugins import Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.rendering.renderer import Renderer
 from solfer.simulation.server.publications import robot_parameters
-from solfer_tools.cli.skeletons.collections import EXAMPLES, find_in_collection, folder_of
+from solfer_tools.cli.skeletons.collections import EXAMPLES, find_robot, folder_of
 from solfer_tools.cli.skeletons.robot import RobotSkeleton, tip_of
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "examples"))
@@ -135,7 +135,7 @@ def move(shown: Shown, folder: Path) -> Found:
     Raises:
         SolferError: The robot cannot be used, or refuses to move.
     """
-    urdf = find_in_collection(shown.source)
+    urdf = find_robot(shown.source)
     srdf = folder_of(EXAMPLES) / shown.srdf if shown.srdf else None
     if shown.joints:
         srdf = folder / "state.srdf"
