@@ -95,8 +95,8 @@ class _Positions(_Drive):
 class WaypointCourse(Course):
     """Follows waypoints with velocities seen from the heading of the base.
 
-    They are published on `cmd_vel`. A target that does not receive these gets the positions that result from them: on
-    `base`, the pipe of a module that drives, or on `base/reference`, that of a task of `inverse_kinematics`.
+    They are published on `cmd_vel`, or as the positions that result from them: on `base`, the pipe of a module that
+    drives, or on `base/reference`, that of a task of `inverse_kinematics`.
 
     It ends where the base has come to rest at the last one: a base that lags behind its velocities, as just after its
     start, rolls on and is sent back. In a map it stays until the corrections of the localisation have been followed.
@@ -107,7 +107,7 @@ class WaypointCourse(Course):
         target: Namespace of the topics.
         odometry: Topic of the odometry.
         localisation: Where its frame is in that of the waypoints; None: they are the same.
-        positions: Whether positions are published, also to a target that receives velocities.
+        positions: Whether positions are published in place of velocities.
     """
 
     def __init__(
@@ -125,13 +125,13 @@ class WaypointCourse(Course):
         self._settles = 0.0 if localisation is None else CORRECTION_TIME
         self._rested = 0.0
         name = f"{target}/" if target else ""
-        poses = (
-            middleware.writer(f"{name}{BASE_PORT}", "geometry_msgs/PoseStamped"),
-            middleware.declared_writer(f"{name}{BASE_PORT}/reference", REFERENCE_MESSAGES["pose"][0]),
-        )
-        self._drives: list[_Drive] = [_Positions(middleware, name, writer) for writer in poses]
-        if not positions:
-            self._drives.insert(0, _Velocities(middleware, name))
+        self._drives: list[_Drive] = [_Velocities(middleware, name)]
+        if positions:
+            poses = (
+                middleware.writer(f"{name}{BASE_PORT}", "geometry_msgs/PoseStamped"),
+                middleware.declared_writer(f"{name}{BASE_PORT}/reference", REFERENCE_MESSAGES["pose"][0]),
+            )
+            self._drives = [_Positions(middleware, name, writer) for writer in poses]
         self._drive = self._drives[0]
         self.writers = tuple(each.writer for each in self._drives)
         self.count = len(follower.waypoints)
