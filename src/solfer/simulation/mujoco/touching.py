@@ -48,7 +48,12 @@ class Frictions:
     """
 
     def __init__(self, mujoco: Any, model: Any):
-        self._mujoco = mujoco
+        self._corrections = (
+            mujoco.mj_makeConstraint,
+            mujoco.mj_island,
+            mujoco.mj_projectConstraint,
+            mujoco.mj_referenceConstraint,
+        )
         self._model = model
         self._coefficients = np.ones(model.ngeom)
         self._is_mixed = False
@@ -71,8 +76,8 @@ class Frictions:
         if np.array_equal(product, contact.friction[:, 0]):
             return
         contact.friction[:, :2] = product[:, None]
-        for correct in ("makeConstraint", "island", "projectConstraint", "referenceConstraint"):
-            getattr(self._mujoco, f"mj_{correct}")(self._model, data)
+        for correct in self._corrections:
+            correct(self._model, data)
 
 
 def contact_points(mujoco: Any, model: Any, data: Any) -> Iterator[ContactPoint]:
