@@ -1,6 +1,9 @@
 """Which physics engine a simulation gets."""
 
 import importlib.util
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -57,3 +60,26 @@ def test_unknown_engines_are_refused_with_the_nearest_name(monkeypatch, tmp_path
 def test_a_window_of_mujoco_is_refused():
     with pytest.raises(SimulationError, match="no window"):
         make_engine("mujoco", gui=True)
+
+
+WITHOUT_OPENGL = """
+import sys
+from solfer.simulation.mujoco import MujocoEngine
+from solfer.simulation.physics import CameraView
+engine = MujocoEngine()
+engine.step()
+assert "OpenGL" not in sys.modules
+engine.render(CameraView((0, 0, 0), 1, yaw=0, pitch=0, field_of_view=60, size=(8, 8)))
+"""
+
+
+def test_mujoco_steps_where_nothing_can_draw():
+    """Only a picture needs OpenGL, and says so."""
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_OPENGL],
+        env=os.environ | {"MUJOCO_GL": "none"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "SimulationError: nothing draws here: " in done.stderr and "libopengl0" in done.stderr

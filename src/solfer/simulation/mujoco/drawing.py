@@ -4,6 +4,7 @@ from typing import Any
 
 from solfer.errors import MissingDependency, SimulationError
 from solfer.installation import pip_install
+from solfer.simulation.mujoco.library import load_opengl
 from solfer.simulation.mujoco.world import MujocoWorld
 from solfer.simulation.physics import CameraView, Picture
 
@@ -83,11 +84,12 @@ class MujocoCamera:
             buffer.offwidth = max(width, buffer.offwidth)
             buffer.offheight = max(height, buffer.offheight)
             try:
+                load_opengl()
                 self._renderer = self._world.mujoco.Renderer(model, height, width)
             except ImportError as error:
                 raise MissingDependency("pictures of MuJoCo need PyOpenGL", expected=pip_install("PyOpenGL")) from error
-            except Exception as error:  # whatever kinds PyOpenGL and its drivers have
-                expected = "EGL: the package libegl1, or MUJOCO_GL=osmesa and libosmesa6"
+            except Exception as error:
+                expected = "EGL: the packages libegl1 and libopengl0, or MUJOCO_GL=osmesa and libosmesa6"
                 raise SimulationError(f"nothing draws here: {error}", expected=expected) from error
             self._drawn = model, size
         return self._renderer
