@@ -1,7 +1,6 @@
 """What pyproject.toml says that `pip install` needs: what the code imports, in the versions that `./run` installs."""
 
 import ast
-import re
 import sys
 from pathlib import Path
 
@@ -62,16 +61,3 @@ def test_the_pinned_versions_are_within_the_declared_ranges(text):
     versions = [next(iter(pin.specifier)).version for pin in pins if pin.name == declared.name]
     assert versions or declared.name in {"PyYAML", "solfer"}
     assert all(version in declared.specifier for version in versions), versions
-
-
-def test_every_kernel_is_compiled_at_the_installation():
-    """A plugin that starts compiles nothing."""
-    script = (REPOSITORY / "run").read_text()
-    begin = script.index("compile_kernels() (")
-    text = script[begin : script.index("\n)\n", begin)]
-    compiled = {
-        ".".join(path.relative_to(SOURCES).with_suffix("").parts)
-        for path in SOURCES.rglob("*.py")
-        if re.search(r"^\w+ = cached\(", path.read_text(), re.MULTILINE)
-    }
-    assert compiled - set(re.findall(r"solfer[\w.]+", text)) == set() and len(compiled) > 15
