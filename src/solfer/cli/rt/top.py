@@ -70,8 +70,6 @@ def top_of_nodes(options: argparse.Namespace) -> None:
         yield from [as_json(newest, silent)] if options.json else health(newest, silent)
 
     with watched() as reports:
-        reports()
-        time.sleep(2.5)  # in which each node reports each of its parts
         _print(options, lines)
 
 

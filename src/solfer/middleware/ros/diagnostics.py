@@ -7,14 +7,17 @@ from contextlib import contextmanager
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from solfer.middleware.ros.node.master import require_master
+from solfer.middleware.ros.node.master import call_master, require_master
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
+
+FIRST_REPORTS = 2.5, 10.0
+"""Time in which each node reports each of its parts, and the longest for nodes that have reported nothing yet [s]."""
 
 
 @contextmanager
 def watched() -> Iterator[Callable[[], Mapping[str, HealthReport]]]:
-    """Watch the health reports of all nodes, in a program that is no node otherwise.
+    """Watch the health reports of all nodes, from when each has reported, in a program that is no node otherwise.
 
     Raises:
         MiddlewareError: The ROS master does not answer.
@@ -23,6 +26,7 @@ def watched() -> Iterator[Callable[[], Mapping[str, HealthReport]]]:
     rospy.init_node("solfer_top", anonymous=True, disable_signals=True, disable_rostime=True)
     diagnostics = Diagnostics(rospy.get_name())
     try:
+        diagnostics.await_reports(*FIRST_REPORTS)
         yield diagnostics.reports
     finally:
         diagnostics.close()
@@ -45,6 +49,7 @@ class Diagnostics:
         self._subscriber: rospy.Subscriber | None = None
         self._last: dict[str, tuple[float, Health]] = {}
         self._received: dict[str, HealthReport] = {}
+        self._reporters: set[str] = set()
 
     def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """Publish one status; see `Middleware.report`."""
@@ -68,7 +73,22 @@ class Diagnostics:
             self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._receive)
         return self._received
 
+    def await_reports(self, shortest: float, longest: float) -> None:
+        """Receive reports for `shortest` [s], and up to `longest` while a node that publishes them has sent none."""
+        self.reports()
+        begin = time.monotonic()
+        end = begin + shortest
+        while (now := time.monotonic()) < end:
+            time.sleep(0.1)
+            if self._silent_publishers():
+                end = min(begin + longest, max(end, now + 1.0))  # the parts of a node follow its first one
+
+    def _silent_publishers(self) -> set[str]:
+        publishers, _, _ = call_master("getSystemState")
+        return set(dict(publishers).get(self._publisher.resolved_name, ())) - self._reporters - {rospy.get_name()}
+
     def _receive(self, message: DiagnosticArray) -> None:
+        self._reporters.add(message._connection_header["callerid"])  # other nodes give any name for themselves
         for status in message.status:
             part = status.name.rpartition(": ")[2]
             self._received[part] = HealthReport(
