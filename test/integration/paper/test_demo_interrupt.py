@@ -1,6 +1,7 @@
 """Ctrl-C in `./run demo` at any moment: everything ends, with wheels at rest."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,22 +17,22 @@ from solfer.recording.reader import read
 
 WHEELS = tuple(f"j_wheel_{leg}" for leg in (1, 2, 3, 4))
 ROCKS = 0.3
-"""Largest speed of a wheel below a body that still rocks on its legs after it has braked from 3 rad/s [rad/s]."""
+"""Largest speed of a joint of a body that still rocks on its legs after it has braked from 3 rad/s [rad/s]."""
 DRIVES = 0.5
 """Speed of a wheel at which the robot is under way [rad/s]."""
 LOOK = 0.5
 """Time between two looks at the recording, which grows [s]."""
-MEASURED, DESIRED = "full_compensation/measured/velocity", "full_compensation/wanted/velocity"
+MEASURED = "full_compensation/measured/velocity"
 
 
-def speeds(folder: Path, channel: str) -> np.ndarray:
-    """Read the speeds of the wheels from the recording, also while it is written, shape (k, 4) [rad/s]."""
+def fastest_wheel(folder: Path) -> float:
+    """Read the largest speed of a wheel from the recording, also while it is written [rad/s]."""
     time.sleep(LOOK)
     file = folder / "out" / "run.mcap"
     channels = read(file).channels if file.is_file() and file.stat().st_size else {}
-    if channel not in channels or not len(channels[channel].times):
-        return np.zeros((1, len(WHEELS)))
-    return np.stack([channels[channel].column(wheel) for wheel in WHEELS], axis=1)
+    if MEASURED not in channels:
+        return 0.0
+    return max(np.abs(channels[MEASURED].column(wheel)).max(initial=0.0) for wheel in WHEELS)
 
 
 @pytest.fixture
@@ -61,7 +62,7 @@ def demo(tmp_path):
 @pytest.mark.daily(1)
 @pytest.mark.parametrize(("sight", "later"), [("first motion", None), ("ROS master", 0.0), ("first motion", 0.5)])
 def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
-    """Ctrl-C at the start or while it drives ends all processes; the recording ends with measured wheels at rest."""
+    """Ctrl-C at the start or while it drives ends all processes, with the robot at rest."""
     process, log = demo
 
     def begun() -> bool:
@@ -70,17 +71,13 @@ def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
 
     until(begun, lambda: f"{sight!r}, only:\n{log.read_text()}", 2.0 * WAIT)
     if later is None:
-        until(lambda: np.abs(speeds(tmp_path, MEASURED)).max() > DRIVES, "wheels that turn", 2.0 * WAIT)
+        until(lambda: fastest_wheel(tmp_path) > DRIVES, "wheels that turn", 2.0 * WAIT)
     else:
         time.sleep(later)
     os.killpg(process.pid, signal.SIGINT)
     assert process.wait(WAIT) == 128 + signal.SIGINT
-    assert "Traceback" not in log.read_text() + (tmp_path / "out" / "roslaunch.log").read_text()
+    output = (tmp_path / "out" / "roslaunch.log").read_text()
+    assert "Traceback" not in log.read_text() + output
     until(lambda: not named(str(tmp_path)), lambda: f"the end of {named(str(tmp_path))}")
     if later is None:
-        for channel in (DESIRED, MEASURED):
-            newest = np.abs(speeds(tmp_path, channel)[-20:])
-            begin = newest[:5].mean(axis=0)
-            end = newest[-5:].mean(axis=0)
-            soon = end - (begin - end)  # 0.1 s later: beside other load the time ends while wheels still brake
-            assert np.minimum(newest.mean(axis=0), soon).max() < ROCKS, channel
+        assert float(re.search(r"the fastest joint moves by (\S+) rad/s", output)[1]) < ROCKS, output

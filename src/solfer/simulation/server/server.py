@@ -217,24 +217,28 @@ class SimulationServer:
             cycle: Makes a cycle, instead of `cycle`.
         """
         loss = self.middleware.loss or self._linger(cycle or self.cycle)
-        if not loss:
-            return
-        owners = self.simulation.lower_level.release_all(loss)
-        logger.warning("the robot holds%s: %s", f", which {', '.join(owners)} commanded" if owners else "", loss)
-        for _ in range(round(COAST_TIME / STEP)):
-            (cycle or self.cycle)()
+        if loss:
+            owners = self.simulation.lower_level.release_all(loss)
+            logger.warning("the robot holds%s: %s", f", which {', '.join(owners)} commanded" if owners else "", loss)
+            for _ in range(round(COAST_TIME / STEP)):
+                (cycle or self.cycle)()
+        logger.info("the simulation ends; the fastest joint moves by %.3f rad/s", self._fastest())
 
     def _linger(self, cycle: Callable[[], None]) -> str:
         """Go on as long as the robot moves; return why that is to end, empty: it rests."""
-        begin = 6 if self.simulation.floating else 0
         left = round(COAST_TIME / STEP) if isinstance(self._followers, StepHook) and not self.paused else 0
-        while left and np.abs(self.simulation.v[begin:]).max(initial=0.0) > 0.05:  # [rad/s]
+        while left and self._fastest() > 0.05:  # [rad/s]
             cycle()
             self.wait()
             left -= 1
             if not left:
                 return "the simulation ends"
         return ""
+
+    def _fastest(self) -> float:
+        """Return the largest speed of a joint [rad/s, m/s]."""
+        begin = 6 if self.simulation.floating else 0
+        return np.abs(self.simulation.v[begin:]).max(initial=0.0)
 
     def _recover(self, error: SimulationError) -> None:
         """Put the robot into its start, as a reset does; raise `error` if that was done a moment ago."""
