@@ -137,10 +137,12 @@ class Driving:
 
     def _rest(self, course: ScenarioCourse) -> None:
         """Let the robot come to rest, as far as it does so soon."""
-        end = time.monotonic() + 3.0  # enough on a busy machine
+        now = self._middleware.now
+        end = now() + 3.0
+        latest = time.monotonic() + 20.0  # simulated time may pass slowly, or stand still
         looks = 0
         # of many messages: a body that rocks rolls the wheels to and fro, and they stand for a moment between
-        while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(20) >= 0.05):
+        while now() < end and time.monotonic() < latest and (looks < 5 or self._recorder.fastest_wheel(20) >= 0.05):
             course.rest()
             time.sleep(1.0 / COURSE_RATE)
             self._recorder.collect()

@@ -222,12 +222,13 @@ class SimulationServer:
             logger.warning("the robot holds%s: %s", f", which {', '.join(owners)} commanded" if owners else "", loss)
             for _ in range(round(COAST_TIME / STEP)):
                 (cycle or self.cycle)()
-        logger.info("the simulation ends; the fastest joint moves by %.3f rad/s", self._fastest())
+        moving = ", ".join(f"{name} {speed:.2f}" for name, speed in self._moving().items())
+        logger.info("the simulation ends %s", f"while joints move [rad/s, m/s]: {moving}" if moving else "at rest")
 
     def _linger(self, cycle: Callable[[], None]) -> str:
         """Go on as long as the robot moves; return why that is to end, empty: it rests."""
         left = round(COAST_TIME / STEP) if isinstance(self._followers, StepHook) and not self.paused else 0
-        while left and self._fastest() > 0.05:  # [rad/s]
+        while left and self._moving():
             cycle()
             self.wait()
             left -= 1
@@ -235,10 +236,11 @@ class SimulationServer:
                 return "the simulation ends"
         return ""
 
-    def _fastest(self) -> float:
-        """Return the largest speed of a joint [rad/s, m/s]."""
-        begin = 6 if self.simulation.floating else 0
-        return np.abs(self.simulation.v[begin:]).max(initial=0.0)
+    def _moving(self) -> dict[str, float]:
+        """Return the speeds of the joints that do not rest, by their names [rad/s, m/s]."""
+        joints = self.simulation.body.joints
+        speeds = np.abs(self.simulation.v[-len(joints) :]).tolist() if joints else ()
+        return {name: speed for name, speed in zip(joints, speeds, strict=True) if speed > 0.05}
 
     def _recover(self, error: SimulationError) -> None:
         """Put the robot into its start, as a reset does; raise `error` if that was done a moment ago."""
