@@ -55,6 +55,7 @@ COURSES: dict[str, tuple[Part, ...]] = {
     "slow": (Part(6.0, 0.05),),
     "forward": (Part(5.0, 0.2),),
     "fast": (Part(4.0, 0.3),),
+    "far": (Part(15.0, 0.2),),
     "backward": (Part(5.0, -0.2),),
     "turn": (Part(8.0, turn=0.3),),
     "circle": (Part(10.0, 0.2, turn=0.4),),

@@ -111,7 +111,7 @@ class Recorder:
                 truth,
                 references.vertices[:, :2].copy(),
                 seen_from(heading, vertices[:, :2] - pelvis[:2]),
-                float(pelvis[2] - references.position[2]),
+                float(pelvis[2] - references.position[2] - references.rise),
                 margin(center[:2], vertices[world.touching(), :2]),
                 float(np.abs(error[self._moved]).max()),
                 float((torque / self._torque_limit)[self._moved].max()),

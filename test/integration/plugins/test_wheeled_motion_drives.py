@@ -5,9 +5,10 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.integration.world import World
+from support.integration.world import CONFIG, World, perfect
 
 from solfer.middleware.memory import MemoryMiddleware
+from solfer.simulation import Simulation, SimulationServer
 from solfer.transport.messages import FieldsMessage
 
 SPEED, TURN = 0.2, 0.3  # [m/s], [rad/s]
@@ -47,6 +48,19 @@ class DrivenWorld(World):
         return np.array([(now.position(f"wheel_{leg}") - pelvis) @ turn for leg in (1, 2, 3, 4)])[:, :2]
 
 
+class SlopedWorld(DrivenWorld):
+    """The same on a slope of 5 degrees."""
+
+    def offer(self, middleware):
+        simulation = Simulation.from_file(perfect(), world=CONFIG / "worlds" / "slope.yaml")
+        return simulation, SimulationServer(simulation, middleware)
+
+    def height(self) -> float:
+        """Return the height of the pelvis over its wheels [m]."""
+        now = self.simulation.state.now
+        return now.position("pelvis")[2] - np.mean([now.position(f"wheel_{leg}")[2] for leg in (1, 2, 3, 4)])
+
+
 @pytest.fixture(scope="module")
 def driven():
     with closing(DrivenWorld()) as world:
@@ -70,6 +84,16 @@ def test_it_goes_where_it_is_driven(driven, motion):
     assert np.linalg.norm(driven.footprint() - standing, axis=1).max() < 8e-3
     assert set(driven.simulation.contact_links()) == {f"wheel_{leg}" for leg in (1, 2, 3, 4)}
     assert not any(driven.driver.outputs.counts().values())  # the gate had nothing to do
+
+
+def test_the_base_rises_with_a_slope():
+    with closing(SlopedWorld()) as world:
+        before, height = world.pose(), world.height()
+        world.drive(3.0, x=SPEED)
+        way = world.pose() - before
+        assert way[0] > 0.5 and way[2] == pytest.approx(way[0] * math.tan(math.radians(5.0)), abs=0.015)
+        assert world.height() == pytest.approx(height, abs=0.015)  # less than the rise
+        assert world.driver.component.references.rise > 0.03
 
 
 @pytest.mark.soak

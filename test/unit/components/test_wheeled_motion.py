@@ -166,6 +166,17 @@ def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
     assert np.diff(rates, prepend=0.0).max() < 1.01 * getattr(component.tags, growth) * component.period
 
 
+@pytest.mark.parametrize(("rise", "error"), [(0.005, -0.005), (0.4, -0.01), (-0.4, 0.01)])
+def test_the_height_of_the_base_counts_from_the_ground(make, rise, error):
+    """What a floor's unevenness explains is corrected; a robot that has driven up a ramp keeps its legs as they are."""
+    component = make()
+    before = component.references.position.copy()
+    component.model.state.position[2] += rise
+    cycle(component)
+    assert component.tasks.rates.error[component.tasks.rows["BASE"]][5] == pytest.approx(error, abs=1e-6)
+    assert_allclose(component.references.position, before)
+
+
 @pytest.mark.parametrize(("turn", "correction"), [(0.1, 0.025), (-0.3, 0.045), (0.3, 0.045)])
 def test_a_base_that_turns_is_corrected_faster(make, turn, correction):
     component = make()

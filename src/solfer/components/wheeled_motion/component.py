@@ -9,6 +9,7 @@ from solfer.components.live_tunings import live_tunings
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.inputs import ReferenceInputs
 from solfer.components.wheeled_motion.joints import CommandedJoints
+from solfer.components.wheeled_motion.kernel import FLOOR
 from solfer.components.wheeled_motion.log import WheelsLog
 from solfer.components.wheeled_motion.original.kernel import ROUNDED_PI, ROUNDED_TWO_PI
 from solfer.components.wheeled_motion.original.resteering import Resteering
@@ -203,6 +204,7 @@ class WheeledMotion(Component):
             place[:2] = self.model.center_of_mass.value[:2]
         references.start(place, wheels.offsets.heading, wheels.pose.value[3:])
         references.vertices[:] = wheels.offsets.reference
+        references.numbers[FLOOR:] = wheels.offsets.reference[:, 2].mean()
         references.camber[:] = wheels.points[TASK_POINTS[CAMBER]].value
         references.caster[:] = wheels.points[TASK_POINTS[CASTER]].value
         if self.tags.is_original:

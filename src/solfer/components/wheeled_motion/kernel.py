@@ -20,6 +20,9 @@ WAKE_TIME = 0.3
 """Time for which that error has to last [s]: an estimate of the base that is late for a moment would turn wheels on the
 spot, and they the base."""
 
+STEEPENING = 0.35
+"""By how much the ground tilts a robot on its way onto a slope of 15 degrees, with wheels that are 0.75 m apart [1/m]."""
+
 EXTRA_ANGLE = 0.35
 """By how much more than a quarter of a revolution a wheel goes on the way that it has begun [rad]."""
 
@@ -29,8 +32,11 @@ END_MARGIN = 0.1
 LEAD_CYCLES = 4.0
 """Cycles before the end of its range at which a wheel begins the other way."""
 
-PACE, LIMIT_RATIO, HEADING, WAITS = range(4)
-"""Indices of the numbers of the references."""
+PACE, LIMIT_RATIO, HEADING, WAITS, FLOOR, GROUND = range(6)
+"""Indices of the numbers of the references; the last are the heights of the ground where it began, and where it is."""
+
+UNEVENNESS = 0.01
+"""By how much wheels on a floor are above or below it on average [m]: estimates of the base err, and legs yield."""
 
 VELOCITY, ANGULAR, PLACE = range(3)
 """Rows of what is desired of the base."""
@@ -72,8 +78,8 @@ WHEELS = BlockLayout(
     directions=(float, "count", 2),
     lifted=(bool, "count"),
     base=(float, 3),  # heading and place
-    # references: the numbers `PACE` to `WAITS`, and the rows `VELOCITY` to `PLACE`
-    numbers=(float, 4),
+    # references: the numbers `PACE` to `GROUND`, and the rows `VELOCITY` to `PLACE`
+    numbers=(float, 6),
     motion=(float, 3, 3),
     velocities=(float, 2, "count", 3),
     orientations=(float, 2, 4),
@@ -221,6 +227,21 @@ def _steer(start):
 
 
 @part
+def _follow_ground(block):
+    """Let the height of the ground follow the wheels that carry the robot, where it is no floor."""
+    total = 0.0
+    count = 0
+    for index in range(block.count):
+        if not block.lifted[index]:
+            total += block.places[index, 2]
+            count += 1
+    if count:
+        height = total / count
+        ground = block.numbers[GROUND]
+        block.numbers[GROUND] = min(max(ground, height - UNEVENNESS), height + UNEVENNESS)
+
+
+@part
 def _find_base(place, pose, desired_place, desired_orientation, error):
     """Write the vector part of the quaternion that turns the base to its reference, and the rest of the path."""
     x = pose[3]
@@ -297,6 +318,9 @@ def _find_errors(start):
     largest_errors = block.largest_errors
     if block.of_base >= 0:
         _find_base(block.place, block.pose, block.motion[PLACE], block.orientations[0], error[block.of_base :])
+        if block.has_ranges:
+            _follow_ground(block)
+            error[block.of_base + 5] += block.numbers[GROUND] - block.numbers[FLOOR]
     if block.of_vertices >= 0:
         for index in range(3 * block.count):
             error[block.of_vertices + index] = -block.offsets[index]
@@ -437,10 +461,14 @@ def _find_rates(start, is_paced, feeds_forward):
         if block.of_base >= 0:
             turn_rise = period * block.turn_acceleration
             base_rise = period * block.base_acceleration
-            # a gyroscope with a wrong scale or sign cannot turn the robot much faster than commanded
+            # a gyroscope with a wrong scale or sign cannot turn the robot much faster than commanded, nor an IMU with
+            # a wrong tilt tilt it much faster than the ground may where it drives
             turn_most = block.turn_correction
-            turn_most = min(turn_most, 0.15 * turn_most + 0.1 * abs(block.motion[ANGULAR, 2]))
-            _correct(rates, away, block.of_base, 3, turn_most, turn_rise)
+            velocity = block.motion[VELOCITY]
+            tilting = STEEPENING * block.numbers[PACE] * math.hypot(velocity[0], velocity[1])
+            turning = 0.1 * abs(block.motion[ANGULAR, 2])
+            _correct(rates, away, block.of_base, 2, min(turn_most, 0.15 * turn_most + tilting), turn_rise)
+            _correct(rates, away, block.of_base + 2, 1, min(turn_most, 0.15 * turn_most + turning), turn_rise)
             _correct(rates, away, block.of_base + 3, 3, block.base_correction, base_rise)
         if block.of_vertices >= 0:
             vertex_rise = period * block.vertex_acceleration

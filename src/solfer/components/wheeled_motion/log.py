@@ -51,5 +51,6 @@ class WheelsLog:
     def measure(self) -> None:
         """Find how far base and vertices are from their references, and how fast the base moves."""
         np.subtract(self._references.position, self._wheels.place, out=self._base_error)
+        self._base_error[2] += self._references.rise
         np.subtract(self._references.vertices, self._wheels.offsets.states, out=self._vertex_error)
         np.dot(self._wheels.pose.jacobian[:3], self._robot.state.velocity, out=self._velocity)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import HEADING, LIMIT_RATIO, PACE, WAITS
+from solfer.components.wheeled_motion.kernel import FLOOR, GROUND, HEADING, LIMIT_RATIO, PACE, WAITS
 from solfer.components.wheeled_motion.pace.kernel import step
 from solfer.numerics.planar_move import PlanarMove, about_z
 from solfer.numerics.rotations import quaternion_product
@@ -18,7 +18,7 @@ class References:
         velocity: Velocity of the base in the world, shape (3,) [m/s].
         angular: Angular velocity of the base (x, y, z), of which z is the rate of the heading, shape (3,) [rad/s].
         vertex_velocity: Velocities of the vertices in the frame of the heading, shape (count, 3) [m/s].
-        position: Position of the base in the world, shape (3,) [m].
+        position: Position of the base in the world, shape (3,) [m]; its height is that above the ground where it began.
         orientation: Orientation of the base, quaternion (x, y, z, w).
         vertices: Vertices in the frame of the heading: x, y from the base, z in the world, shape (count, 3) [m].
         camber: Camber of the wheels, shape (count,) [rad].
@@ -28,7 +28,7 @@ class References:
         motion: Velocity, angular velocity and position, shape (3, 3).
         places: Velocities of the vertices, and vertices, shape (2, count, 3).
         orientations: Orientation and tilt, shape (2, 4).
-        numbers: Pace, factor by the limits, heading, and whether velocities wait, shape (4,).
+        numbers: Pace, factor by the limits, heading, whether velocities wait, and heights of the ground, shape (6,).
     """
 
     def __init__(self, count: int):
@@ -37,7 +37,7 @@ class References:
         self.velocity, self.angular, self.position = self.motion
         self.vertex_velocity, self.vertices = self.places
         self.camber, self.caster = np.zeros((2, count))
-        self.numbers = np.zeros(4)
+        self.numbers = np.zeros(6)
         self.lifted = np.zeros(count, dtype=bool)
         self.orientations = np.zeros((2, 4))
         self.orientation, self.tilt = self.orientations
@@ -75,6 +75,11 @@ class References:
     def waits(self, value: bool) -> None:
         self.numbers[WAITS] = value
 
+    @property
+    def rise(self) -> float:
+        """How much higher the ground is than where it began [m]."""
+        return float(self.numbers[GROUND] - self.numbers[FLOOR])
+
     def start(self, position: np.ndarray, heading: float, orientation: np.ndarray) -> None:
         """Begin with a base at rest, at a position [m], a heading [rad] and an orientation (quaternion)."""
         self.velocity[:] = 0.0
@@ -103,6 +108,7 @@ class References:
         move.rotate(self.velocity)
         self.heading = move.rotate_heading(self.heading)
         self.vertices[:, 2] += move.rise
+        self.numbers[FLOOR:] += move.rise
         move.rotate_orientation(self.orientation)
 
     def step(self, period: float) -> None:

@@ -24,7 +24,7 @@ GOING = BlockLayout(
     steered=(float, 4, "count"),
     base=(float, 3),
     # the references, and the vertices that are desired
-    numbers=(float, 4),
+    numbers=(float, 6),
     motion=(float, 3, 3),
     vertices=(float, 2, "count", 3),
     orientations=(float, 2, 4),
