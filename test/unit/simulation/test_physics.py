@@ -13,7 +13,8 @@ from solfer.simulation.bullet import BulletEngine
 from solfer.simulation.loading.wheels import TorusWheel
 from solfer.simulation.mujoco import MujocoEngine
 from solfer.simulation.physics import STEP, CameraView
-from solfer.simulation.world.records import Friction
+from solfer.simulation.world.records import Friction, StairsRecord, WorldRecord
+from solfer.simulation.world.world import World
 
 pytestmark = pytest.mark.needs("simulation")
 ENGINES = [BulletEngine, MujocoEngine]
@@ -365,6 +366,53 @@ def test_boxes_stand_are_put_and_stopped(engine):
     run(engine, 1)
     assert engine.pose(crate)[0][2] == pytest.approx(2.0, abs=1e-4)
     engine.set_friction(crate, 0.2)
+
+
+STAIRS = StairsRecord(position=(0.0, 0.0), count=3, rise=0.15, tread=0.4, width=1.0)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_ball_rests_on_each_step_of_stairs(engine, number):
+    World(engine, WorldRecord(stairs={"steps": STAIRS}))
+    robot = load_ball(engine, 1.0)
+    place = 0.4 * (number - 0.5)
+    robot.place_base((place, 0.0, 0.15 * number + 0.11), UPRIGHT)
+    run(engine, 500)
+    assert robot.base_state().position == pytest.approx((place, 0.0, 0.15 * number + 0.1), abs=1e-3)
+
+
+def test_what_rests_on_a_box_falls_when_it_moves(engine):
+    """A ball falls onto a shelf that is put lower, and beside one that is put away."""
+    shelf = engine.add_box((1.0, 1.0, 0.2), ((0.0, 0.0, 0.9), UPRIGHT), 0.0, friction=1.0, colour=GREY)
+    robot = load_ball(engine, 1.0)
+    robot.place_base((0.0, 0.0, 1.1), UPRIGHT)
+    run(engine, 200)
+    assert robot.base_state().position[2] == pytest.approx(1.1, abs=1e-3)
+    engine.place(shelf, ((0.0, 0.0, 0.4), UPRIGHT))
+    run(engine, 1000)
+    assert robot.base_state().position[2] == pytest.approx(0.6, abs=1e-3)
+    engine.place(shelf, ((5.0, 0.0, 0.4), UPRIGHT))
+    run(engine, 100)
+    assert robot.base_state().position[2] == pytest.approx(0.6 - 0.5 * GRAVITY * 0.01, abs=2e-3)
+
+
+def test_a_ball_pushes_a_box_and_shares_its_momentum(engine):
+    """They slide without friction, and do not bounce: the momentum stays, and both end with one speed."""
+    engine.add_plane((0.0, 0.0, 1.0), 0.0)
+    crate = engine.add_box((0.2, 0.2, 0.2), ((0.5, 0.0, 0.1), UPRIGHT), 3.0, friction=0.0, colour=GREY)
+    robot = load_ball(engine, 0.0)
+    robot.place_base((0.0, 0.0, 0.1), UPRIGHT)
+    for _ in range(200):
+        robot.push("ball", [20.0, 0.0, 0.0], [0.0] * 3, robot.center_of_mass().tolist())
+        engine.step()
+    assert robot.base_state().linear[0] == pytest.approx(2.0, abs=1e-3)
+    run(engine, 300)
+    begin = engine.pose(crate)[0][0]
+    run(engine, 100)
+    speed = (engine.pose(crate)[0][0] - begin) / (100 * STEP)
+    momentum = 3.0 * speed + 2.0 * robot.base_state().linear[0]
+    assert momentum == pytest.approx(4.0, rel=0.01)
+    assert speed >= 0.8 - 1e-3 and robot.base_state().linear[0] <= speed + 1e-3
 
 
 GRID = np.array([[0.0, 0.1, 0.3, 0.2], [0.05, 0.2, 0.1, 0.4], [0.3, 0.1, 0.0, 0.6]]) + 1.0
