@@ -2,13 +2,16 @@
 
 python benchmark/engines.py robots [--json]
 python benchmark/engines.py contacts [--solref SECONDS] [--solimp D] [--impratio RATIO] [--json] [--engine NAME]
+python benchmark/engines.py wheels [--json]
 
 `robots`: 50 drawn postures of each robot in the air, at rest, with drawn torques: the accelerations of one step against
 those of Pinocchio, over the largest one; and what carries it after 1.5 s, over its weight. `contacts`: CENTAURO with
 perfect sensors drives at 0.5 m/s for 6 s, or stands for 6 s; figures of the last second, and how far wheels have moved
-in the last 5 s. With MuJoCo its contacts can be changed.
+in the last 5 s. With MuJoCo its contacts can be changed. `wheels`: one of CENTAURO's wheels leans to the side and
+rolls below 20 kg: by how much its height, its contact and its rolling radius miss those of its torus.
 """
 
+import math
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import closing
@@ -18,11 +21,13 @@ import numpy as np
 import pinocchio
 from form import Figures, add_engine, parser_of
 
+from solfer.model.urdf.description import Description
 from solfer.simulation import Simulation, read_bundle
 from solfer.simulation.bundle import load_bundle
 from solfer.simulation.engines import default_engine, make_engine
+from solfer.simulation.loading.wheels import TorusWheel, wheels_of
 from solfer.simulation.physics import STEP
-from solfer.simulation.world.records import ENGINES
+from solfer.simulation.world.records import ENGINES, Friction
 from solfer_tools.cli.skeletons.collections import EXAMPLES, folder_of
 
 CENTAURO = Path(__file__).resolve().parent.parent / "config" / "robots" / "centauro" / "robot.yaml"
@@ -134,12 +139,61 @@ def contacts(given: Namespace, figures: Figures) -> None:
     )
 
 
+CART = """<robot name="cart"><link name="rail"/>
+  <joint name="way" type="prismatic"><parent link="rail"/><child link="slide"/><axis xyz="1 0 0"/>
+    <limit lower="-9" upper="9" effort="0" velocity="9"/></joint>
+  <link name="slide"><inertial><mass value="1"/>{inertia}</inertial></link>
+  <joint name="height" type="prismatic"><parent link="slide"/><child link="fork"/><axis xyz="0 0 1"/>
+    <limit lower="-9" upper="9" effort="0" velocity="9"/></joint>
+  <link name="fork"><inertial><mass value="20"/>{inertia}</inertial></link>
+  <joint name="axle" type="continuous"><parent link="fork"/><child link="wheel_1"/>
+    <origin rpy="{roll} 0 0"/><axis xyz="0 0 1"/></joint>
+  <link name="wheel_1"><inertial><mass value="1.7"/>{inertia}</inertial>
+    <collision><geometry><sphere radius="0.078"/></geometry></collision></link></robot>"""
+"""A wheel of CENTAURO below a load that moves along x and z."""
+
+
+def wheel_errors(name: str, camber: float, torus: TorusWheel) -> np.ndarray:
+    """Return by how much a wheel misses the height, the contact and the rolling radius of its torus, shape (3,) [m]."""
+    inertia = '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>'
+    text = CART.format(inertia=inertia, roll=camber - 0.5 * math.pi)
+    height = torus.ring * math.cos(camber) + torus.tube
+    with closing(make_engine(name)) as engine:
+        joints = ("way", "height", "axle")
+        described = Description.from_text(text)
+        robot = engine.load_robot(described, joints, Friction(), floats=False, wheels={"wheel_1": torus})
+        robot.set_losses([0.0] * 3, [0.0] * 3, np.ones(3))
+        engine.add_plane((0.0, 0.0, 1.0), 1.0)
+        robot.place_joints([0.0, height, 0.0])
+        drive = robot.group([2])
+        places = []
+        for count in range(1000):
+            drive.hold_speeds(np.array([6.4]), [100.0])
+            engine.step()
+            if count in (499, 999):
+                places.append(robot.joint_states().position)
+        way, _, angle = np.subtract(*places)
+        contact = np.mean([point.position[1] for point in robot.contacts()])
+        found = np.array((places[1][1], contact, way / angle))
+    return found - (height, torus.ring * math.sin(camber), torus.ring + torus.tube * math.cos(camber))
+
+
+def wheels(given: Namespace, figures: Figures) -> None:
+    """Compare a leaning wheel with its torus."""
+    torus = wheels_of(load_bundle(read_bundle(CENTAURO)).equipment.contacts)["wheel_1"]
+    for camber in (0.0, 5.0, 10.0, 15.0, 20.0):
+        for name in ENGINES:
+            errors = 1e3 * wheel_errors(name, math.radians(camber), torus)
+            row = dict(zip(("height_mm", "contact_mm", "radius_mm"), errors.tolist(), strict=True))
+            figures.row(f"{camber:g} degrees, {name}", **row)
+
+
 if __name__ == "__main__":
     parser = parser_of(__doc__)
-    parser.add_argument("what", choices=("robots", "contacts"))
+    parser.add_argument("what", choices=("robots", "contacts", "wheels"))
     parser.add_argument("--solref", type=float, default=0.004, help="time constant of contacts [s]")
     parser.add_argument("--solimp", type=float, default=0.9, help="impedance of contacts")
     parser.add_argument("--impratio", type=float, default=1.0, help="stiffness of friction over that of normal forces")
     add_engine(parser)
     chosen = parser.parse_args()
-    {"robots": robots, "contacts": contacts}[chosen.what](chosen, Figures(chosen.json))
+    {"robots": robots, "contacts": contacts, "wheels": wheels}[chosen.what](chosen, Figures(chosen.json))

@@ -108,8 +108,8 @@ def add_robot_files(parser: argparse.ArgumentParser, source: bool = False) -> No
             "--from",
             dest="source",
             metavar="SOURCE",
-            help="a robot as MJCF (FILE.xml), or COLLECTION:NAME of example-robot-data, pybullet_data or "
-            "robot_descriptions",
+            help="a robot as MJCF (FILE.xml), or COLLECTION:NAME of example-robot-data, pybullet_data, "
+            "robot_descriptions or menagerie",
         )
     parser.add_argument("--srdf", type=Path, metavar="FILE", help="the robot's SRDF")
 

@@ -209,6 +209,14 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
     return np.array(quaternion) / math.copysign(math.hypot(*quaternion), quaternion[3])
 
 
+def rotation_onto(axis: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Compute a rotation whose z is along an axis of any length but zero, shape (3, 3)."""
+    z = np.asarray(axis) / np.linalg.norm(axis)
+    x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (0.0, 0.0, 1.0), z)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))
+
+
 def whole_revolutions(displacements: np.ndarray, revolutions: np.ndarray) -> np.ndarray:
     """Return whole revolutions in displacements, shape (..., n) [rad]: without them, none is longer than half of one.
 

@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from solfer.model.urdf.description import Description
+from solfer.simulation.loading.wheels import NO_WHEELS, TorusWheel
 from solfer.simulation.world.records import Friction
 
 STEP = 0.001
@@ -199,7 +200,13 @@ class PhysicsEngine(Protocol):
     """A world with gravity along -z, in which bodies have numbers; equal calls give bitwise equal motions."""
 
     def load_robot(
-        self, description: Description, joints: Sequence[str], friction: Friction, *, floats: bool
+        self,
+        description: Description,
+        joints: Sequence[str],
+        friction: Friction,
+        *,
+        floats: bool,
+        wheels: Mapping[str, TorusWheel] = NO_WHEELS,
     ) -> RobotInEngine:
         """Load a robot, at rest at the world's origin, without losses in its joints.
 
@@ -208,6 +215,7 @@ class PhysicsEngine(Protocol):
             joints: Its moving joints, in the order in which they are read and driven.
             friction: Friction of its links.
             floats: Whether its base moves.
+            wheels: Wheels by link, whose shapes stand in for those of the description in an engine that has them.
 
         Raises:
             SimulationError: The engine cannot take the robot.

@@ -8,6 +8,7 @@ from solfer.errors import SimulationError, UnknownName
 from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.engines import make_engine
+from solfer.simulation.loading.wheels import wheels_of
 from solfer.simulation.physics import STEP, PhysicsEngine
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
@@ -74,6 +75,7 @@ class Simulation:
                 motors=drives.speed_dofs,
                 friction=bundle.friction,
                 lossless=bundle.lossless,
+                wheels=wheels_of(bundle.equipment.contacts),
             )
             self.world = World(self._engine, world, bundle.friction.ground)
             self._contacts = ContactDetector(self.body)

@@ -2,7 +2,7 @@
 
 import io
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import genpy
 import numpy as np
@@ -15,7 +15,8 @@ from solfer.middleware.ros.codecs.packed_message import PackedMessage, present
 from solfer.middleware.ros.tf import prefixed
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.numerics.rotations import quaternion_from_rotation
-from solfer_tools.scene import ContactForce, ScenePose, SceneState, ShownReference
+from solfer_tools.scene import ContactForce, ScenePose, SceneState, ShownReference, WorldSurface
+from solfer_tools.scene.live_scene import WORLD
 
 FORCE_SCALE = 1e-3
 """Length of the arrow of a force [m/N]."""
@@ -23,12 +24,15 @@ FORCE_SCALE = 1e-3
 AXES_LENGTH = 0.1
 """Length of the axes of a reference [m]."""
 
+WORLD_COLOR = (0.58, 0.55, 0.50, 1.0)
+"""Color of a world."""
+
 MEASURED_COLOR = (0.1, 0.4, 0.9, 1.0)
 """Color of what is measured: red, green, blue, opacity."""
 
 
 class SceneMarkers:
-    """Publishes a scene: `~markers` (visualization_msgs/MarkerArray), and the links of the desired robot on /tf.
+    """Publishes a scene: `~markers` `~world` (visualization_msgs/MarkerArray, latched), and the desired links on /tf.
 
     Namespaces of the markers are `center`, `polygon`, `margins`, `forces`, `cones`, `references`, `desired` (where
     references go), `names` and `path`.
@@ -40,6 +44,7 @@ class SceneMarkers:
     def __init__(self, prefix: str = ""):
         self._prefix = prefix
         self._markers = TopicPublisher("~markers", MarkerArray)
+        self._world = TopicPublisher("~world", MarkerArray, latch=True)
         self._transforms = TopicPublisher("/tf", TFMessage)
 
     def publish(self, state: SceneState) -> None:
@@ -49,9 +54,16 @@ class SceneMarkers:
         if state.desired and self._transforms.has_subscribers():
             self._transforms.send(_packed(TFMessage(list(self._placed(state)))))
 
+    def publish_world(self, surfaces: Sequence[WorldSurface]) -> None:
+        """Publish the world, in place of the one before."""
+        message = MarkerArray(markers=list(world_markers(surfaces)))
+        self._world.latch(message)
+        self._world.send(_packed(message))
+
     def close(self) -> None:
         """Unregister."""
         self._markers.close()
+        self._world.close()
         self._transforms.close()
 
     def _placed(self, state: SceneState) -> Iterator[TransformStamped]:
@@ -76,6 +88,16 @@ def markers_of(state: SceneState) -> Iterator[Marker]:
     for made in _markers(state):
         made.header.frame_id = state.frame
         made.lifetime = genpy.Duration.from_sec(0.5)  # disappears unless it is published again
+        yield made
+
+
+def world_markers(surfaces: Iterable[WorldSurface]) -> Iterator[Marker]:
+    """Make the markers of a world, behind one that deletes those of another one."""
+    yield Marker(action=Marker.DELETEALL)
+    for index, surface in enumerate(surfaces):
+        made = _marker(surface.name, index, Marker.TRIANGLE_LIST, scale=(1.0, 1.0, 1.0), color=WORLD_COLOR)
+        made.header.frame_id = WORLD
+        made.points = [_point(place) for place in surface.vertices[surface.faces].reshape(-1, 3)]
         yield made
 
 

@@ -3,6 +3,7 @@
 from solfer_tools.scene.dragging import DraggedReferences
 from solfer_tools.scene.live_scene import LiveScene
 from solfer_tools.scene.state import ContactForce, ScenePose, SceneState, ShownReference
+from solfer_tools.scene.world import ShownWorld, WorldSurface
 
 __all__ = [
     "ContactForce",
@@ -11,4 +12,6 @@ __all__ = [
     "ScenePose",
     "SceneState",
     "ShownReference",
+    "ShownWorld",
+    "WorldSurface",
 ]

@@ -20,7 +20,7 @@ def bundle_of(record: SimulationRecord, seed: int) -> BundleRecord:
     Raises:
         ConfigError, UnknownName: There is no such robot, or its file is wrong.
     """
-    bundle = read_bundle(_found(record, "robot"))
+    bundle = read_bundle(file_of(record, "robot"))
     sensors = bundle.sensors.perfect() if record.perfect else bundle.sensors.scaled(record.noise)
     changes: dict[str, float] = {"seed": (sensors.seed + seed) % 2**32}
     if record.delay is not None:
@@ -35,7 +35,7 @@ def simulation_of(record: SimulationRecord, bundle: BundleRecord, description: s
         SolferError: A link, a state, a world or a part of it does not exist, or the robot cannot be put into it.
     """
     changed = with_masses(description, record)
-    world = _found(record, "world")
+    world = file_of(record, "world")
     simulation = Simulation.from_file(
         bundle, gui, record.state, description_text=changed, world=world, engine=record.engine
     )
@@ -66,7 +66,7 @@ def files_of(record: SimulationRecord) -> list[Path]:
     Raises:
         ConfigError, UnknownName: One of them does not exist, or is wrong.
     """
-    files = [*_files_of_robot(_found(record, "robot")), _found(record, "world")]
+    files = [*_files_of_robot(file_of(record, "robot")), file_of(record, "world")]
     if record.transport is not None:
         files.append(record.transport.location)
     for file in files:
@@ -84,8 +84,12 @@ def _files_of_robot(robot: Path) -> list[Path]:
     return [robot, *(each.location for each in named if each is not None)]
 
 
-def _found(record: SimulationRecord, key: str) -> Path:
-    """Find the file of the robot or of the world, by its name or beside the file that names it."""
+def file_of(record: SimulationRecord, key: str) -> Path:
+    """Find the file of the `robot` or of the `world`, by its name or beside the file that names it.
+
+    Raises:
+        UnknownName: There is none of that name.
+    """
     name = getattr(record, key)
     is_path = "/" in name or name.endswith((".yaml", ".urdf"))
     try:

@@ -23,12 +23,13 @@ from solfer.robot.description.shipped import RobotFiles
 from solfer.simulation import SimulationServer
 from solfer.simulation.physics import STEP
 from solfer.simulation.server.publications import robot_parameters
+from solfer.simulation.world.world import WORLD_FILE
 from solfer.telemetry.plugin_log import PluginLog
 from solfer_tools.navigation import Course, Navigation, ReferenceCourse, ScenarioCourse, read_references
 from solfer_tools.scenarios import Player, read_scenario
 from solfer_tools.study.measures import Columns
 from solfer_tools.study.records import StudyRecord
-from solfer_tools.study.robot import bundle_of, faults_of, simulation_of
+from solfer_tools.study.robot import bundle_of, faults_of, file_of, simulation_of
 
 MOTION_PERIOD = 0.02
 """Period of what moves the robot [s]."""
@@ -94,7 +95,7 @@ class SimulatedRun:
         self._navigation: Navigation | None = None
         record = self.record
         bundle = bundle_of(record.simulation, self._options.seed)
-        parameters = robot_parameters(bundle)
+        parameters = robot_parameters(bundle) | {WORLD_FILE: str(file_of(record.simulation, "world"))}
         self.bus = Bus(parameters, faults_of(record.simulation, self._options.seed))
         self.simulation = simulation_of(
             record.simulation, bundle, parameters["/robot_description"], gui=self._options.gui

@@ -3,18 +3,20 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from viser import ArrowsHandle, FrameHandle, LineSegmentsHandle, SceneApi
+from viser import ArrowsHandle, FrameHandle, LineSegmentsHandle, MeshHandle, SceneApi
 from viser._messages import SetOrientationMessage, SetPositionMessage
 
 from solfer.model.urdf.description import Description
 from solfer.numerics.rotations import quaternion_from_rotation
-from solfer_tools.scene import ScenePose, SceneState, ShownReference
+from solfer_tools.scene import ScenePose, SceneState, ShownReference, ShownWorld
 from solfer_tools.view.visuals import Visual, visuals_of
 
 FORCE_SCALE = 1e-3
 """Length of the arrow of a force [m/N]."""
 
 FORCE_COLOR = (0.9, 0.3, 0.1)
+
+WORLD_COLOR = (0.58, 0.55, 0.50)
 
 LARGEST_AGREEMENT = 2e-3
 """Distance between a desired and a measured link up to which the desired one is not drawn [m]."""
@@ -28,16 +30,26 @@ class SceneDrawing:
     Args:
         api: What is seen there.
         description: The robot.
+        world: What it stands on and bumps into.
 
     Attributes:
         base: The first link that is seen.
     """
 
-    def __init__(self, api: SceneApi, description: Description):
+    def __init__(self, api: SceneApi, description: Description, world: ShownWorld):
         self._api = api
+        self._world = world
         visuals = visuals_of(description)
         api.add_grid("/ground", width=20.0, height=20.0, cell_size=0.5, section_size=1.0)
-        for group in ("/desired", "/center", "/support", "/path", "/forces", "/names"):  # a page may hide each
+        for group in (
+            "/desired",
+            "/center",
+            "/support",
+            "/path",
+            "/forces",
+            "/names",
+            "/world",
+        ):  # a page may hide each
             api.add_frame(group, show_axes=False)
         self.base = next((link for link, surfaces in visuals.items() if surfaces), description.root)
         self._measured = _Links(api, "/measured", visuals)
@@ -50,6 +62,26 @@ class SceneDrawing:
         self._estimated = _Line(api, "/path/estimated", (0.95, 0.6, 0.2))
         self._forces: ArrowsHandle | None = None
         self._references: dict[str, _Reference] = {}
+        self._surfaces: list[MeshHandle] = []
+
+    def update_world(self) -> None:
+        """Draw the world where it has changed, in place of what was there."""
+        surfaces = self._world.update()
+        if surfaces is None:
+            return
+        for old in self._surfaces:
+            old.remove()
+        self._surfaces = [
+            self._api.add_mesh_simple(
+                f"/world/{each.name}",
+                each.vertices,
+                each.faces,
+                color=WORLD_COLOR,
+                flat_shading=True,
+                side="double",
+            )
+            for each in surfaces
+        ]
 
     def update(self, state: SceneState) -> None:
         """Draw a scene."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from solfer.model.urdf.description import Description
 from solfer.transport import Middleware
 from solfer.transport.middleware import HealthReport
-from solfer_tools.scene import SceneState
+from solfer_tools.scene import SceneState, ShownWorld
 from solfer_tools.view.columns import LiveColumns
 from solfer_tools.view.commands.control import ONLY_WATCHES, PageControl
 from solfer_tools.view.commands.emergency_stop import EmergencyStopButton, StopActions
@@ -69,7 +69,7 @@ class Page:
         self._viser.initial_camera.fov = self.FIELD_OF_VIEW
         self._status = StatusBar(server, description.name, simulation)
         self._requests = PageRequests(middleware, self._viser)
-        self._drawing = SceneDrawing(self._viser.scene, description)
+        self._drawing = SceneDrawing(self._viser.scene, description, ShownWorld(middleware))
         self._views = OwnViews(self._viser, self._requests)
         self._control: PageControl | None = None
         self.foxglove: FoxgloveServer | None = None
@@ -120,6 +120,7 @@ class Page:
                 carry_out("the server for Foxglove", partial(self.foxglove.update, state))
         if self._control is not None:
             carry_out("the control", partial(self._control.update, state))
+        carry_out("the world", self._drawing.update_world)
         if state is None:
             return
         carry_out("the plot", partial(self._plots.update, now))

@@ -134,8 +134,60 @@ def test_an_srdf_replaces_the_keyframes_of_an_mjcf(folder, caplog):
     state = '<group_state name="low" group="g"><joint name="left_hip" value="0"/></group_state>'
     (folder / "own.srdf").write_text(f'<robot name="a"><group name="g"><joint name="left_hip"/></group>{state}</robot>')
     assert main(["new", "robot", "biped", "--from", "biped.xml", "--srdf", "own.srdf"]) == 0
-    assert "its keyframes are left out: --srdf has the states" in caplog.text
+    assert "its keyframes and excluded contacts are left out: --srdf has those" in caplog.text
     assert not list(folder.glob("biped/**/*.srdf"))
+
+
+def test_an_mjcf_is_no_urdf(folder, capsys):
+    (folder / "biped.xml").write_text(BIPED)
+    assert main(["new", "robot", "biped", "--urdf", "biped.xml"]) == 2
+    message = "error: --urdf biped.xml: the file is MJCF, not URDF\n  expected: --from biped.xml\n"
+    assert capsys.readouterr().err == message
+
+
+@pytest.fixture
+def menagerie(tmp_path_factory, monkeypatch):
+    """Make a cache of robot_descriptions: a robot with a second file, and a folder with two hands."""
+    cache = tmp_path_factory.mktemp("cache")
+    for name in ("maker_biped/biped", "maker_biped/biped_fast", "maker_biped/scene", "hand/left", "hand/right"):
+        file = cache / f"mujoco_menagerie/{name}.xml"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(BIPED)
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(cache))
+    return cache / "mujoco_menagerie"
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("maker_biped", "maker_biped/biped.xml"),
+        ("biped", "maker_biped/biped.xml"),
+        ("biped_fast", "maker_biped/biped_fast.xml"),
+        ("hand/left", "hand/left.xml"),
+    ],
+)
+def test_a_robot_of_the_menagerie(name, file, menagerie):
+    assert collections.find_robot(f"menagerie:{name}") == menagerie / file
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("maker_bipd", "unknown robot 'maker_bipd'\n  did you mean: maker_biped"),
+        ("hand", "2 robots are called 'hand'\n  expected: hand/left, hand/right"),
+    ],
+)
+def test_a_robot_that_the_menagerie_lacks(name, message, menagerie, capsys):
+    assert main(["new", "robot", "a", "--from", f"menagerie:{name}"]) == 2
+    assert f"error: --from menagerie:{name}: {message}" in capsys.readouterr().err
+
+
+def test_a_menagerie_that_is_not_there(folder, monkeypatch, capsys):
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(folder))
+    assert main(["new", "robot", "a", "--from", "menagerie:unitree_go2"]) == 2
+    error = capsys.readouterr().err
+    assert "MuJoCo's menagerie is not there" in error
+    assert f"as mujoco_menagerie or {folder / 'mujoco_menagerie'}" in error
 
 
 def test_a_urdf_that_is_called_xml(folder):

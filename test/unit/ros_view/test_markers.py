@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solfer_tools.ros_view.markers import FORCE_SCALE, markers_of
-from solfer_tools.scene import ContactForce, ScenePose, SceneState, ShownReference
+from solfer_tools.ros_view.markers import FORCE_SCALE, markers_of, world_markers
+from solfer_tools.scene import ContactForce, ScenePose, SceneState, ShownReference, WorldSurface
 
 FRICTION = 0.5
 SQUARE = np.array(((0.0, 0.0, 0.1), (1.0, 0.0, 0.1), (1.0, 1.0, 0.1), (0.0, 1.0, 0.1)))
@@ -72,3 +72,11 @@ def test_a_cone_holds_the_tip_of_what_friction_holds(sideways, holds):
 def test_a_lifted_contact_has_no_arrow():
     lifted = ContactForce("leg", np.ones(3), np.array((0.0, 0.0, 1.0)), False)
     assert not {"forces", "cones"} & {each.ns for each in markers_of(scene(forces=(lifted,)))}
+
+
+def test_a_world_takes_the_place_of_another_one():
+    faces = np.array(((0, 1, 2), (0, 2, 3)))
+    first, second = world_markers([WorldSurface("ramp", SQUARE, faces)])
+    assert first.action == first.DELETEALL
+    assert (second.ns, second.header.frame_id, second.type) == ("ramp", "world", second.TRIANGLE_LIST)
+    assert_allclose([xyz(point) for point in second.points], SQUARE[[0, 1, 2, 0, 2, 3]])

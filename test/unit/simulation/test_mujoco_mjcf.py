@@ -8,6 +8,7 @@ import pinocchio
 import pytest
 
 from solfer.errors import SolferError
+from solfer.model.srdf.semantics import Semantics
 from solfer.model.urdf.description import Description
 from solfer.simulation.loading.meshes import TRIANGLE
 from solfer.simulation.mujoco.library import load_mujoco
@@ -248,15 +249,27 @@ CURVED = '<equality><joint name="cam" joint1="elbow" joint2="wrist" polycoef="0 
         ({"more": '<actuator><muscle name="biceps" joint="elbow" lengthrange="0 1"/></actuator>'}, "motors: biceps"),
         ({"more": '<actuator><motor name="jet" site="tip"/></actuator>'}, "their joints get motors: jet"),
         ({"body": '<body><joint stiffness="2"/><geom size="1"/></body>'}, "to the actuators' file: joint_2"),
+        ({"body": '<body><joint name="hip" damping="1 2"/><geom size="1"/></body>'}, "rest: hip ({file}:4:70)"),
+        ({"body": '<body name="head" gravcomp="1"><geom size="1"/></body>'}, "the weight: head ({file}:4:64)"),
+        ({"more": '<contact><exclude body1="world" body2="arm"/></contact>'}, "say: world arm ({file}:8:12)"),
+        ({"more": '<actuator><motor name="m" joint="elbow" damping="3"/></actuator>'}, "joints: m ({file}:8:13)"),
         ({"body": '<body><joint type="slide"/><geom size="1"/></body>'}, "range, so that 1000 m counts: joint_2"),
         ({"more": SURFACE, "body": '<geom type="hfield" hfield="hill"/>'}, "or meshes: number 2"),
     ],
 )
 def test_what_a_urdf_lacks_is_a_warning(part, message, tmp_path, caplog):
+    file = arm(tmp_path, **part)
     with caplog.at_level(logging.WARNING):
-        made = convert_mjcf(arm(tmp_path, **part), "arm")
-    assert message in caplog.text
+        made = convert_mjcf(file, "arm")
+    assert message.format(file=file) in caplog.text
     assert Description.from_text(made["arm.urdf"].decode()).root == "world"
+
+
+def test_bodies_that_do_not_touch_are_those_of_the_srdf(tmp_path):
+    made = convert_mjcf(arm(tmp_path, more='<contact><exclude body1="hand" body2="arm"/></contact>'), "arm")
+    description = Description.from_text(made["arm.urdf"].decode())
+    semantics = Semantics.from_text(made["arm.srdf"].decode(), description, where="arm.srdf")
+    assert semantics.apart == {frozenset(("arm", "hand"))}
 
 
 GRID = '<flexcomp name="cloth" type="grid" count="3 3 1" spacing="1 1 1" dim="2" mass="1"/>'

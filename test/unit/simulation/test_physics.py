@@ -10,9 +10,11 @@ from scipy.integrate import solve_ivp
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
 from solfer.simulation.bullet import BulletEngine
+from solfer.simulation.loading.wheels import TorusWheel
 from solfer.simulation.mujoco import MujocoEngine
 from solfer.simulation.physics import STEP, CameraView
-from solfer.simulation.world.records import Friction
+from solfer.simulation.world.records import Friction, StairsRecord, WorldRecord
+from solfer.simulation.world.world import World
 
 pytestmark = pytest.mark.needs("simulation")
 ENGINES = [BulletEngine, MujocoEngine]
@@ -50,6 +52,20 @@ BALL = """<robot name="ball"><link name="ball"><inertial><mass value="2"/>
 """A ball whose mass is distributed evenly, 2/5 m r^2."""
 
 
+CART = """<robot name="cart"><link name="rail"/>
+  <joint name="way" type="prismatic"><parent link="rail"/><child link="slide"/><axis xyz="1 0 0"/>
+    <limit lower="-9" upper="9" effort="0" velocity="9"/></joint>
+  <link name="slide"><inertial><mass value="1"/>{inertia}</inertial></link>
+  <joint name="height" type="prismatic"><parent link="slide"/><child link="fork"/><axis xyz="0 0 1"/>
+    <limit lower="-9" upper="9" effort="0" velocity="9"/></joint>
+  <link name="fork"><inertial><mass value="20"/>{inertia}</inertial></link>
+  <joint name="axle" type="continuous"><parent link="fork"/><child link="tire"/>
+    <origin rpy="{camber} 0 0"/><axis xyz="0 1 0"/></joint>
+  <link name="tire"><inertial><origin xyz="0 0.1 0"/><mass value="2"/>{inertia}</inertial>
+    <collision><origin xyz="0 0.1 0"/><geometry><sphere radius="{radius}"/></geometry></collision></link></robot>"""
+"""A wheel that leans to the side below a load that moves along x and z."""
+
+
 @pytest.fixture(params=ENGINES)
 def engine(request):
     with closing(request.param()) as made:
@@ -73,6 +89,14 @@ def load_pendulum(engine, limits=""):
 
 def load_ball(engine, friction):
     return engine.load_robot(Description.from_text(BALL), (), Friction(default=friction), floats=True)
+
+
+def load_cart(engine, camber, wheel):
+    description = Description.from_text(CART.format(inertia=INERTIA, camber=camber, radius=wheel.ring + wheel.tube))
+    joints = ("way", "height", "axle")
+    robot = engine.load_robot(description, joints, Friction(), floats=False, wheels={"tire": wheel})
+    robot.set_losses([0.0] * 3, [0.0] * 3, np.ones(3))
+    return robot
 
 
 def slope(angle):
@@ -271,6 +295,36 @@ def test_what_falls_does_not_bounce(engine):
     assert np.linalg.norm(robot.base_state().linear) < 1e-3
 
 
+@pytest.mark.parametrize("camber", [-20.0, 0.0, 10.0])
+@pytest.mark.parametrize(("ring", "tube"), [(0.010, 0.068), (0.25, 0.03)])
+def test_a_wheel_rolls_as_its_torus(engine, ring, tube, camber):
+    """Its contact is at c - R (n - a (a.n)) / |n - a (a.n)| - r n, and it rolls by R + r cos(camber).
+
+    Its centre is beside the origin of its link. PyBullet has a ball, which is near a torus with a small ring.
+    """
+    is_ball = isinstance(engine, BulletEngine)
+    if is_ball and ring > tube:
+        pytest.skip("a ball is no wheel with a thin tire")
+    angle = math.radians(camber)
+    wheel = TorusWheel((0.0, 0.1, 0.0), (0.0, 3.0, 0.0), ring, tube=tube)
+    robot = load_cart(engine, angle, wheel)
+    engine.add_plane((0.0, 0.0, 1.0), 1.0)
+    y, z = 0.1 * math.cos(angle), 0.1 * math.sin(angle)  # of the centre from the origin of the link
+    robot.place_joints([0.0, ring * math.cos(angle) + tube - z, 0.0])
+    drive = robot.group([2])
+    ways = []
+    for _ in range(2):
+        for _ in range(400):
+            drive.hold_speeds(np.array([2.0]), [100.0])
+            engine.step()
+        ways.append(robot.joint_states().position)
+    (start, _, first), (end, height, last) = ways
+    assert (end - start) / (last - first) == pytest.approx(ring + tube * math.cos(angle), abs=1e-3)
+    assert height + z == pytest.approx(ring * math.cos(angle) + tube, abs=1e-3)
+    place = np.average([point.position[1] for point in robot.contacts()])
+    assert place == pytest.approx(y if is_ball else y + ring * math.sin(angle), abs=1e-3)
+
+
 def test_equal_calls_give_equal_motions_to_the_bit(request):
     for make in ENGINES:
         ends = []
@@ -312,6 +366,53 @@ def test_boxes_stand_are_put_and_stopped(engine):
     run(engine, 1)
     assert engine.pose(crate)[0][2] == pytest.approx(2.0, abs=1e-4)
     engine.set_friction(crate, 0.2)
+
+
+STAIRS = StairsRecord(position=(0.0, 0.0), count=3, rise=0.15, tread=0.4, width=1.0)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_ball_rests_on_each_step_of_stairs(engine, number):
+    World(engine, WorldRecord(stairs={"steps": STAIRS}))
+    robot = load_ball(engine, 1.0)
+    place = 0.4 * (number - 0.5)
+    robot.place_base((place, 0.0, 0.15 * number + 0.11), UPRIGHT)
+    run(engine, 500)
+    assert robot.base_state().position == pytest.approx((place, 0.0, 0.15 * number + 0.1), abs=1e-3)
+
+
+def test_what_rests_on_a_box_falls_when_it_moves(engine):
+    """A ball falls onto a shelf that is put lower, and beside one that is put away."""
+    shelf = engine.add_box((1.0, 1.0, 0.2), ((0.0, 0.0, 0.9), UPRIGHT), 0.0, friction=1.0, colour=GREY)
+    robot = load_ball(engine, 1.0)
+    robot.place_base((0.0, 0.0, 1.1), UPRIGHT)
+    run(engine, 200)
+    assert robot.base_state().position[2] == pytest.approx(1.1, abs=1e-3)
+    engine.place(shelf, ((0.0, 0.0, 0.4), UPRIGHT))
+    run(engine, 1000)
+    assert robot.base_state().position[2] == pytest.approx(0.6, abs=1e-3)
+    engine.place(shelf, ((5.0, 0.0, 0.4), UPRIGHT))
+    run(engine, 100)
+    assert robot.base_state().position[2] == pytest.approx(0.6 - 0.5 * GRAVITY * 0.01, abs=2e-3)
+
+
+def test_a_ball_pushes_a_box_and_shares_its_momentum(engine):
+    """They slide without friction, and do not bounce: the momentum stays, and both end with one speed."""
+    engine.add_plane((0.0, 0.0, 1.0), 0.0)
+    crate = engine.add_box((0.2, 0.2, 0.2), ((0.5, 0.0, 0.1), UPRIGHT), 3.0, friction=0.0, colour=GREY)
+    robot = load_ball(engine, 0.0)
+    robot.place_base((0.0, 0.0, 0.1), UPRIGHT)
+    for _ in range(200):
+        robot.push("ball", [20.0, 0.0, 0.0], [0.0] * 3, robot.center_of_mass().tolist())
+        engine.step()
+    assert robot.base_state().linear[0] == pytest.approx(2.0, abs=1e-3)
+    run(engine, 300)
+    begin = engine.pose(crate)[0][0]
+    run(engine, 100)
+    speed = (engine.pose(crate)[0][0] - begin) / (100 * STEP)
+    momentum = 3.0 * speed + 2.0 * robot.base_state().linear[0]
+    assert momentum == pytest.approx(4.0, rel=0.01)
+    assert speed >= 0.8 - 1e-3 and robot.base_state().linear[0] <= speed + 1e-3
 
 
 GRID = np.array([[0.0, 0.1, 0.3, 0.2], [0.05, 0.2, 0.1, 0.4], [0.3, 0.1, 0.0, 0.6]]) + 1.0

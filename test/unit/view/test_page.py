@@ -21,11 +21,13 @@ from viser import _messages  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.simulation.server.services import PushRequest, ResetRequest  # noqa: E402
+from solfer.simulation.world.world import find_world, read_world  # noqa: E402
 from solfer.transport.health import Health  # noqa: E402
 from solfer.transport.lower_level import Answer  # noqa: E402
 from solfer.transport.middleware import Flag, NoFields  # noqa: E402
 from solfer.transport.parameters import GetParameters, ParametersReply, SetParameters  # noqa: E402
 from solfer_tools.scene import ScenePose  # noqa: E402
+from solfer_tools.scene.world import surfaces_of  # noqa: E402
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +73,13 @@ def test_links_are_where_the_robot_measures_them(bench):
         assert_allclose(seen[name], robot.kinematics.position(name.rpartition("/")[2]), atol=1e-4, err_msg=name)
     assert_allclose(seen["/center/mass"], robot.kinematics.center_of_mass, atol=1e-4)
     assert_allclose(seen["/references/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
+
+
+def test_the_world_of_a_simulation_is_seen(bench):
+    bench.bus.parameters["/world_file"] = str(find_world("steps"))
+    bench.run(50)
+    expected = {f"/world/{each.name}" for each in surfaces_of(read_world(find_world("steps")))}
+    assert expected and expected <= {*bench.page._drawing._api._handle_from_node_name}
 
 
 def test_each_page_has_its_own_view(bench):

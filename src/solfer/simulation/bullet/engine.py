@@ -1,12 +1,13 @@
 """A physics engine: PyBullet."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from solfer.model.urdf.description import Description
 from solfer.simulation.bullet.client import BulletClient
 from solfer.simulation.bullet.robot import BulletRobot
+from solfer.simulation.loading.wheels import NO_WHEELS, TorusWheel
 from solfer.simulation.physics import STEP, CameraView, Colour, PhysicsEngine, Picture, Pose, Vector
 from solfer.simulation.world.records import Friction
 
@@ -38,9 +39,15 @@ class BulletEngine(PhysicsEngine):
         )
 
     def load_robot(
-        self, description: Description, joints: Sequence[str], friction: Friction, *, floats: bool
+        self,
+        description: Description,
+        joints: Sequence[str],
+        friction: Friction,
+        *,
+        floats: bool,
+        wheels: Mapping[str, TorusWheel] = NO_WHEELS,
     ) -> BulletRobot:
-        """See `PhysicsEngine.load_robot`."""
+        """See `PhysicsEngine.load_robot`. Wheels have the shapes of the description: PyBullet has none of a torus."""
         return BulletRobot(self._world, description, joints, friction=friction, floats=floats)
 
     def add_plane(self, normal: Sequence[float], friction: float) -> int:

@@ -1,13 +1,14 @@
 """A physics engine: MuJoCo."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
-from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_onto
+from solfer.simulation.loading.wheels import NO_WHEELS, TorusWheel
 from solfer.simulation.mujoco.drawing import SEEN, MujocoCamera
 from solfer.simulation.mujoco.robot import MujocoRobot
 from solfer.simulation.mujoco.shapes import box_around
@@ -42,14 +43,20 @@ class MujocoEngine(PhysicsEngine):
         self._saved = 0
 
     def load_robot(
-        self, description: Description, joints: Sequence[str], friction: Friction, *, floats: bool
+        self,
+        description: Description,
+        joints: Sequence[str],
+        friction: Friction,
+        *,
+        floats: bool,
+        wheels: Mapping[str, TorusWheel] = NO_WHEELS,
     ) -> MujocoRobot:
         """See `PhysicsEngine.load_robot`."""
-        return MujocoRobot(self._world, description, joints, friction, floats=floats, draws=self._draws)
+        return MujocoRobot(self._world, description, joints, friction, floats=floats, wheels=wheels, draws=self._draws)
 
     def add_plane(self, normal: Sequence[float], friction: float) -> int:
         """See `PhysicsEngine.add_plane`."""
-        pose = (0.0, 0.0, 0.0), _upright_on(normal)
+        pose = (0.0, 0.0, 0.0), quaternion_from_rotation(rotation_onto(normal))
         return self._add(pose, friction, type=self._mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0))
 
     def add_box(self, size: Sequence[float], pose: Pose, mass: float, friction: float, colour: Colour) -> int:
@@ -169,11 +176,3 @@ class MujocoEngine(PhysicsEngine):
     @property
     def _mujoco(self) -> Any:
         return self._world.mujoco
-
-
-def _upright_on(normal: Sequence[float]) -> np.ndarray:
-    """Compute an orientation whose z is along a normal, (x, y, z, w), shape (4,)."""
-    z = np.asarray(normal) / np.linalg.norm(normal)
-    x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (0.0, 0.0, 1.0), z)
-    x /= np.linalg.norm(x)
-    return quaternion_from_rotation(np.column_stack((x, np.cross(z, x), z)))

@@ -56,7 +56,7 @@ def convert_mjcf(path: Path, name: str) -> dict[str, bytes]:
         name: Name of the robot.
 
     Returns:
-        Contents of files by name: `NAME.urdf`, its meshes, and `NAME.srdf` if there are keyframes.
+        Contents of files by name: `NAME.urdf`, its meshes, and `NAME.srdf` if there are keyframes or excluded contacts.
 
     Raises:
         MissingDependency: MuJoCo is not installed.
@@ -95,9 +95,10 @@ class _Converter:
         self._warn_of_defaults()
         self._warn_of_lacks()
         made = {f"{self._name}.urdf": _bytes(robot)}
-        states = self._states()
-        if states is not None:
-            made[f"{self._name}.srdf"] = _bytes(states)
+        semantics = Element("robot", name=self._name)
+        semantics.extend((*self._states(), *self._excluded()))
+        if len(semantics):
+            made[f"{self._name}.srdf"] = _bytes(semantics)
         return made | {f"meshes/{file}": content for file, content in self._geoms.meshes.items()}
 
     def _compile(self, path: Path, documents: dict[str, Element]) -> Any:
@@ -128,6 +129,11 @@ class _Converter:
     def _at(self, kind: str, name: str) -> str:
         place = self._places.get((kind, name), self._where)
         return f"{place}: {kind} '{name}'"
+
+    def _placed(self, kind: str, name: str, more: str = "") -> str:
+        """Return the name of an element, and where it is if that is known."""
+        place = self._places.get((kind, name))
+        return f"{name}{more} ({place})" if place else name + more
 
     def _names(self, kind: Any, count: int, stem: str) -> list[str]:
         """Return the names of all elements of a kind; those without get their numbers."""
@@ -217,10 +223,9 @@ class _Converter:
                 }
             else:
                 name = self._name_of(self._mujoco.mjtObj.mjOBJ_EQUALITY, number)
-                place = self._places.get(("equality", name))
-                if model.eq_objtype[number] == self._mujoco.mjtObj.mjOBJ_BODY:
-                    name += f" of {self._links[joint]} and {self._links[leader]}"
-                unread.append(f"{name} ({place})" if place else name)
+                of_bodies = model.eq_objtype[number] == self._mujoco.mjtObj.mjOBJ_BODY
+                ends = f" of {self._links[joint]} and {self._links[leader]}" if of_bodies else ""
+                unread.append(self._placed("equality", name, ends))
         self._warn(
             "equalities that are not of two joints in proportion are left out, so that loops are open: fix or remove "
             "the joints that they hold",
@@ -306,23 +311,35 @@ class _Converter:
             return "prismatic"
         return "revolute" if self._model.jnt_limited[joint] else "continuous"
 
-    def _states(self) -> Element | None:
-        """Make the SRDF with the keyframes that have names; None: there are none."""
+    def _states(self) -> Iterator[Element]:
+        """Yield the keyframes that have names as states, behind the group of their joints."""
         model = self._model
         joints = [joint for joint in range(model.njnt) if joint not in self._free and joint not in self._leaders]
         keys = [(model.key(key).name, key) for key in range(model.nkey) if model.key(key).name]
         if not keys or not joints:
-            return None
-        robot = Element("robot", name=self._name)
-        group = SubElement(robot, "group", name="joints")
+            return
+        group = Element("group", name="joints")
         for joint in joints:
             SubElement(group, "joint", name=self._joints[joint])
+        yield group
         for name, key in sorted(keys, key=lambda each: each[0] != FIRST_STATE):
-            state = SubElement(robot, "group_state", name=name, group="joints")
+            state = Element("group_state", name=name, group="joints")
             for joint in joints:
                 value = float(model.key_qpos[key, model.jnt_qposadr[joint]])
                 SubElement(state, "joint", name=self._joints[joint], value=repr(value))
-        return robot
+            yield state
+
+    def _excluded(self) -> Iterator[Element]:
+        """Yield the pairs of bodies of the robot that do not touch; the world cannot be one of them."""
+        unread = []
+        for signature in self._model.exclude_signature.tolist():
+            pair = [signature >> 16, signature & 0xFFFF]
+            first, second = (self._links[body] for body in pair)
+            if {*pair} <= {*self._bodies}:
+                yield Element("disable_collisions", link1=first, link2=second, reason="Exclude")
+            else:
+                unread.append(self._placed("exclude", f"{first} {second}"))
+        self._warn("contacts of the robot with the world are excluded, which a URDF cannot say", unread)
 
     def _warn_of_defaults(self) -> None:
         """Note the limits that were made up; a follower has those of its leader."""
@@ -352,9 +369,28 @@ class _Converter:
         )
         self._warn(
             "springs of joints are left out: add them to the actuators' file",
-            self._named(joint for joint in moving if model.jnt_stiffness[joint]),
+            self._named(
+                joint for joint in moving if model.jnt_stiffness[joint] or model.jnt_stiffnesspoly[joint].any()
+            ),
+        )
+        self._warn(
+            "damping that grows with the speed is left out, beside that at rest",
+            [
+                self._placed("joint", self._joints[joint])
+                for joint in moving
+                if model.dof_dampingpoly[model.jnt_dofadr[joint]].any()
+            ],
+        )
+        self._warn(
+            "gravcomp is left out: the component `compensation` carries the weight",
+            [self._placed("body", self._links[body]) for body in self._bodies if model.body_gravcomp[body]],
         )
         kinds = self._mujoco.mjtObj
+        dampers = np.flatnonzero(model.actuator_damping)
+        self._warn(
+            "damping of actuators is left out: add it to that of their joints",
+            [self._placed("actuator", self._name_of(kinds.mjOBJ_ACTUATOR, int(each))) for each in dampers],
+        )
         tendons = [self._name_of(kinds.mjOBJ_TENDON, each) for each in range(model.ntendon)]
         self._warn("tendons are left out: couple their joints by equalities of joints", tendons)
         plugins = [self._name_of(kinds.mjOBJ_PLUGIN, each) for each in range(model.nplugin)]
@@ -402,11 +438,16 @@ def _documents(path: Path) -> dict[str, Element]:
 
 
 def _places(documents: dict[str, Element], folder: Path) -> Iterator[tuple[tuple[str, str], str]]:
-    """Yield `file:line:column` of each element that has a name, by its kind and name."""
+    """Yield `file:line:column` of elements by their kind and their name, or the bodies that they exclude."""
     for file, root in documents.items():
         for parent in root.iter():
             for element in parent:
                 assert isinstance(element, PlacedElement)
                 kind = parent.tag if parent.tag in ("equality", "tendon", "actuator") else element.tag
-                if element.get("name"):
-                    yield (kind, element.get("name", "")), f"{folder / file}:{element.line}:{element.column}"
+                place = f"{folder / file}:{element.line}:{element.column}"
+                if kind == "exclude":
+                    first, second = element.get("body1", ""), element.get("body2", "")
+                    yield (kind, f"{first} {second}"), place
+                    yield (kind, f"{second} {first}"), place
+                elif element.get("name"):
+                    yield (kind, element.get("name", "")), place

@@ -1,7 +1,7 @@
 """A robot that MuJoCo has loaded."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -11,10 +11,11 @@ import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
-from solfer.numerics.rotations import rotated
+from solfer.numerics.rotations import quaternion_from_rotation, rotated, rotation_onto
 from solfer.simulation.loading.body_urdf import body_urdf
 from solfer.simulation.loading.friction import coefficients
 from solfer.simulation.loading.meshes import MeshReader
+from solfer.simulation.loading.wheels import TorusWheel
 from solfer.simulation.mujoco.motors import RIGID
 from solfer.simulation.mujoco.shapes import box_around, closest_points
 from solfer.simulation.mujoco.touching import BODY, LINK, ROBOT, Touching
@@ -63,6 +64,7 @@ class MujocoRobot(RobotInEngine):
         joints: Its moving joints, in the order in which they are read and driven.
         friction: Friction of its links.
         floats: Whether its base moves.
+        wheels: Wheels by link.
         draws: Whether it is loaded with the shapes by which it is seen.
 
     Raises:
@@ -77,6 +79,7 @@ class MujocoRobot(RobotInEngine):
         friction: Friction,
         *,
         floats: bool,
+        wheels: Mapping[str, TorusWheel],
         draws: bool,
     ):
         self._world = world
@@ -88,6 +91,8 @@ class MujocoRobot(RobotInEngine):
         of_links = coefficients(friction, urdf.owner)
         try:
             spec = self._specification(text, assets, urdf.base, floats=floats)
+            turning = {link: wheels[link] for link in wheels if self.owner.get(link) == link != urdf.base}
+            self._put_wheels(spec, turning)
             world.change()
             world.spec.attach(spec, prefix=ROBOT, frame=world.spec.worldbody.add_frame())
             world.compile()
@@ -217,6 +222,17 @@ class MujocoRobot(RobotInEngine):
             if geom.contype:
                 Touching.ROBOT.prepare(geom)
         return spec
+
+    def _put_wheels(self, spec: Any, wheels: Mapping[str, TorusWheel]) -> None:
+        """Let links touch by ellipsoids alone that roll as their wheels do."""
+        for link, wheel in wheels.items():
+            body = spec.body(LINK + link)
+            for geom in body.geoms:
+                if geom.contype:
+                    spec.delete(geom)
+            x, y, z, w = quaternion_from_rotation(rotation_onto(wheel.axis))
+            kind = self._world.mujoco.mjtGeom.mjGEOM_ELLIPSOID
+            Touching.ROBOT.prepare(body.add_geom(type=kind, size=wheel.half_axes, pos=wheel.center, quat=(w, x, y, z)))
 
     def _find(self, base: str, joints: Sequence[str], *, floats: bool) -> None:
         """Find the numbers of links and joints, which other bodies do not change."""

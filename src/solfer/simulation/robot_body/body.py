@@ -1,7 +1,7 @@
 """A robot in the world of a physics engine: its state, its motors, and where it is put."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 from solfer.model.urdf.description import Description
+from solfer.simulation.loading.wheels import NO_WHEELS, TorusWheel
 from solfer.simulation.physics import PhysicsEngine
 from solfer.simulation.robot_body.base import FloatingBase
 from solfer.simulation.robot_body.motors import BodyMotors
@@ -29,6 +30,7 @@ class Body:
         motors: DoFs with motors that hold a speed; all other joints are driven by torques.
         friction: Friction of its links.
         lossless: Joints without the damping and friction of the description.
+        wheels: Wheels by link.
 
     Attributes:
         robot: The robot as the engine has loaded it.
@@ -53,11 +55,12 @@ class Body:
         friction: Friction,
         *,
         lossless: Collection[str] = (),
+        wheels: Mapping[str, TorusWheel] = NO_WHEELS,
     ):
         floats = kinematics.base is not None
         self._first = 6 if floats else 0
         self.joints = tuple(kinematics.dofs[self._first :])
-        self.robot = engine.load_robot(description, self.joints, friction, floats=floats)
+        self.robot = engine.load_robot(description, self.joints, friction, floats=floats, wheels=wheels)
         self.owner = self.robot.owner
         self.links = self.robot.links
         self.base_link = self.links[-1]

@@ -15,6 +15,9 @@ from solfer.simulation.world.grids import Grid
 from solfer.simulation.world.records import GROUND_NAME, BoxRecord, GridRecord, StairsRecord, WorldRecord
 
 FLAT_WORLD = WorldRecord()
+WORLD_FILE = "/world_file"
+"""Parameter with the file of the world in which a robot is simulated."""
+
 COLOUR: Colour = (0.58, 0.55, 0.50, 1.0)
 """What is seen of a world."""
 

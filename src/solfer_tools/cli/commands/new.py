@@ -5,8 +5,8 @@ launch file, and a test that passes at once and needs no ROS master. Change the 
 
 `solfer new robot NAME --urdf FILE` makes one for a robot: the file that describes it, a configuration with one plugin
 that moves its joints, a launch file, and a test that simulates it. `--from COLLECTION:NAME` takes a robot of
-example-robot-data, pybullet_data or robot_descriptions instead, `--from FILE.xml` one that MJCF describes,
-which becomes a URDF.
+example-robot-data, pybullet_data, robot_descriptions or MuJoCo's menagerie instead, `--from FILE.xml` one that MJCF
+describes, which becomes a URDF.
 """
 
 import argparse
@@ -63,6 +63,7 @@ def _write_component(name: str, folder: Path, options: argparse.Namespace) -> No
 
 
 def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
+    from solfer.errors import ModelError
     from solfer.simulation.mujoco.mjcf import convert_mjcf, is_mjcf
     from solfer_tools.cli.skeletons.collections import find_robot
     from solfer_tools.cli.skeletons.robot import RobotSkeleton
@@ -70,7 +71,9 @@ def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
     urdf = options.urdf if options.source is None else find_robot(options.source)
     srdf = options.srdf
     made: dict[str, bytes] = {}
-    if options.source is not None and is_mjcf(urdf):
+    if is_mjcf(urdf):
+        if options.source is None:
+            raise ModelError("the file is MJCF, not URDF", where=f"--urdf {urdf}", expected=f"--from {urdf}")
         made = convert_mjcf(urdf, name)
         urdf = Path(f"{name}.urdf")
         states = Path(f"{name}.srdf")
@@ -78,7 +81,7 @@ def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
             srdf = states
         elif states.name in made:
             del made[states.name]
-            logger.warning("%s: its keyframes are left out: --srdf has the states", options.source)
+            logger.warning("%s: its keyframes and excluded contacts are left out: --srdf has those", options.source)
     skeleton = RobotSkeleton(name, folder, urdf, srdf=srdf, floating_base=options.floating_base, made=made)
     skeleton.write()
     _simulate(skeleton.bundle)

@@ -1,7 +1,8 @@
-"""Robots of collections that are installed as Python packages."""
+"""Robots of collections: of Python packages, and of MuJoCo's menagerie."""
 
 import importlib
 import importlib.util
+import os
 import pkgutil
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -12,8 +13,8 @@ from solfer.installation import pip_install
 EXAMPLES = "example-robot-data"
 PYBULLET = "pybullet_data"
 DESCRIPTIONS_PACKAGE = "robot_descriptions"
-COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS_PACKAGE)
-
+MENAGERIE = "menagerie"
+COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS_PACKAGE, MENAGERIE)
 
 SUFFIXES = (".xml", ".mjcf", ".urdf")
 """Ends of files that are named in place of a collection."""
@@ -23,12 +24,12 @@ def find_robot(source: str) -> Path:
     """Find the URDF or the MJCF of a robot.
 
     Args:
-        source: A file, or `COLLECTION:NAME`. The name is that of the URDF without its end, with its folders where
-            several have one name, or, of robot_descriptions, that of the module.
+        source: A file, or `COLLECTION:NAME`. The name is that of the file without its end, with its folders where
+            several have one name; of the menagerie also that of its folder; of robot_descriptions that of the module.
 
     Raises:
         UnknownName: There is no such collection, or it has no such robot.
-        MissingDependency: The collection is not installed.
+        MissingDependency: The collection is not there.
         ModelError: The name stands for several files, or robot_descriptions cannot get the robot.
     """
     collection, colon, name = source.partition(":")
@@ -38,18 +39,40 @@ def find_robot(source: str) -> Path:
         raise UnknownName("collection of robots", collection, COLLECTIONS, where=f"--from {source}")
     if collection == DESCRIPTIONS_PACKAGE:
         return _described(name, source)
-    folder = folder_of(collection)
-    files = {path.relative_to(folder).with_suffix("").as_posix(): path for path in sorted(folder.rglob("*.urdf"))}
-    found = [path for key, path in files.items() if key == name or key.endswith(f"/{name}")]
-    if not found:
-        names = {key.rpartition("/")[2] for key in files} | set(files)
-        raise UnknownName("robot", name, sorted(names), where=f"--from {source}")
+    folder = _menagerie() if collection == MENAGERIE else folder_of(collection)
+    paths = _described_by_mjcf(folder) if collection == MENAGERIE else sorted(folder.rglob("*.urdf"))
+    files = {path.relative_to(folder).with_suffix("").as_posix(): path for path in paths}
     if name in files:
         return files[name]
+    found = [key for key in files if key.endswith(f"/{name}")] or [key for key in files if key.startswith(f"{name}/")]
+    if not found:
+        names = {part for key in files for part in (key, *key.split("/"))}
+        raise UnknownName("robot", name, sorted(names), where=f"--from {source}")
+    # folders are called by the maker and the robot: unitree_go2/go2
+    found = [key for key in found if name.endswith(key.rpartition("/")[2])] or found
     if len(found) > 1:
-        several = ", ".join(path.relative_to(folder).with_suffix("").as_posix() for path in found)
-        raise ModelError(f"{len(found)} robots are called '{name}'", where=f"--from {source}", expected=several)
-    return found[0]
+        raise ModelError(
+            f"{len(found)} robots are called '{name}'", where=f"--from {source}", expected=", ".join(found)
+        )
+    return files[found[0]]
+
+
+def _menagerie() -> Path:
+    """Return the folder of MuJoCo's menagerie: here, or in the cache of robot_descriptions."""
+    cache = os.environ.get("ROBOT_DESCRIPTIONS_CACHE") or "~/.cache/robot_descriptions"
+    folders = [Path(place).expanduser() / "mujoco_menagerie" for place in (".", cache)]
+    for folder in folders:
+        if folder.is_dir():
+            return folder
+    raise MissingDependency(
+        "MuJoCo's menagerie is not there",
+        expected=f"a clone of github.com/google-deepmind/mujoco_menagerie as {' or '.join(map(str, folders))}",
+    )
+
+
+def _described_by_mjcf(folder: Path) -> list[Path]:
+    """List the files with robots; a scene includes one of them, beside its floor."""
+    return [path for path in sorted(folder.glob("*/*.xml")) if not path.stem.startswith("scene")]
 
 
 def folder_of(collection: str) -> Path:

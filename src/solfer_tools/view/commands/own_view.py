@@ -42,6 +42,7 @@ SHOWN = {  # group of the drawing: label, colour and meaning
     "/center": ("centre of mass", "#1a66e6", "centre of mass; red: its projection on the ground"),
     "/path": ("path", "#9933cc", "path of the base; orange: as odometry estimates it"),
     "/names": ("names", "#495057", "names of the tasks' references; grey ball: the target"),
+    "/world": ("world", "#948c80", "what the robot stands on and bumps into in a simulation"),
 }
 """What a page may hide, with its legend."""
 
