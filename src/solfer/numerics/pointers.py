@@ -28,15 +28,24 @@ integers = pointer_to(types.int64)
 booleans = pointer_to(types.boolean)
 
 
-@intrinsic
-def release_fence(_typing):
-    """Let other processors see all that was written before no later than what is written afterwards."""
+def _fence(ordering: str) -> Any:
+    """Make a function that keeps accesses to memory in order, on each side of it, as other processors see them."""
 
-    def generate(context, builder, _signature, _arguments):
-        builder.fence("release")
-        return context.get_dummy_value()
+    @intrinsic
+    def fence(_typing):
+        def generate(context, builder, _signature, _arguments):
+            builder.fence(ordering)
+            return context.get_dummy_value()
 
-    return types.void(), generate
+        return types.void(), generate
+
+    return fence
+
+
+acquire_fence = _fence("acquire")
+"""acquire_fence(): all later accesses wait for all earlier reads."""
+release_fence = _fence("release")
+"""release_fence(): all later writes wait for all earlier accesses."""
 
 
 def address(array: np.ndarray) -> int:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from solfer.segments.files import PREFIX
 from solfer.segments.latched import latched
+from solfer.segments.words import words_of
 
 # words of the memory
 TRIPPED = 0
@@ -40,7 +41,7 @@ class EmergencyStopLatch:
         words = 8 * 6  # [B]
         text = self.TEXT_SIZE
         self.segment = latched(folder / "estop", "estop", layout, size=words + 2 * text)
-        self._words = self.segment.data[:words].cast("q")
+        self._words = words_of(self.segment.data[:words])
         self._text = self.segment.data[words : words + text]
         self._answer = self.segment.data[words + text : words + 2 * text]
 

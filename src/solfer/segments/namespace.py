@@ -10,9 +10,12 @@ from urllib.parse import quote, unquote
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.segments import files
+from solfer.segments.words import Words, words_of
 
 SHARED_MEMORY = Path("/dev/shm")
 NOTIFICATIONS_FILE = "bells"
+NOTIFICATIONS = 512
+"""Numbers in that file."""
 ANY = 0
 """Place of the notification that is sent with every other one."""
 
@@ -95,16 +98,16 @@ class Namespace:
 
     def notification(self, *names: str) -> "Notification":
         """Return the notification of changes of the segments in a folder."""
-        place = zlib.crc32("/".join(map(_quoted, names)).encode()) % (len(self._numbers) - 1)
+        place = zlib.crc32("/".join(map(_quoted, names)).encode()) % (NOTIFICATIONS - 1)
         return Notification(self._numbers, ANY + 1 + place)
 
     def any_notification(self) -> "Notification":
         """Return the notification that is sent with every other one."""
         return Notification(self._numbers, ANY)
 
-    def _open_numbers(self) -> tuple[memoryview, files.Identity]:
+    def _open_numbers(self) -> tuple[Words, files.Identity]:
         path = self.folder / NOTIFICATIONS_FILE
-        whole = 4096  # [B]
+        whole = 8 * NOTIFICATIONS  # [B]
         file = files.open_or_make(path)
         try:
             size = os.fstat(file).st_size
@@ -115,7 +118,7 @@ class Namespace:
                     expected="remove the file",
                 )
             os.ftruncate(file, whole)
-            return memoryview(mmap.mmap(file, whole)).cast("q"), files.identity(file)
+            return words_of(memoryview(mmap.mmap(file, whole))), files.identity(file)
         finally:
             os.close(file)
 
@@ -149,7 +152,7 @@ class Notification:
         received: Its number when it was acknowledged last; another one than now: it was sent since.
     """
 
-    def __init__(self, words: memoryview, place: int):
+    def __init__(self, words: Words, place: int):
         self.words = words
         self.place = place
         self.received = -1

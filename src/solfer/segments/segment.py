@@ -24,6 +24,7 @@ from solfer.segments.header import (
     write_header,
 )
 from solfer.segments.lock import Lock, locked
+from solfer.segments.words import require_order, words_of
 
 
 class _Mapped(NamedTuple):
@@ -50,7 +51,7 @@ class Segment:
         self._memory = memory
         self._lock = lock
         view = memoryview(memory)
-        self._words = view[: KIND_FIELD.start].cast("q")
+        self._words = words_of(view[: KIND_FIELD.start])
         start = LAYOUT_OFFSET + padded(self._words[Word.TEXT])
         self.layout = bytes(view[LAYOUT_OFFSET : LAYOUT_OFFSET + self._words[Word.TEXT]])
         self.data = view[start:]
@@ -70,7 +71,7 @@ class Segment:
         Raises:
             MiddlewareError: Another process owns it, the file is not solfer's, or it cannot be made.
         """
-        _require_order()
+        require_order()
         try:
             lock = Lock(path)
         except OSError as error:
@@ -101,7 +102,7 @@ class Segment:
         Raises:
             MiddlewareError: There is none, it is damaged, or it is not what is expected.
         """
-        _require_order()
+        require_order()
         try:
             mapped = _map(path, writable)
         except OSError as error:
@@ -174,16 +175,6 @@ class Segment:
             self._lock = None
 
 
-def _require_order() -> None:
-    """Refuse a processor that may reorder writes: a reader could see the new index before the new numbers."""
-    ordered = ("x86_64", "amd64", "i686", "i386")
-    if os.uname().machine.lower() not in ordered:
-        raise MiddlewareError(
-            f"shared memory is not safe on a {os.uname().machine}: it may reorder writes",
-            expected=f"one of {', '.join(ordered)}, or the middleware ROS",
-        )
-
-
 def _map(path: Path, writable: bool) -> _Mapped:
     """Map a whole file; an empty one is refused by the error of `mmap`, as too short."""
     file = files.open_file(path, os.O_RDWR if writable else os.O_RDONLY)
@@ -215,7 +206,7 @@ def _previous(path: Path) -> mmap.mmap | None:
 def _replace(path: Path, kind: str, layout: bytes, size: int) -> _Mapped:
     """Put new memory at `path`; the caller holds the lock."""
     previous = _previous(path)
-    words = memoryview(previous)[: KIND_FIELD.start].cast("q") if previous is not None else None
+    words = words_of(memoryview(previous)[: KIND_FIELD.start]) if previous is not None else None
     generation = words[Word.GENERATION] + 1 if words is not None else 1
     draft = path.with_name(f"{path.name}.new")
     mapped = _allocate(draft, LAYOUT_OFFSET + padded(len(layout)) + padded(size))

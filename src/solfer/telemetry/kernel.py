@@ -35,17 +35,16 @@ def _append(address, stamp):
     number = ring.number[0] + 1
     slot = CACHE_LINE // 8 + (number % ring.count) * ring.stride
     words[slot + STATE_WORD] = 2 * number - 1
+    release_fence()  # the mark first, then stamp and numbers
     words[slot + STAMP_WORD] = stamp
-    release_fence()
     place = slot + CACHE_LINE // 8
     for piece in range(ring.pieces):
         array = indices_at(ring.arrays[piece], ring.sizes[piece])
         for index in range(len(array)):
             words[place + index] = array[index]
         place += len(array)
-    release_fence()
     words[slot + STATE_WORD] = 2 * number
-    release_fence()
+    release_fence()  # no reader accepts a row that the index does not announce
     words[NEWEST] = number
     ring.number[0] = number
 

@@ -3,7 +3,6 @@
 import errno
 import os
 import stat
-from types import SimpleNamespace
 
 import pytest
 from support.processes import kill, process
@@ -158,9 +157,3 @@ def test_a_full_disk_is_an_error(path, monkeypatch):
 def test_strangers_cannot_read_it(path):
     Segment.create(path, KIND, LAYOUT, 8)
     assert not path.stat().st_mode & stat.S_IRWXO
-
-
-def test_a_processor_that_reorders_writes_is_refused(path, monkeypatch):
-    monkeypatch.setattr(segment_module.os, "uname", lambda: SimpleNamespace(machine="aarch64"))
-    with pytest.raises(MiddlewareError, match="aarch64"):
-        Segment.create(path, KIND, LAYOUT, 8)

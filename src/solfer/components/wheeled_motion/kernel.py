@@ -21,7 +21,7 @@ WAKE_TIME = 0.3
 spot, and they the base."""
 
 STEEPENING = 0.35
-"""By how much the ground tilts a robot on its way onto a slope of 15 degrees, with wheels that are 0.75 m apart [1/m]."""
+"""By how much the ground tilts a robot on its way onto a slope of 15 degrees, with wheels 0.75 m apart [1/m]."""
 
 EXTRA_ANGLE = 0.35
 """By how much more than a quarter of a revolution a wheel goes on the way that it has begun [rad]."""

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from solfer.segments.latched import latched
+from solfer.segments.words import words_of
 
 # words of the memory
 REWINDS = 0
@@ -25,7 +26,7 @@ class SimulatedTime:
     def __init__(self, folder: Path):
         layout = b'{"words": ["rewinds", "time [ns]"]}'
         self._segment = latched(folder / "simulated_time", "simulated time", layout, size=16)
-        self.words = self._segment.data[:16].cast("q")
+        self.words = words_of(self._segment.data[:16])
 
     @property
     def rewinds(self) -> int:
