@@ -2,8 +2,12 @@
 
 from typing import Any, NamedTuple
 
+import pytest
+
 from solfer.simulation import Simulation
 from solfer.simulation.bullet import load_pybullet
+
+pytest.importorskip("pybullet", reason="PyBullet has no wheel for this Python")
 
 
 class RawBullet(NamedTuple):

@@ -4,6 +4,7 @@ Where one of them is missing, `pytest --without ros` (or `--without simulation`)
 below, tests with the mark `needs`, and those that load a robot of PyBullet. Without the option what is missing fails.
 """
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,8 @@ FILES = {
 }
 """Files and folders below `test/` that need it; they are not even imported without."""
 
+needs_bullet = pytest.mark.skipif(find_spec("pybullet") is None, reason="PyBullet has no wheel for this Python")
+
 without: set[str] = set()
 """What this run has to do without."""
 
@@ -32,9 +35,9 @@ def left_out(path: Path) -> bool:
 
 
 def pybullet_robot(file: str) -> Path:
-    """Return a URDF that PyBullet brings along; `--without simulation` skips the test that asks."""
+    """Return a URDF that PyBullet brings along; `--without simulation` skips the test that asks, as does its lack."""
     if "simulation" in without:
         pytest.skip("a robot of PyBullet")
-    import pybullet_data
+    pybullet_data = pytest.importorskip("pybullet_data", reason="a robot of PyBullet, which has no wheel here")
 
     return Path(pybullet_data.getDataPath(), file)

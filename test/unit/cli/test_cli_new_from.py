@@ -5,8 +5,8 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
-import pybullet_data
 import pytest
+from support.needs import needs_bullet, pybullet_robot
 
 from solfer.errors import MissingDependency
 from solfer.simulation import Simulation
@@ -22,24 +22,26 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@needs_bullet
 @pytest.mark.parametrize(
     "name, path", [("kuka_iiwa/model", "kuka_iiwa/model.urdf"), ("xarm6_robot", "xarm/xarm6_robot.urdf")]
 )
 def test_a_robot_of_pybullet(name, path, folder):
     assert main(["new", "robot", "arm", "--from", f"pybullet_data:{name}"]) == 0
     urdf = read_bundle(folder / "arm/config/robots/arm/robot.yaml").urdf.location
-    assert Path(urdf).samefile(Path(pybullet_data.getDataPath(), path))
+    assert Path(urdf).samefile(pybullet_robot(path))
 
 
 def test_a_robot_of_a_collection_with_packages(folder, monkeypatch, capsys):
     (folder / "robots/arm_description/urdf").mkdir(parents=True)
-    source = Path(pybullet_data.getDataPath(), "xarm/xarm6_robot.urdf").read_text()
+    source = pybullet_robot("xarm/xarm6_robot.urdf").read_text()
     (folder / "robots/arm_description/urdf/arm.urdf").write_text(source)
     monkeypatch.setattr(collections, "folder_of", lambda collection: folder / "robots")
     assert main(["new", "robot", "arm", "--from", "example-robot-data:arm"]) == 0
     assert "the robot arm of 6 DoFs" in capsys.readouterr().out
 
 
+@needs_bullet
 @pytest.mark.parametrize(
     "source, message",
     [
@@ -86,7 +88,7 @@ DESCRIPTIONS = {
 def test_a_robot_of_robot_descriptions(name, message, folder, tmp_path_factory, monkeypatch, capsys):
     package = tmp_path_factory.mktemp("packages") / f"robot_descriptions_of_{name}"
     package.mkdir()
-    urdf = str(Path(pybullet_data.getDataPath(), "xarm/xarm6_robot.urdf"))
+    urdf = str(pybullet_robot("xarm/xarm6_robot.urdf"))
     mjcf = package / "biped.xml"
     mjcf.write_text(BIPED)
     for module, text in DESCRIPTIONS.items():
@@ -191,7 +193,7 @@ def test_a_menagerie_that_is_not_there(folder, monkeypatch, capsys):
 
 
 def test_a_urdf_that_is_called_xml(folder):
-    source = Path(pybullet_data.getDataPath(), "xarm/xarm6_robot.urdf").read_text()
+    source = pybullet_robot("xarm/xarm6_robot.urdf").read_text()
     (folder / "arm.xml").write_text(source)
     assert main(["new", "robot", "arm", "--from", "arm.xml"]) == 0
     assert Path(read_bundle(folder / "arm/config/robots/arm/robot.yaml").urdf.location).samefile(folder / "arm.xml")

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from support.needs import needs_bullet
 
 from solfer.errors import SimulationError, UnknownName
 from solfer.simulation import engines
@@ -22,7 +23,9 @@ def without_choice(monkeypatch):
     monkeypatch.delenv(engines.ENGINE_VARIABLE, raising=False)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("bullet", BulletEngine), ("mujoco", MujocoEngine)])
+@pytest.mark.parametrize(
+    ("name", "kind"), [pytest.param("bullet", BulletEngine, marks=needs_bullet), ("mujoco", MujocoEngine)]
+)
 def test_an_engine_is_made_by_its_name_or_by_the_environment(monkeypatch, name, kind):
     monkeypatch.setenv(engines.ENGINE_VARIABLE, "bullet" if name == "mujoco" else "mujoco")
     for chosen in (name, None):

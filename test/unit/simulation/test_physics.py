@@ -6,6 +6,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support.needs import needs_bullet
 
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
@@ -17,7 +18,7 @@ from solfer.simulation.world.records import Friction, StairsRecord, WorldRecord
 from solfer.simulation.world.world import World
 
 pytestmark = pytest.mark.needs("simulation")
-ENGINES = [BulletEngine, MujocoEngine]
+ENGINES = [MujocoEngine] if needs_bullet.args[0] else [BulletEngine, MujocoEngine]
 GRAVITY = 9.81
 GREY = (0.5, 0.5, 0.5, 1.0)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
