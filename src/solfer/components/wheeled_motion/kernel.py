@@ -23,6 +23,9 @@ spot, and they the base."""
 STEEPENING = 0.35
 """By how much the ground tilts a robot on its way onto a slope of 15 degrees, with wheels 0.75 m apart [1/m]."""
 
+STEEPEST = 0.5
+"""By how much the ground rises at most on the way of the base: that wheels are lifted by straight legs is no rise."""
+
 EXTRA_ANGLE = 0.35
 """By how much more than a quarter of a revolution a wheel goes on the way that it has begun [rad]."""
 
@@ -228,7 +231,9 @@ def _steer(start):
 
 @part
 def _follow_ground(block):
-    """Let the height of the ground follow the wheels that carry the robot, where it is no floor."""
+    """Let the height of the ground follow the wheels that carry the robot, where they drive and it is no floor."""
+    velocity = block.motion[VELOCITY]
+    most = STEEPEST * block.law[0].period * block.numbers[PACE] * math.hypot(velocity[0], velocity[1])
     total = 0.0
     count = 0
     for index in range(block.count):
@@ -238,7 +243,8 @@ def _follow_ground(block):
     if count:
         height = total / count
         ground = block.numbers[GROUND]
-        block.numbers[GROUND] = min(max(ground, height - UNEVENNESS), height + UNEVENNESS)
+        change = min(max(ground, height - UNEVENNESS), height + UNEVENNESS) - ground
+        block.numbers[GROUND] += min(max(change, -most), most)
 
 
 @part
