@@ -14,7 +14,8 @@ def versions() -> dict[str, str]:
     """Return the versions of solfer, Python and its libraries, by name; what is not known is left out."""
     found = {"solfer": _own(), "python": platform.python_version()}
     # libraries whose results are in the numbers, and the packages that install them
-    libraries = {"numpy": "numpy", "pinocchio": "pin", "pybullet": "pybullet", "scipy": "scipy", "numba": "numba"}
+    libraries = {"numpy": "numpy", "pinocchio": "pin", "scipy": "scipy", "numba": "numba"}
+    libraries |= {"pybullet": "pybullet", "mujoco": "mujoco-core"}
     for name, package in libraries.items():
         with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(package)

@@ -23,6 +23,11 @@ def default_engine() -> str:
     return chosen or ("mujoco" if find_spec("pybullet") is None and find_spec("mujoco") is not None else "bullet")
 
 
+def is_installed() -> bool:
+    """Return whether there is an engine at all."""
+    return any(find_spec(module) is not None for module in ("pybullet", "mujoco"))
+
+
 def make_engine(name: str | None = None, gui: bool = False, draws: bool = False) -> PhysicsEngine:
     """Make an engine with an empty world.
 

@@ -224,7 +224,7 @@ def test_unusable_arguments_are_reported(arguments, message, capsys):
 def test_it_needs_neither_the_simulation_nor_ros():
     program = (
         "import sys; from solfer_tools.cli.main import main; "
-        "absent = dict.fromkeys(('pybullet', 'rospy', 'matplotlib')); sys.modules |= absent; "
+        "absent = dict.fromkeys(('pybullet', 'mujoco', 'rospy', 'matplotlib')); sys.modules |= absent; "
         f"sys.exit(main(['check', {str(CENTAURO)!r}, '-n', 'joint_states']))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)

@@ -8,7 +8,6 @@ plugins that it lists are checked as they run in the layer.
 """
 
 import argparse
-import importlib.util
 import sys
 from typing import TYPE_CHECKING
 
@@ -84,7 +83,9 @@ def _simulate_robots(report: "CheckReport") -> None:
         bundle = bundle_of(configuration) if configuration.system == "SM" else None
         if bundle is not None and bundle.suffix == ".yaml":
             robots.setdefault(bundle, configuration.tree.nearest(("robot", "name")).head)
-    if not robots or importlib.util.find_spec("pybullet") is None:
+    from solfer.simulation.engines import is_installed
+
+    if not robots or not is_installed():
         return
     from solfer.simulation.trial import simulate_for_a_second
 

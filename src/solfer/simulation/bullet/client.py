@@ -67,7 +67,7 @@ def load_pybullet() -> ModuleType:
         except ModuleNotFoundError as error:
             raise MissingDependency(
                 "the simulation needs PyBullet",
-                expected=f"{pip_install('pybullet')}; from Python 3.12 on that compiles it, with g++ and python3-dev",
+                expected=f"{pip_install('pybullet')}, up to Python 3.11; on later ones MuJoCo",
             ) from error
     return pybullet
 
