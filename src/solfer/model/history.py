@@ -1,6 +1,6 @@
 """What a pipe has measured since the last cycle, message by message."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,7 +23,9 @@ class History:
         values: The numbers in the State's units; NaN: the message lacks it. Shape (N, len(interfaces), k).
         sender: Name of the publisher of the newest message.
         count: Messages of this cycle; 0: nothing new.
-        contradiction: Why their user finds the measurements wrong; empty: nothing contradicts them. The pipe takes it.
+        contradiction: Why their user finds the measurements wrong; empty: nothing contradicts them. The pipe refuses
+            them until they and what contradicts them rest.
+        others_rest: Whether that rests: as long as it moves, it may be what is wrong.
         dropped: Messages that were lost so far because there were more than N in a cycle, the oldest of them.
         unread: Those of them that were lost before the pipe read them.
     """
@@ -38,6 +40,7 @@ class History:
         self.count = self.dropped = self.unread = 0
         self.sender = ""
         self.contradiction = ""
+        self.others_rest: Callable[[], bool] = lambda: True
 
     def clear(self) -> None:
         """Begin a cycle."""

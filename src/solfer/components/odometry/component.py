@@ -162,7 +162,7 @@ class Odometry(Component):
         law.stop_tilting()
         ground = law.ground
         reason = f"the ground turns by {ground.apart[0]:.2g} rad below wheels that carry the robot"
-        if not self.streams.distrust(reason):
+        if not self.streams.distrust(reason, self._wheels.carrying):
             self._throttle.warning("ground", "%s: by the IMU %s; it, or joints of legs are wrong", self.name, reason)
 
     def _inconsistency(self) -> str:

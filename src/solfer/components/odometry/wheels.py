@@ -65,6 +65,7 @@ class Wheels:
             the world's, turned about the vertical as the base is.
         jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
         legs: Which of them do not roll, shape (joints,).
+        carrying: Which of those lie between base and wheels, shape (joints,).
 
     Raises:
         ComponentError: The Robot has no floating base, or no wheel.
@@ -102,7 +103,11 @@ class Wheels:
         self.arms = np.zeros((count, 3))
         self.jacobian = np.zeros((3 * count, joints))
         self.legs = np.ones(joints, dtype=bool)
-        self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
+        self.carrying = np.zeros(joints, dtype=bool)
+        for link in self.links:
+            *leg, wheel = (column - 6 for column in robot.kinematics.attachment(link).columns if column >= 6)
+            self.legs[wheel] = False
+            self.carrying[leg] = True
         self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
         self._ground = _Ground(self._contacts)

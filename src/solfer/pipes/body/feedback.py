@@ -129,11 +129,13 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         if self._turn_check is not None:
             history = self.history
             if history is not None and history.contradiction:
-                self._turn_check.distrust(history.contradiction)
-                history.contradiction = ""
+                if not (self._turn_check.is_distrusted and history.others_rest()):
+                    self._turn_check.distrust(history.contradiction)
             oddity = self._turn_check.check(
                 reading.values, reading.own_axes, self.reader.arrival, self._stamp, force=reading.force
             )
+            if history is not None:
+                history.contradiction = ""
             if oddity:
                 self.warnings.warn("force", oddity)
         self._mount.update()

@@ -21,7 +21,7 @@ class TurnCheck:
     spikes where the orientation since the message before differs from them by half. The mean specific force of 1.5 s is
     vertical within 0.1 rad, which is a change of the velocity by 1.5 m/s; it does not count where it is not within
     1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall. A link that others
-    distrust counts again when its tilt has stayed within 0.02 rad for 0.5 s.
+    distrust counts again when its tilt has stayed within 0.02 rad for 0.5 s since the last call of `distrust`.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class TurnCheck:
         self._check = orientations.check_rotation
         self._before = np.zeros(orientations.NUMBERS)
         self._times = self._before[orientations.ARRIVAL : orientations.STAMP + 1]
-        self._is_distrusted = orientations.IS_DISTRUSTED
+        self._distrusted = orientations.IS_DISTRUSTED
         self._reason = ""
         self.forget()
 
@@ -40,10 +40,15 @@ class TurnCheck:
         self._before[:] = 0.0
         self._times[:] = -math.inf
 
+    @property
+    def is_distrusted(self) -> bool:
+        """Whether it is refused for a reason that others have found."""
+        return bool(self._before[self._distrusted])
+
     def distrust(self, reason: str) -> None:
         """Refuse the link until it rests, for a reason that others have found."""
-        self._before[self._is_distrusted :] = 0.0
-        self._before[self._is_distrusted] = 1.0
+        self._before[self._distrusted :] = 0.0
+        self._before[self._distrusted] = 1.0
         self._reason = reason
 
     def check(

@@ -82,6 +82,33 @@ class _JointSamples:
         return float(np.abs(row[len(row) // 2 :]).max()) > 0.05  # [rad/s]
 
 
+class _JointsAtRest:
+    """Whether joints have stayed within 0.02 rad for 0.5 s, by what their pipe receives: also while nothing reads it.
+
+    Args:
+        history: That of all joints.
+        joints: Which of them count, shape (width,).
+    """
+
+    def __init__(self, history: SensorHistory, joints: np.ndarray):
+        self._messages = history
+        self._joints = joints
+        self._still = np.full(len(joints), math.inf)
+        self._since = math.nan
+        self._row = np.zeros(2 * len(joints))
+
+    def __call__(self) -> bool:
+        """Return whether they rest, by the messages of this cycle."""
+        history = self._messages.history
+        for index in range(history.count):
+            self._messages.copy(index, self._row)
+            positions = self._row[: len(self._still)]
+            if np.abs(positions - self._still)[self._joints].max() > 0.02:  # [rad]
+                self._still[:] = positions
+                self._since = float(history.arrivals[index])
+        return bool(history.count and history.arrivals[history.count - 1] - self._since > 0.5)  # [s]
+
+
 class Streams:
     """Measurements of joints and base, each of one time, from two streams of messages.
 
@@ -188,11 +215,20 @@ class Streams:
             max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, LONGEST_EXTRAPOLATION
         )
 
-    def distrust(self, reason: str) -> bool:
-        """Let the pipe of the IMU refuse what it measures until it rests; return whether there is one that can."""
-        if self._histories is not None:
-            self._histories[1].history.contradiction = reason
-        return self._histories is not None
+    def distrust(self, reason: str, legs: np.ndarray) -> bool:
+        """Let the pipe of the IMU refuse it until it and legs rest; return whether there is one that can.
+
+        Args:
+            reason: Why it is wrong.
+            legs: Which joints are those of legs, shape (joints,).
+        """
+        if self._histories is None:
+            return False
+        joints, imu = self._histories
+        if not imu.history.contradiction:
+            imu.history.contradiction = reason
+            imu.history.others_rest = _JointsAtRest(joints, legs)
+        return True
 
     def turned_since(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the base's angles at the last measurement, and the newest ones, shape (3,) [rad]; None: not known."""
