@@ -36,6 +36,7 @@ class Course(NamedTuple):
         world: File of its world; None: a plane.
         lifted: Wheel that is lifted all the way; None: none is.
         spun: Speed that is added to that of a wheel while it is on `patch` [m/s], and the wheel; None: none is.
+        pushed: Speed of the wheels after the legs, whatever stops the robot, and for how long [m/s, s]; None: none.
         patch: Smallest and largest x and y of the patch [m].
         goals: Most that figures of `filter` may be, by their names, at the shipped noise.
     """
@@ -44,6 +45,7 @@ class Course(NamedTuple):
     world: Path | None = None
     lifted: int | None = None
     spun: tuple[float, int] | None = None
+    pushed: tuple[float, float] | None = None
     patch: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     goals: Mapping[str, float] = MappingProxyType({"end_error": 0.003, "height_error": 0.05, "heading_error": 0.5})
 
@@ -92,6 +94,7 @@ COURSES: dict[str, Course] = {
         patch=(1.5, 3.5, -1.0, 1.0),
         goals={"end_error": 0.005},
     ),
+    "wall": Course((Leg(0.2),), WORLDS / "wall.yaml", pushed=(0.15, 7.0), goals={"end_error": 0.3}),
     "lifted": Course(_closed(), lifted=2, goals={"end_error": 0.003}),
     # a hundredth of the climb
     "ridge": Course((Leg(11.0),), WORLDS / "ridge.yaml", goals={"height_error": 0.0052}),

@@ -81,6 +81,11 @@ class Driver:
             self._lift(self._course.lifted)
         for leg in self._course.legs:
             self._follow(leg)
+        if self._course.pushed is not None:
+            speed, duration = self._course.pushed
+            self._roll[:] = speed
+            self._wait(duration)
+            self._roll[:] = 0.0
         if self._course.lifted is not None:
             self._steer(np.zeros(4))
             self._shift(self._lowered, 0.5 * SHIFTING)

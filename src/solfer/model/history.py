@@ -21,6 +21,9 @@ class History:
         stamps: When the numbers were true, in the sender's clock, shape (N,) [s].
         arrivals: When they arrived, in the pipe's own clock, shape (N,) [s].
         values: The numbers in the State's units; NaN: the message lacks it. Shape (N, len(interfaces), k).
+        forces: Specific forces of an accelerometer in the axes of the base, shape (N, 3) [m/s^2]; zeros: not measured.
+        force: That of the newest message, shape (3,) [m/s^2]; live. The pipe writes it before it calls `add`.
+        place: From the origin of the base to the accelerometer in these axes, shape (3,) [m]; live.
         sender: Name of the publisher of the newest message.
         count: Messages of this cycle; 0: nothing new.
         contradiction: Why their user finds the measurements wrong; empty: nothing contradicts them. The pipe refuses
@@ -36,6 +39,8 @@ class History:
         self.stamps = np.zeros(size)
         self.arrivals = np.zeros(size)
         self.values = np.zeros((size, len(self.interfaces), len(dofs)))
+        self.forces = np.zeros((size, 3))
+        self.force, self.place = np.zeros((2, 3))
         self.size = size
         self.count = self.dropped = self.unread = 0
         self.sender = ""
@@ -60,6 +65,7 @@ class History:
         row = self.count
         self.stamps[row] = stamp
         self.arrivals[row] = arrival
+        self.forces[row] = self.force
         if part is None:
             self.values[row] = values
         else:
@@ -68,7 +74,7 @@ class History:
         self.count += 1
 
     def _drop_oldest(self) -> None:
-        for array in (self.stamps, self.arrivals, self.values):
+        for array in (self.stamps, self.arrivals, self.forces, self.values):
             array[:-1] = array[1:]
         self.count -= 1
         self.dropped += 1

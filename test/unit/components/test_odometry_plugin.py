@@ -157,6 +157,43 @@ def test_an_imu_that_turns_on_its_link_is_refused_until_it_and_legs_rest(rolling
     assert rolling.plugin.running
 
 
+def accelerated(rolling, ahead):
+    """Return what lets the IMU measure an acceleration of the base [m/s^2]."""
+    force = rolling._turn.T @ (ahead, 0.0, 9.81)
+
+    def measure(sample):
+        sample.imu.acceleration[:] = force
+
+    return measure
+
+
+def test_wheels_that_all_spin_move_the_base_as_the_accelerometer_says(rolling, caplog):
+    """The robot runs against something within 0.2 s, its wheels go on for 3 s, and it comes free again."""
+    law = rolling.plugin.component.law
+    rolling.roll(1.0, accelerated(rolling, 0.0))
+    before = rolling.way
+    rolling.roll(0.2, accelerated(rolling, -5.0 * SPEED))
+    rolling.roll(0.1, accelerated(rolling, 0.0))
+    assert law.slip.lasts and "all wheels slip by" in caplog.text and law.velocity[0] == pytest.approx(0.0, abs=0.01)
+    assert rolling.plugin.component.wheel_states().status[0].level == 1
+    rolling.roll(2.7, accelerated(rolling, 0.0))
+    missed = rolling.way - before - 0.1 * SPEED
+    assert abs(missed) < min(0.03, math.sqrt(law.kalman.covariance[0, 0])) and abs(law.velocity[0]) < 0.01
+    rolling.roll(0.2, accelerated(rolling, 5.0 * SPEED))
+    rolling.roll(1.0, accelerated(rolling, 0.0))
+    assert not law.slip.lasts and law.velocity[0] == pytest.approx(SPEED, abs=1e-3)
+    assert rolling.way - before == pytest.approx(1.2 * SPEED, abs=0.05)
+
+
+@pytest.mark.parametrize("acceleration", [0.5, -5.0])
+def test_an_accelerometer_that_no_slip_explains_moves_nothing(rolling, caplog, acceleration):
+    rolling.roll(1.0, accelerated(rolling, 0.0))
+    before = rolling.way
+    rolling.roll(2.0, accelerated(rolling, acceleration))
+    assert "wheels slide, or the accelerometer is wrong" in caplog.text
+    assert rolling.way - before == pytest.approx(2.0 * SPEED, abs=0.1)
+
+
 def test_time_that_goes_back_begins_anew(rolling):
     assert rolling.way > 0.1
     bus = rolling._plugins._bus

@@ -223,7 +223,7 @@ def test_requests_from_several_threads_lose_nothing(fleet):
 
 
 def test_a_flood_costs_a_cycle_next_to_nothing(fleet):
-    """Thirty Python calls at most, beside cycles with requests that are refused: one is carried out, however many wait."""
+    """Thirty Python calls more than with requests that are refused: one is carried out, however many wait."""
     plugin = fleet.plugins[0]
 
     def calls(gain):

@@ -15,7 +15,7 @@ WORLDS = Path(__file__).resolve().parents[3] / "config/worlds"
 
 def test_the_shipped_worlds_are_as_they_are_called():
     worlds = {path.stem: read_world(path) for path in WORLDS.glob("*.yaml")}
-    assert set(worlds) == {"flat", "slope", "steps", "boxes", "ice", "gate", "ridge", "ramp", "step", "uneven"}
+    assert set(worlds) == {"flat", "slope", "steps", "boxes", "ice", "gate", "ridge", "ramp", "step", "uneven", "wall"}
     assert worlds["flat"].ground.slope == 0.0 and not worlds["flat"].boxes
     assert worlds["slope"].ground.slope == pytest.approx(5.0 * 3.14159265 / 180.0)
     assert worlds["ramp"].boxes["up"].rpy[1] == pytest.approx(-15.0 * 3.14159265 / 180.0)

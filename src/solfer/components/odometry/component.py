@@ -125,6 +125,7 @@ class Odometry(Component):
         self._pose[:] = 0.0
         self.streams.start()
         self._base.averages = self.streams.synchronizes
+        self._base.push = self.streams.push
         self.law.start()
         self._write()
 
@@ -156,6 +157,12 @@ class Odometry(Component):
                 self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
             if law.ground.turns:
                 self._distrust(law)
+            if law.slip.lasts:
+                self._throttle.warning("slip", "%s: %s", self.name, self._common_slip(law))
+            elif law.slip.contradicted:
+                self._throttle.warning(
+                    "slide", "%s: wheels slide, or the accelerometer is wrong: all wheels measure otherwise", self.name
+                )
 
     def _distrust(self, law: FilteredOdometry) -> None:
         """Let the IMU be refused, below which the ground turns: it turns on its link, or many encoders drift."""
@@ -164,6 +171,12 @@ class Odometry(Component):
         reason = f"the ground turns by {ground.apart[0]:.2g} rad below wheels that carry the robot"
         if not self.streams.distrust(reason, self._wheels.carrying):
             self._throttle.warning("ground", "%s: by the IMU %s; it, or joints of legs are wrong", self.name, reason)
+
+    @staticmethod
+    def _common_slip(law: FilteredOdometry) -> str:
+        """Return how all wheels slip."""
+        speed = math.hypot(*law.slip.slip.tolist())
+        return f"all wheels slip by {speed:.2g} m/s, by the accelerometer, which the base follows"
 
     def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""
@@ -239,7 +252,8 @@ class Odometry(Component):
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
         inconsistency = self._inconsistency()
-        summary = inconsistency or ("a wheel slips" if slips else "all wheels that touch roll")
+        common = self._common_slip(law) if law.slip.lasts else ""
+        summary = common or inconsistency or ("a wheel slips" if slips else "all wheels that touch roll")
         return Statuses(
             status=(
                 Status(

@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.common_slip import CommonSlip
 from solfer.components.odometry.consensus import COMPARISON_TIME, WheelConsensus, yaw_of
 from solfer.components.odometry.ground.ground_plane import GroundPlane
-from solfer.components.odometry.kalman import HEADING, NO_SAMPLE, ImuSample, WheelInertialFilter
+from solfer.components.odometry.kalman import HEADING, NO_SAMPLE, TILT, ImuSample, WheelInertialFilter
 from solfer.components.odometry.sensing.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheel_motion import WheelMotion
@@ -21,6 +22,10 @@ REST_TIME = 0.1
 SHAKE_RATIO = 2.5e-3
 """What samples of a gyroscope miss while legs move, as a ratio to the speed of their joints: the base shakes in time
 with the commands."""
+
+
+SLIP_DEVIATION = 0.03
+"""Standard deviation of the velocity where all wheels begin to slip [m/s]."""
 
 
 class ImuProgress:
@@ -74,6 +79,7 @@ class FilteredOdometry:
     Attributes:
         kalman: The filter.
         consensus: Finds the wheels that roll.
+        slip: Finds out whether all of them slip.
         ground: The ground below them.
         position: Position of the base's origin in the world, shape (3,) [m]; live.
         heading: Angle about the vertical from the world to the base's x axis [rad].
@@ -99,6 +105,7 @@ class FilteredOdometry:
         )
         self.consensus = WheelConsensus(count, tags.slip_time)
         self._motion = WheelMotion(wheels)
+        self.slip = CommonSlip(self._motion)
         self.ground = GroundPlane(self._motion, self.kalman, math.tan(math.radians(tags.level)))
         self._imu = ImuProgress(wheels.joints)
         self.filter: LowPass | None = None
@@ -128,6 +135,7 @@ class FilteredOdometry:
                 low_pass.reset()
         kalman.start()
         self.consensus.start()
+        self.slip.start()
         base.start()
         wheels.set_normal(*UP)
         wheels.update(base.heading)
@@ -293,7 +301,7 @@ class FilteredOdometry:
         imu.rest = imu.rest + self._period if still else 0.0
 
     def _correct(self, yaw: float, imu_time: float, leg_speed: float) -> None:
-        """Correct the filter by the wheels that roll."""
+        """Correct the filter by the wheels that roll, or by the accelerometer where all slip."""
         motion = self._motion
         kalman = self.kalman
         consensus = self.consensus
@@ -326,6 +334,12 @@ class FilteredOdometry:
             tolerance=self._tolerance(speed), time=period, variances=motion.variances,
         )  # fmt: skip
         kalman.allow_scrubbing(contradiction)
+        if imu_time:
+            self._compare(imu_time)
+        if self.slip.lasts:
+            kalman.coast(self.slip.speed - self.slip.slip, self.slip.velocity_variance(period))
+            consensus.inliers[:] = False
+            return
         kalman.correct(
             motion.speeds,
             motion.arms,
@@ -338,6 +352,23 @@ class FilteredOdometry:
         yaw_rate = rate - covered * (kalman.bias + kalman.noise)
         keep = spread_time / (spread_time + period)
         filter_kernel.learn_spreads(motion.block.address, kalman.velocity, yaw_rate, consensus.inliers, keep)
+
+    def _compare(self, time: float) -> None:
+        """Compare the wheels with the accelerometer, `time` [s] after it was read; where slip begins, go back."""
+        base = self._base
+        kalman = self.kalman
+        x, y, z = base.angular.tolist()
+        way = self.slip.follow(
+            *base.push,
+            kalman.axes,
+            self.consensus.inliers,
+            heading=base.heading,
+            rotation=(x, y, z - kalman.bias, time),
+            tilt=(*kalman.tilt.tolist(), float(kalman.covariance[TILT, TILT])),
+        )
+        if way is not None:
+            kalman.lose_velocity(SLIP_DEVIATION**2)
+            self.position[:2] -= about_vertical(np.append(way, 0.0), self.heading)[:2]
 
     def _tolerance(self, speed: float) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
@@ -402,6 +433,8 @@ class FilteredOdometry:
         filter_kernel.velocity_of_base(
             wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity
         )
+        if self.slip.lasts:
+            self.velocity[:2] -= self.slip.slip
         if self.smoothing is not None:
             self._smoothed[:3] = self.velocity
             self._smoothed[3] = self.angular[2]

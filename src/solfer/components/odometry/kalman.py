@@ -140,6 +140,7 @@ class WheelInertialFilter:
             half=half,
         )
         self._address = self._block.address
+        self._velocity_noise = 0.0
         self.start()
 
     def start(self) -> None:
@@ -213,8 +214,9 @@ class WheelInertialFilter:
         slope = -math.expm1(-rolled / FLOOR_LENGTH)
         estimates_tilt = given.tilt > 0.0 and imu_time > 0.0
         # scrubbing yaws the base by 0.5 mrad for each metre that wheels roll
+        self._velocity_noise = given.acceleration * period * period
         variances = (
-            given.acceleration * period * period,
+            self._velocity_noise,
             (5e-4 * rolled / period) ** 2 * scrub * (2.0 - scrub),
             given.noise / period + shaken,
             given.noise * imu_time + shaken * imu_time * imu_time,
@@ -292,6 +294,22 @@ class WheelInertialFilter:
             inliers: Which wheels count, shape (k,); those that more likely slip are taken out.
         """
         kernel.correct(self._address, speeds, arms, rate, covered, variances, inliers)
+
+    def lose_velocity(self, variance: float) -> None:
+        """Know the velocity by another measurement from now on, with a variance [m^2/s^2]."""
+        for axis in range(VELOCITY, VELOCITY + 2):
+            self.covariance[axis] = 0.0
+            self.covariance[:, axis] = 0.0
+            self.covariance[axis, axis] = variance
+        self.rolling[:] = 0.0
+
+    def coast(self, velocity: np.ndarray, variance: float) -> None:
+        """Go on with a velocity along x and y [m/s] that wheels do not measure; its variance grows [m^2/s^2]."""
+        self.velocity[:2] = velocity
+        grown = variance - self._velocity_noise
+        self.covariance[VELOCITY, VELOCITY] += grown
+        self.covariance[VELOCITY + 1, VELOCITY + 1] += grown
+        self.rolling[:] = 0.0
 
     def integrate(self, heading: float, period: float, imu_time: float, unknown: float) -> None:
         """Propagate the pose over an interval.

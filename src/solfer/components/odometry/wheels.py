@@ -65,7 +65,6 @@ class Wheels:
             the world's, turned about the vertical as the base is.
         jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
         legs: Which of them do not roll, shape (joints,).
-        carrying: Which of those lie between base and wheels, shape (joints,).
 
     Raises:
         ComponentError: The Robot has no floating base, or no wheel.
@@ -103,11 +102,7 @@ class Wheels:
         self.arms = np.zeros((count, 3))
         self.jacobian = np.zeros((3 * count, joints))
         self.legs = np.ones(joints, dtype=bool)
-        self.carrying = np.zeros(joints, dtype=bool)
-        for link in self.links:
-            *leg, wheel = (column - 6 for column in robot.kinematics.attachment(link).columns if column >= 6)
-            self.legs[wheel] = False
-            self.carrying[leg] = True
+        self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
         self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
         self._ground = _Ground(self._contacts)
@@ -121,6 +116,14 @@ class Wheels:
     def set_normal(self, x: float, y: float, z: float) -> None:
         """Set the normal of the ground, any length."""
         self._ground.set_normal(x, y, z)
+
+    @property
+    def carrying(self) -> np.ndarray:
+        """Which joints lie between base and wheels, shape (joints,); a new array."""
+        carrying = np.zeros(self.joints, dtype=bool)
+        for link in self.links:
+            carrying[[column - 6 for column in self._robot.kinematics.attachment(link).columns if column >= 6]] = True
+        return carrying & self.legs
 
     @property
     def normal(self) -> np.ndarray:

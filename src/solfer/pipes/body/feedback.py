@@ -94,6 +94,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         is_turned = reception.measured and self._measures_pose and "orientation" in reading.carries
         self._turn_check = TurnCheck() if is_turned else None
         carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
+        if self.history is not None:
+            self.history.place = mount.position
         self._measured = [(state_field.values, carried[state_field.field]) for state_field in self.state_fields]
 
     def restart(self) -> None:
@@ -136,6 +138,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
             )
             if history is not None:
                 history.contradiction = ""
+                np.matmul(self._mount.rotation, reading.force, out=history.force)
             if oddity:
                 self.warnings.warn("force", oddity)
         self._mount.update()

@@ -25,18 +25,23 @@ class ImuSamples:
     Args:
         offset: Time by which the IMU's stamps are behind those of the joints [s].
         stamps: Check of its stamps.
+        origin: Rotation from the axes of the base's chart to the world, shape (3, 3).
 
     Attributes:
         stamps: See above.
+        pushed: Change of the velocity of the IMU since the measurement before in the world, by its accelerometer,
+            shape (3,) [m/s]; live. NaN: it has none, or samples since then are missing.
         measured_at: Time of the newest measurement [s]; NaN before the first.
     """
 
-    def __init__(self, offset: float, stamps: StampCheck):
+    def __init__(self, offset: float, stamps: StampCheck, origin: np.ndarray):
         self.stamps = stamps
+        self._origin = origin
+        self.pushed = np.full(3, math.nan)
         self.measured_at = math.nan
         self._offset = offset
-        self._samples = SortedSamples(CAPACITY, 9)
-        self._turned = np.zeros(3)
+        self._samples = SortedSamples(CAPACITY, 15)
+        self._integrals = np.zeros(6)
         self._angles = np.zeros(3)
         self._angles_before = np.zeros(3)
 
@@ -65,7 +70,8 @@ class ImuSamples:
             if row < 0:
                 continue
             history.copy(index, samples.rows[row, :6])
-            samples_kernel.integrate(samples.stamps, samples.rows, row, samples.count)
+            force = history.history.forces[index]
+            samples_kernel.integrate(samples.stamps, samples.rows, row, samples.count, force, self._origin)
 
     def turned_since(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the base's angles at the measurement of a time [s], and the newest ones; None: not known."""
@@ -98,15 +104,18 @@ class ImuSamples:
             change = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
             self._angles[axis] = first[axis] + fraction * change
         state.position[3:6] = self._angles
-        turned = self._turned
-        turned_before = turned.copy()
-        samples_kernel.find_turned(samples.stamps, samples.rows, before, after, fraction, turned)
+        integrals = self._integrals
+        integrals_before = integrals.copy()
+        samples_kernel.find_turned(samples.stamps, samples.rows, before, after, fraction, integrals)
         passed = time - self.measured_at
         if not passed > 0.0:
             state.velocity[3:6] = first[RATES]
+            self.pushed[:] = math.nan
         elif samples.stamps[0] <= self.measured_at:
-            state.velocity[3:6] = (turned - turned_before) / passed
+            state.velocity[3:6] = (integrals[:3] - integrals_before[:3]) / passed
+            self.pushed[:] = integrals[3:] - integrals_before[3:]
         else:  # the samples since then are gone, but for their angles
+            self.pushed[:] = math.nan
             turned_by = self._angles - self._angles_before
             state.velocity[3:6] = (turned_by - 2.0 * math.pi * np.round(turned_by / (2.0 * math.pi))) / passed
         self.measured_at = time

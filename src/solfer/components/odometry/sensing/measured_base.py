@@ -1,6 +1,7 @@
 """Orientation and angular velocity of the base by the IMU, in a State that an odometry writes itself."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,19 @@ from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.numerics.twist_transport import BaseKinematics
 from solfer.robot import Robot
+
+
+class Push(NamedTuple):
+    """What an accelerometer measures.
+
+    Attributes:
+        change: Change of its velocity since it was measured the last time in the State's world, shape (3,) [m/s]; live.
+            NaN: nothing is known of it.
+        place: From the base's origin to it in the base, shape (3,) [m]; live.
+    """
+
+    change: np.ndarray
+    place: np.ndarray
 
 
 class MeasuredBase:
@@ -20,6 +34,7 @@ class MeasuredBase:
     Attributes:
         averages: Whether `angular` is the mean since the measurement before, and not that of one moment.
         fresh: Whether the IMU has a new sample.
+        push: What its accelerometer measures; to be set before `start`.
         rotation: Rotation from the base to the State's world, shape (3, 3).
         heading: Angle about the vertical from the State's world to the base's x axis [rad].
         turned: Rotation vector of the base since the sample before, in the heading frame, shape (3,) [rad]; zero
@@ -34,6 +49,7 @@ class MeasuredBase:
         self._state = robot.state
         self._rates = np.zeros(6)
         self.fresh = True
+        self.push = Push(np.full(3, math.nan), np.zeros(3))
         self.rotation = self._known = np.eye(3)
         self.turned, self.angular = np.zeros((2, 3))
         self.heading = 0.0

@@ -1,8 +1,12 @@
 """Compiled steps of samples that are sorted by their stamps, see `SortedSamples` and `ImuSamples`."""
 
 import math
+from pathlib import Path
 
+from solfer.numerics import base_chart
 from solfer.numerics.compilation import cached, part
+
+_rotation_of = part(base_chart.rotation_of)
 
 LONGEST_LAG = 0.03
 """Longest time for which joints wait for what the IMU measures at their time [s]."""
@@ -46,19 +50,23 @@ def _copy(values, first, second, places, out):
 
 @part
 def turned_at(stamps, rows, before, after, fraction, out):
-    """Write the integral of the rates at a fraction of the time from one sample to the next, shape (3,) [rad].
+    """Write the integrals of rates and acceleration at a fraction of the time from one sample to the next, shape (6,).
 
-    A sample has three angles, their rates, and the integrals of these.
+    A sample has three angles, their rates, the acceleration in the world, and the integrals of both [rad, m/s]. That of
+    the acceleration is NaN where the time is too long for it.
     """
     span = stamps[after] - stamps[before]
     for k in range(3):
+        slope = rows[after, 6 + k] - rows[before, 6 + k]
+        change = fraction * span * (rows[before, 6 + k] + 0.5 * fraction * slope)
+        out[3 + k] = math.nan if span > LONGEST_LAG else rows[before, 12 + k] + change
         if span > LONGEST_LAG:  # too long for rates: angles do not drift in it
             change = rows[after, k] - rows[before, k]
             displacement = fraction * (change - math.tau * round(change / math.tau))
         else:
             rate = rows[before, 3 + k]
             displacement = fraction * span * (rate + 0.5 * fraction * (rows[after, 3 + k] - rate))
-        out[k] = rows[before, 6 + k] + displacement
+        out[k] = rows[before, 9 + k] + displacement
 
 
 def _turned_at(stamps, rows, before, after, fraction, out):
@@ -66,10 +74,33 @@ def _turned_at(stamps, rows, before, after, fraction, out):
     turned_at(stamps, rows, before, after, fraction, out)
 
 
-def _integrate(stamps, rows, first, count):
-    """Integrate the rates up to each sample from the row `first` on."""
+def _integrate(stamps, rows, first, count, force, origin):
+    """Write the acceleration of the sample `first`, and integrate it and the rates up to each sample from there on.
+
+    Args:
+        stamps: Stamps of the samples [s].
+        rows: The samples, see `turned_at`.
+        first: Row of the first one.
+        count: Number of all.
+        force: Its specific force in the axes of the base [m/s^2]; zeros: it is not measured.
+        origin: Rotation from the axes of the base's chart to the world.
+    """
+    gravity = 9.81
+    row = rows[first]
+    turned = _rotation_of(row[0], row[1], row[2])
+    for i in range(3):
+        row[6 + i] = 0.0
+        for k in range(3):
+            row[6 + i] += origin[i, k] * (
+                turned[3 * k] * force[0] + turned[3 * k + 1] * force[1] + turned[3 * k + 2] * force[2]
+            )
+    row[8] -= gravity
+    if force[0] == 0.0 and force[1] == 0.0 and force[2] == 0.0:
+        row[6:9] = math.nan
     for later in range(max(first, 1), count):
-        turned_at(stamps, rows, later - 1, later, 1.0, rows[later, 6:9])
+        turned_at(stamps, rows, later - 1, later, 1.0, rows[later, 9:15])
+        if rows[later, 12] != rows[later, 12] and rows[later, 6] == rows[later, 6]:
+            rows[later, 12:15] = 0.0  # it begins anew
 
 
 _V = "float64[::1]"
@@ -77,4 +108,4 @@ _M = "float64[:, ::1]"
 insert = cached(f"int64({_V}, {_M}, int64, float64)", _insert)
 copy = cached(f"void({_M}, int64, int64, int64[::1], {_V})", _copy)
 find_turned = cached(f"void({_V}, {_M}, int64, int64, float64, {_V})", _turned_at)
-integrate = cached(f"void({_V}, {_M}, int64, int64)", _integrate)
+integrate = cached(f"void({_V}, {_M}, int64, int64, {_V}, {_M})", _integrate, sources=[Path(base_chart.__file__)])

@@ -5,9 +5,11 @@ import math
 import numpy as np
 
 from solfer.components.odometry.sensing.imu_samples import CAPACITY, ImuSamples
+from solfer.components.odometry.sensing.measured_base import Push
 from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.sensing.samples_kernel import LONGEST_LAG
 from solfer.components.odometry.sensing.stamps import StampCheck
+from solfer.numerics.base_chart import BaseChart
 from solfer.robot import Robot
 
 LONGEST_EXTRAPOLATION = 0.1
@@ -123,6 +125,7 @@ class Streams:
     Attributes:
         elapsed: Time from the measurement before to this one [s].
         measured: Whether the IMU has measured the base in the meantime.
+        push: What the accelerometer measures.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
         silence: Of joints and IMU together.
         stamp_checks: Checks of the stamps of joints and IMU.
@@ -136,7 +139,9 @@ class Streams:
         self.silence = SensorSilence()
         self._measurements = _JointSamples(robot.size - 6)
         imu_check = StampCheck(self._measurements.stamps, offset)
-        self._samples = ImuSamples(offset, imu_check)
+        chart = robot.kinematics.base or BaseChart()
+        self._samples = ImuSamples(offset, imu_check, np.ascontiguousarray(chart.rotation))
+        self.push = Push(self._samples.pushed, np.zeros(3))
         self.stamp_checks = self._measurements.stamps, imu_check
         self._written = np.zeros((2, 3))
         self._time = math.nan
@@ -159,6 +164,8 @@ class Streams:
         self.silence.start()
         self._measurements.start()
         self._samples.start()
+        if imu is not None:
+            self.push = Push(self._samples.pushed, imu.history.place)
         if self._histories is not None:
             self._receive(*self._histories)
             waiting = self._measurements.waiting

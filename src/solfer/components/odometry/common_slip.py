@@ -1,0 +1,112 @@
+"""Slip of all wheels at once, which no wheel contradicts: the accelerometer does."""
+
+import math
+
+import numpy as np
+
+from solfer.components.odometry import common_slip_kernel as kernel
+from solfer.components.odometry.wheel_motion import WheelMotion
+from solfer.numerics.blocks import MemoryBlock
+
+RELIABILITY = 0.03
+"""Standard deviation of a velocity that an accelerometer alone has followed for a second [m/s]: by tilt, mostly."""
+
+
+class CommonSlip:
+    """Finds out whether all wheels slip together, such as against a step, and how fast the base is meanwhile.
+
+    Over some 0.4 s the wheels and the accelerometer gain the same velocity, within 12 mm/s and what the tilt errs by;
+    a constant difference is learned. Where that is a thousand times less likely than slip, wheels slip: the base goes
+    on with the velocity that it had before and what the accelerometer has measured since. On average it does not go
+    faster than the wheels, nor elsewhere than they go, within 0.05 m/s; where it hardly moves it is taken to rest but
+    for swaying. Slip ends where both velocities are the same again, or the wheels rest. Where no slip explains what the
+    accelerometer measures, it is wrong, or wheels slide: they count, and are not compared for 2 s.
+
+    Args:
+        motion: The wheels.
+
+    Attributes:
+        speed: Velocity of the base by the wheels in the heading frame, shape (2,) [m/s]; live.
+        slip: By how much that is too fast, shape (2,) [m/s]; live.
+        contradicted: Whether the accelerometer measures what no slip explains.
+    """
+
+    def __init__(self, motion: WheelMotion):
+        self._motion = motion
+        self.speed, self.slip, self._before, self._gained, self._bias, self._way = np.zeros((6, 2))
+        self._probability, self._lasts, self._excess = np.ones((3, 1))
+        self.contradicted = False
+        self._block = MemoryBlock(
+            kernel.SLIP,
+            speed=self.speed,
+            before=self._before,
+            gained=self._gained,
+            bias=self._bias,
+            slip=self.slip,
+            way=self._way,
+            mean=np.zeros(4),
+            probability=self._probability,
+            excess=self._excess,
+            lasts=self._lasts,
+        )
+        self.start()
+
+    def start(self) -> None:
+        """Begin with wheels that roll, and nothing to compare with."""
+        for numbers in (self._gained, self._bias, self.slip, self._way):
+            numbers[:] = 0.0
+        self._lasts[:] = math.nan
+        self._probability[:] = 1.0
+        self.contradicted = False
+
+    @property
+    def lasts(self) -> float:
+        """For how long all wheels have slipped [s]; 0: they roll."""
+        lasts = float(self._lasts[0])
+        return lasts if lasts > 0.0 else 0.0
+
+    @property
+    def probability(self) -> float:
+        """Probability that they roll."""
+        return 0.0 if self.lasts else float(self._probability[0])
+
+    @property
+    def gain(self) -> float:
+        """What wheels have gained more than the accelerometer has measured [m/s]."""
+        return math.hypot(*self._gained.tolist())
+
+    def follow(
+        self,
+        pushed: np.ndarray,
+        place: np.ndarray,
+        axes: np.ndarray,
+        inliers: np.ndarray,
+        *,
+        heading: float,
+        rotation: tuple[float, float, float, float],
+        tilt: tuple[float, float, float],
+    ) -> np.ndarray | None:
+        """Compare what wheels and the accelerometer have measured since the IMU was measured the last time.
+
+        Args:
+            pushed: Change of the IMU's velocity in its own world, shape (3,) [m/s].
+            place: From the base's origin to the IMU in the base, shape (3,) [m].
+            axes: Rotation from the base to the heading frame, shape (3, 3).
+            inliers: Which wheels agree, shape (k,).
+            heading: Heading of the base in that world [rad].
+            rotation: Angular velocity in the heading frame [rad/s], and that time [s].
+            tilt: Error of the tilt about x and y of the heading frame [rad], and its variance [rad^2].
+
+        Returns:
+            By which way the base is too far where slip begins, in the heading frame, shape (2,) [m]; live. None else.
+        """
+        found = kernel.follow(
+            self._block.address, self._motion.block.address, inliers, pushed, heading, place, axes, rotation,
+            tilt,
+        )  # fmt: skip
+        self.contradicted = found == kernel.CONTRADICTS
+        return self._way if found == kernel.BEGINS else None
+
+    def velocity_variance(self, time: float) -> float:
+        """Return the variance that the velocity gains in a time [s] by the accelerometer alone [m^2/s^2]."""
+        return 2.0 * RELIABILITY * RELIABILITY * self.lasts * time
