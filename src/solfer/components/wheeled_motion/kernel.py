@@ -479,8 +479,8 @@ def _find_rates(start, is_paced, feeds_forward):
             turn_most = block.turn_correction
             velocity = block.motion[VELOCITY]
             yaw_rate = abs(block.motion[ANGULAR, 2])
-            way = STEEPENING * math.hypot(velocity[0], velocity[1]) + TURNING_SLOPE * yaw_rate
-            tilting = block.numbers[PACE] * way
+            tilting = STEEPENING * math.hypot(velocity[0], velocity[1]) + TURNING_SLOPE * yaw_rate
+            tilting *= block.numbers[PACE]
             turning = 0.1 * yaw_rate
             _correct(rates, away, block.of_base, 2, min(turn_most, 0.15 * turn_most + tilting), turn_rise)
             _correct(rates, away, block.of_base + 2, 1, min(turn_most, 0.15 * turn_most + turning), turn_rise)

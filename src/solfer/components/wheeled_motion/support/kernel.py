@@ -158,7 +158,7 @@ def _keep_margin(block):
 
 @part
 def _lacks(block):
-    """Whether joints move base and vertices slower along their desired direction than their rates ask for.
+    """Whether joints move base and vertices slower along their desired direction than is desired.
 
     Where they are behind for another reason, as on a slope, whose way is longer, the motion is not held up.
     """
