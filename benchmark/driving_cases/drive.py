@@ -46,6 +46,7 @@ class Row(NamedTuple):
         desired: Desired vertices, x and y, shape (4, 2) [m].
         vertices: The same as they are.
         height: Height of the base, less the desired one [m].
+        up: Direction of the pelvis' z in the world, shape (3,).
         margin: Distance of the centre of mass from the nearest edge of the support polygon [m].
         joint_error: Largest distance of a joint from its command [rad].
         torque: Largest torque of a joint, by its limit.
@@ -60,6 +61,7 @@ class Row(NamedTuple):
     desired: np.ndarray
     vertices: np.ndarray
     height: float
+    up: np.ndarray
     margin: float
     joint_error: float
     torque: float
@@ -112,6 +114,7 @@ class Recorder:
                 references.vertices[:, :2].copy(),
                 seen_from(heading, vertices[:, :2] - pelvis[:2]),
                 float(pelvis[2] - references.position[2] - references.rise),
+                simulation.state.now.rotation(base)[:, 2].copy(),
                 margin(center[:2], vertices[world.touching(), :2]),
                 float(np.abs(error[self._moved]).max()),
                 float((torque / self._torque_limit)[self._moved].max()),
@@ -172,6 +175,7 @@ def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: 
         print(f"{name}: {why}", file=sys.stderr, flush=True)
     figures |= {
         "done": not why,
+        "why": why,
         "toppled": why.startswith(("tilted", "lies")),
         "holds": holds if why else "",
         "held_back": int(held),
@@ -243,7 +247,11 @@ def figures_of(recorder: Recorder, duration: float) -> dict[str, Any]:
     way = float(np.linalg.norm(np.diff(columns["truth"][:, :2], axis=0), axis=1).sum())
     work = float(columns["power"].sum()) * EVERY * PERIOD
     drift = np.linalg.norm((columns["drift"] - columns["drift"][0])[:, :2], axis=1)
+    height, tilt = columns["height"] - columns["height"][0], np.arccos(np.clip(columns["up"] @ columns["up"][0], -1, 1))
     return tracking_of(columns, duration) | {
+        "height_max": float(np.abs(height).max()),
+        "tilt_max": float(tilt.max()),
+        "tilt_end": float(tilt[-1]),
         "drift": float(drift.max()),
         "slip": float(slid.sum() / rolled.sum()) if rolled.sum() > 0.05 else None,
         "joint_error": float(columns["joint_error"].max()),

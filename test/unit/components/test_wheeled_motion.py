@@ -166,18 +166,35 @@ def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
     assert np.diff(rates, prepend=0.0).max() < 1.01 * getattr(component.tags, growth) * component.period
 
 
-@pytest.mark.parametrize(("speed", "rise", "followed"), [(0.2, 0.03, 0.02), (0.2, 0.005, 0.0), (0.0, 0.03, 0.0)])
-def test_the_height_of_the_base_counts_from_the_ground(make, speed, rise, followed):
+@pytest.mark.parametrize(
+    ("speed", "turn", "rise", "followed"),
+    [(0.2, 0.0, 0.03, 0.02), (0.0, 0.4, 0.015, 0.005), (0.2, 0.0, 0.005, 0.0), (0.0, 0.0, 0.03, 0.0)],
+)
+def test_the_height_of_the_base_counts_from_the_ground(make, speed, turn, rise, followed):
     """It goes up with wheels that drive onto something; what a floor's unevenness explains, or lifts them, does not."""
     component = make()
     state = component.model.state
     height = state.position[2]
-    cycle(component, 200, (speed, 0.0, 0.0))
+    cycle(component, 200, (speed, 0.0, turn))
     for _ in range(50):
         state.position[2] = height + rise
         cycle(component)
-    assert component.references.rise == pytest.approx(followed, abs=6e-3)
+    assert component.references.rise == pytest.approx(followed, abs=6e-3 if speed else 1e-3)
     assert component.tasks.rates.error[component.tasks.rows["BASE"]][5] == pytest.approx(followed - rise, abs=6e-3)
+
+
+@pytest.mark.parametrize(("turn", "most"), [(0.0, 0.015), (0.3, 0.096)])
+def test_a_pelvis_stays_level_where_it_turns_on_a_slope(make, turn, most):
+    """A slope of 15 degrees tilts it by 0.08 rad/s; at rest an IMU with a wrong tilt must not."""
+    component = make(tunning="level")
+    cycle(component, 200, (0.0, 0.0, turn))
+    component.references.tilt[:] = (math.sin(0.1), 0.0, 0.0, math.cos(0.1))
+    rates = []
+    for _ in range(100):
+        cycle(component, 1, (0.0, 0.0, turn))
+        base = component.stack.jacobian[component.tasks.rows["BASE"]] @ component.joints.velocity
+        rates.append(abs(base[:2]).max())
+    assert 0.9 * most < max(rates) < 1.05 * most
 
 
 @pytest.mark.parametrize(("turn", "correction"), [(0.1, 0.025), (-0.3, 0.045), (0.3, 0.045)])

@@ -23,6 +23,9 @@ spot, and they the base."""
 STEEPENING = 0.35
 """By how much the ground tilts a robot on its way onto a slope of 15 degrees, with wheels 0.75 m apart [1/m]."""
 
+TURNING_SLOPE = 0.27
+"""By how much a slope of 15 degrees tilts a robot that turns on it: the tangent [rad/rad]."""
+
 STEEPEST = 0.5
 """By how much the ground rises at most on the way of the base: that wheels are lifted by straight legs is no rise."""
 
@@ -37,6 +40,9 @@ LEAD_CYCLES = 4.0
 
 PACE, LIMIT_RATIO, HEADING, WAITS, FLOOR, GROUND = range(6)
 """Indices of the numbers of the references; the last are the heights of the ground where it began, and where it is."""
+
+TURNING_ARM = 0.1
+"""Farthest that the middle of the wheels is from what the base turns about [m]: it moves up and down on a slope."""
 
 UNEVENNESS = 0.01
 """By how much wheels on a floor are above or below it on average [m]: estimates of the base err, and legs yield."""
@@ -233,7 +239,8 @@ def _steer(start):
 def _follow_ground(block):
     """Let the height of the ground follow the wheels that carry the robot, where they drive and it is no floor."""
     velocity = block.motion[VELOCITY]
-    most = STEEPEST * block.law[0].period * block.numbers[PACE] * math.hypot(velocity[0], velocity[1])
+    speed = math.hypot(velocity[0], velocity[1]) + TURNING_ARM * abs(block.motion[ANGULAR, 2])
+    most = STEEPEST * block.law[0].period * block.numbers[PACE] * speed
     total = 0.0
     count = 0
     for index in range(block.count):
@@ -471,8 +478,10 @@ def _find_rates(start, is_paced, feeds_forward):
             # a wrong tilt tilt it much faster than the ground may where it drives
             turn_most = block.turn_correction
             velocity = block.motion[VELOCITY]
-            tilting = STEEPENING * block.numbers[PACE] * math.hypot(velocity[0], velocity[1])
-            turning = 0.1 * abs(block.motion[ANGULAR, 2])
+            yaw_rate = abs(block.motion[ANGULAR, 2])
+            tilting = STEEPENING * math.hypot(velocity[0], velocity[1]) + TURNING_SLOPE * yaw_rate
+            tilting *= block.numbers[PACE]
+            turning = 0.1 * yaw_rate
             _correct(rates, away, block.of_base, 2, min(turn_most, 0.15 * turn_most + tilting), turn_rise)
             _correct(rates, away, block.of_base + 2, 1, min(turn_most, 0.15 * turn_most + turning), turn_rise)
             _correct(rates, away, block.of_base + 3, 3, block.base_correction, base_rise)

@@ -66,7 +66,7 @@ class DrivingTasks:
         self.stack = Stack(self.configured.levels)
         self.rows = rows_of(record.levels, self.stack.ends.tolist())
         self.gain = np.concatenate([task.gain for task in self.stack.tasks])
-        self.rates = TaskRates(self.rows, *np.zeros((3, len(self.gain))))
+        self.rates = TaskRates(self.rows, self.stack.jacobian, self.stack.velocity, *np.zeros((3, len(self.gain))))
         rigid = 1 if self.rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
         self.descent = DampedDescent(self.stack.ends, self.stack.size, moved, rigid=rigid)
         self._robot = robot

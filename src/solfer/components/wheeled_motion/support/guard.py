@@ -26,16 +26,20 @@ log = logging.getLogger(__name__)
 
 
 class TaskRates(NamedTuple):
-    """Rows of the tasks, live, each of shape (rows,).
+    """Rows of the tasks, live, each of shape (rows,) but for the Jacobian.
 
     Attributes:
         rows: Rows of each task, by its name.
+        jacobian: Jacobian of all rows, shape (rows, n).
+        rates: Rates of all rows: those by which errors go away and, at the pace, desired ones.
         error: Desired less present values.
         away: Rates by which errors of base and vertices go away.
         forward: Desired rates of base and vertices, whole.
     """
 
     rows: dict[str, slice]
+    jacobian: np.ndarray
+    rates: np.ndarray
     error: np.ndarray
     away: np.ndarray
     forward: np.ndarray
@@ -99,6 +103,8 @@ class MotionGuard:
             edges=polygon.edges,
             of_base=rows[BASE].start if BASE in rows else -1,
             of_vertices=rows[VERTICES].start if VERTICES in rows else -1,
+            jacobian=rates.jacobian,
+            rates=rates.rates,
             error=rates.error,
             away=rates.away,
             forward=rates.forward,

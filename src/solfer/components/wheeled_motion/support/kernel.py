@@ -26,9 +26,12 @@ GUARD = BlockLayout(
     order=(int, "count"),
     edges=(float, "count", EDGE_SIZE),
     required_margin=float,
-    # tasks: first rows, -1: there is none; errors, rates by which they go away, desired rates, and the way that is held
+    # tasks: first rows, -1: there is none; Jacobian and rates, errors, rates by which they go away, desired rates, and
+    # the way that is held
     of_base=int,
     of_vertices=int,
+    jacobian=(float, "rows", "dofs"),
+    rates=(float, "rows"),
     error=(float, "rows"),
     away=(float, "rows"),
     forward=(float, "rows"),
@@ -155,17 +158,20 @@ def _keep_margin(block):
 
 @part
 def _lacks(block):
-    """Whether base and vertices are behind along their desired direction.
+    """Whether joints move base and vertices slower along their desired direction than is desired.
 
-    It is measured by the rates with which errors would go away along that way. Where the way leads back to where joints
-    can follow, it is not held up.
+    Where they are behind for another reason, as on a slope, whose way is longer, the motion is not held up.
     """
     along = square = 0.0
     for first, size in ((block.of_base, 6), (block.of_vertices, 3 * block.count)):
         if first >= 0:
             for k in range(first, first + size):
-                along += block.away[k] * block.forward[k]
-                square += block.forward[k] * block.forward[k]
+                if block.forward[k] != 0.0:
+                    rate = block.rates[k]
+                    for a in range(block.dofs):
+                        rate -= block.jacobian[k, a] * block.velocity[a]
+                    along += rate * block.forward[k]
+                    square += block.forward[k] * block.forward[k]
     return along > 1e-3 * math.sqrt(square)  # [m/s, rad/s]
 
 
