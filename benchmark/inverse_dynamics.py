@@ -164,7 +164,7 @@ def squats(name: str, folder: Path) -> Iterator[Figure]:
 
 
 def slopes(degrees: float, way: str, name: str, is_felt: bool) -> Iterator[Figure]:
-    """Squat on a slope by 10 cm, at 0.25 Hz for 8 s."""
+    """Squat on a slope by 10 cm, at 0.25 Hz for 4 s."""
     kind = type("Sloped", (HeavyWorld if name == "squat" else SensedWorld,), {})
     kind.slope, kind.heading, kind.seed = np.radians(degrees), WAYS[way], None
     normal = np.array((-np.sin(kind.slope), 0.0, np.cos(kind.slope)))
@@ -172,7 +172,8 @@ def slopes(degrees: float, way: str, name: str, is_felt: bool) -> Iterator[Figur
         file = configured(Path(folder), 0.05, hand=False)
         ground = "      ground: odometry/ground"
         text = file.read_text().replace(ground, "      #")
-        file.write_text(text.replace("      track: wheels", f"{ground}\n      track: wheels", 1) if is_felt else text)
+        driven = "      speed_driven: wheels"
+        file.write_text(text.replace(driven, f"{ground}\n{driven}", 1) if is_felt else text)
         world.run(1.0)
         odometry = world.plugin("odometry", target="solfer.components.odometry:Odometry")
         world.run(0.6)
@@ -196,7 +197,7 @@ def slopes(degrees: float, way: str, name: str, is_felt: bool) -> Iterator[Figur
             slips.append(float(np.abs(component._watch._moved).max()))
 
         world.bus.every(0.005, look)
-        world.run(8.0)
+        world.run(4.0)
         held = float(component.is_holding)
     case = f"{name} on {degrees} deg {way}, {'felt' if is_felt else 'not felt'}"
     goals = (5.0, 0.8, 0.8, 5.0, 0.0) if is_felt else (None,) * 5
