@@ -6,8 +6,8 @@ figure is a line, with `--json` an object with `case`, `value`, `unit`, `goal` a
 is not met. 1 u is one `pinocchio.computeAllTerms` on CENTAURO in the same run; cycles are timed by the time of the
 processor, which other work does not lengthen. Robots are pushed at their base, in directions that the seed draws, while
 their masses are up to 10 % wrong: with the seeds 1 to 3, or the one that is given. Robots with hands draw a circle with
-one while they squat; CENTAURO does the same once more where odometry estimates its base. TALOS and ANYmal come with
-`requirements-examples.txt`.
+one while they squat; CENTAURO does the same once more where odometry estimates its base. On slopes CENTAURO squats with
+the normals of its file, and with those that odometry feels. TALOS and ANYmal come with `requirements-examples.txt`.
 """
 
 import argparse
@@ -34,6 +34,8 @@ from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.config import load
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.bundle import load_bundle
+from solfer.simulation.robot_body.placement import StartPlacement
+from solfer.simulation.world.records import WorldRecord
 
 SQUATS = {"go1": 0.03, "go2": 0.03}
 """Robots with short legs, and how far they squat to each side [m]; others by 0.05 m."""
@@ -58,20 +60,29 @@ HANDS = {"centauro": "arm1_7", "talos": "arm_left_7_link"}
 STANDING = 1e-9
 """Amplitude of a robot that stands [m]; squats are larger."""
 
+WAYS = {"ahead": 0.0, "across": 0.5 * np.pi}
+"""Headings of a robot that stands on a slope [rad]."""
+
 SEEDS = (1, 2, 3)
 """Seeds of pushes."""
+
+SLOPES = [(degrees, way, base) for base in ("squat", "squat_estimated") for degrees in (10, 15) for way in WAYS]
+"""Slopes [deg], in which direction they rise, and the plugin on the true base or on an estimated one."""
 
 
 class HeavyWorld(World):
     """CENTAURO with perfect sensors, and with masses that are not those of its model."""
 
     seed: int | None = None
+    slope = heading = 0.0  # [rad]
 
     def offer(self, middleware):  # noqa: D102 see World
         text = parameters()["/robot_description"]
         urdf = text if self.seed is None else with_other_masses(text, WRONG, self.seed)
         record = perfect() if self.is_perfect else read_bundle(ROBOT / "robot.yaml")
-        simulation = Simulation(load_bundle(record, urdf))
+        world = WorldRecord.model_validate({"ground": {"slope": self.slope}})
+        simulation = Simulation(load_bundle(record, urdf), world=world)
+        simulation.reset(placement=StartPlacement(yaw=self.heading))
         return simulation, SimulationServer(simulation, middleware)
 
 
@@ -81,14 +92,14 @@ class SensedWorld(HeavyWorld):
     is_perfect = False
 
 
-def configured(folder: Path, amplitude: float) -> Path:
-    """Write CENTAURO's configuration with squats to each side by an amplitude [m], and a hand that draws a circle."""
+def configured(folder: Path, amplitude: float, hand: bool = True) -> Path:
+    """Write CENTAURO's configuration with squats to each side by an amplitude [m]; a hand may draw a circle."""
     for name in ("support", "robots"):
         (folder / name).symlink_to(CONFIG / name)
     first, begin, squat = (CONFIG / "centauro.yaml").read_text().partition("    squat: &squat")
     squat = squat.replace("[0.0, 0.0, -0.05]", f"[0.0, 0.0, {-amplitude}]", 1)
     task = f"hand: {json.dumps(hand_task(HANDS['centauro'], 'pelvis'))}\n          base: "
-    if amplitude > STANDING:
+    if hand and amplitude > STANDING:
         squat = squat.replace("base: ", task, 1).replace("[com, base]", "[com, base, hand]", 1)
     file = folder / "centauro.yaml"
     file.write_text(first + begin + squat)
@@ -150,6 +161,51 @@ def squats(name: str, folder: Path) -> Iterator[Figure]:
     yield Figure(f"squat {name}: largest share of friction", float(max(grips)), "", 0.7 if name in LEGGED else 0.8)
     yield Figure(f"squat {name}: largest share of a torque limit", float(max(shares)), "", 1.0)
     yield Figure(f"squat {name}: it holds instead", held, "", 0.0)
+
+
+def slopes(degrees: float, way: str, name: str, is_felt: bool) -> Iterator[Figure]:
+    """Squat on a slope by 10 cm, at 0.25 Hz for 4 s."""
+    kind = type("Sloped", (HeavyWorld if name == "squat" else SensedWorld,), {})
+    kind.slope, kind.heading, kind.seed = np.radians(degrees), WAYS[way], None
+    normal = np.array((-np.sin(kind.slope), 0.0, np.cos(kind.slope)))
+    with closing(kind()) as world, tempfile.TemporaryDirectory() as folder:
+        file = configured(Path(folder), 0.05, hand=False)
+        ground = "      ground: odometry/ground"
+        text = file.read_text().replace(ground, "      #")
+        driven = "      speed_driven: wheels"
+        file.write_text(text.replace(driven, f"{ground}\n{driven}", 1) if is_felt else text)
+        world.run(1.0)
+        odometry = world.plugin("odometry", target="solfer.components.odometry:Odometry")
+        world.run(0.6)
+        simulation = world.simulation
+        away = simulation.q[:3] - odometry.robot.command.position[:3] if name == "squat_estimated" else 0.0
+        component = world.plugin(name, file).component
+        world.run(0.5)
+        com = component.tasks["com"]
+        model, _ = component.model.kinematics.pinocchio
+        data = model.createData()
+        errors, grips, planned, slips = [], [], [], []
+
+        def ratio(forces):
+            pressed = forces @ normal
+            return float(np.max(np.linalg.norm(forces - np.outer(pressed, normal), axis=1) / pressed))
+
+        def look():
+            errors.append(pinocchio.centerOfMass(model, data, simulation.q) - away - com.reference.value)
+            grips.append(ratio(np.array(list(simulation.contacts().values()))))
+            planned.append(ratio(component.problem.force.reshape(-1, 3)))
+            slips.append(float(np.abs(component._watch._moved).max()))
+
+        world.bus.every(0.005, look)
+        world.run(4.0)
+        held = float(component.is_holding)
+    case = f"{name} on {degrees} deg {way}, {'felt' if is_felt else 'not felt'}"
+    goals = (5.0, 0.8, 0.8, 5.0, 0.0) if is_felt else (None,) * 5
+    yield Figure(f"{case}: centre of mass, RMS", _rms(errors), "mm", goals[0])
+    yield Figure(f"{case}: largest share of friction", max(grips), "", goals[1])
+    yield Figure(f"{case}: the same, as planned", max(planned), "", goals[2])
+    yield Figure(f"{case}: a contact moves, within 0.5 s", 1e3 * max(slips), "mm", goals[3])
+    yield Figure(f"{case}: it holds instead", held, "", goals[4])
 
 
 def _rms(errors: list[np.ndarray]) -> float:
@@ -223,11 +279,14 @@ def cycles(seed: int) -> Iterator[Figure]:
 
 
 def figures(only: list[str], seeds: tuple[int, ...]) -> Iterator[Figure]:
-    """Yield the figures of the cases `squat`, `pushes` and `cycle`."""
+    """Yield the figures of the cases `squat`, `slope`, `pushes` and `cycle`."""
     for name in (*CASES, "estimated"):
         if "squat" in only:
             with tempfile.TemporaryDirectory() as folder:
                 yield from squats(name, Path(folder))
+    for case in SLOPES if "slope" in only else ():
+        for is_felt in (False, True):
+            yield from slopes(*case, is_felt)
     for name in (*CASES, "estimated"):
         for seed in seeds if "pushes" in only else ():
             with tempfile.TemporaryDirectory() as folder:
@@ -241,7 +300,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true", help="one object a line")
     parser.add_argument("--seed", type=int, help="of directions and wrong masses (default: 1, 2 and 3 in turn)")
-    parser.add_argument("--only", default="squat,pushes,cycle", help="cases, with commas (default: %(default)s)")
+    parser.add_argument("--only", default="squat,slope,pushes,cycle", help="cases, with commas (default: %(default)s)")
     add_engine(parser)
     arguments, is_met = parser.parse_args(), True
     seeds = SEEDS if arguments.seed is None else (arguments.seed,)

@@ -123,7 +123,7 @@ def numbers_of(component):
             yield from (task.numbers for task in component.tasks.values())
             demand, problem = component._demand, component.problem
             limits = problem._constraints.limits
-            yield from (demand.velocity_gains, demand.roots, problem.bounds.speed, component.ground.cones)
+            yield from (demand.velocity_gains, demand.roots, problem.bounds.speed, component.ground.cones.matrix)
             yield from (limits, problem._constraints.upper[: len(limits)])
             yield [problem.bounds.braking, component.ground.fade, demand.settle, component._motion.follow]
             yield from (numbers for _, _, numbers in component._gains)

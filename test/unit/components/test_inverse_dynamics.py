@@ -1,5 +1,6 @@
 """The component `inverse_dynamics` on CENTAURO, without any transport, beside Pinocchio and another solver."""
 
+import math
 import re
 from ctypes import c_int
 from pathlib import Path
@@ -8,6 +9,7 @@ import daqp
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 from support.allocations import check_that_it_keeps_no_memory
 
 from solfer.components.inverse_dynamics import InverseDynamics
@@ -15,6 +17,7 @@ from solfer.components.inverse_dynamics.component import SECOND_LEVEL_WEIGHT
 from solfer.components.inverse_dynamics.problem import ACCELERATION_WEIGHT, FORCE_WEIGHT
 from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
 from solfer.interfaces.geometry import Pose, Vector
+from solfer.interfaces.ground import GroundEstimate
 from solfer.interfaces.support import LiftContacts
 from solfer.interfaces.task_references import GetReference, ReachGoal, SetReference
 from solfer.numerics.planar_move import PlanarMove
@@ -91,8 +94,8 @@ class Second:
         self._torques = torque_scale * self._robot.upper_limits.torque
         self._radii = 0.01, 0.068
 
-    def contact_jacobian(self, position):
-        """Return the Jacobian of the wheels' material at the ground, rows in world axes."""
+    def contact_jacobian(self, position, normal=(0.0, 0.0, 1.0)):
+        """Return the Jacobian of the wheels' material at a ground with a normal, rows in world axes."""
         pin.computeJointJacobians(self._model, self._data, position)
         pin.updateFramePlacements(self._model, self._data)
         rows = []
@@ -100,8 +103,8 @@ class Second:
             frame = self._model.getFrameId(f"wheel_{leg}", pin.FrameType.BODY)
             jacobian = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
             axle = self._data.oMf[frame].rotation[:, 2]
-            down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
-            arm = -self._radii[0] * down / np.linalg.norm(down) - np.array((0.0, 0.0, self._radii[1]))
+            down = normal - axle * (axle @ normal)
+            arm = -self._radii[0] * down / np.linalg.norm(down) - self._radii[1] * np.array(normal)
             rows.append(jacobian[:3] - pin.skew(arm) @ jacobian[3:])
         return np.vstack(rows)
 
@@ -358,14 +361,17 @@ def test_contacts_that_slip_are_named_and_held(speed, is_slipping, caplog):
 
 
 @pytest.mark.slow
-def test_cycles_keep_no_memory():
-    component = started()
+@pytest.mark.parametrize("ground", [None, "odometry/ground"])
+def test_cycles_keep_no_memory(ground):
+    component = started(ground=ground)
     random = np.random.default_rng(5)
     draw(component, random)
     state = component.model.state
 
     def one():
         state.velocity[0] += 1e-9
+        if ground:  # it never comes to rest
+            component.ground.cones.felt.normals[:, 0] = 0.1 * math.sin(1e5 * state.velocity[0])
         cycle(component)
 
     check_that_it_keeps_no_memory(one)
@@ -513,6 +519,72 @@ def test_a_base_that_jumps_changes_no_torque():
     torques = [[cycle(component).torque.copy() for _ in range(3)] for component in pair]
     assert np.abs(np.subtract(*torques)).max() < 5.0  # for one cycle the acceleration has the old heading
     assert np.abs(np.subtract(*torques))[1:].max() < 1e-3
+
+
+def on_slope(degrees, axis="y", **tags):
+    """Stand on a plane that is turned about an axis, and has been felt if others feel it; return its normal as well."""
+    robot = centauro()
+    base = robot.kinematics.base
+    turn = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+    place, _ = base.to_pose(robot.state.position[:6])
+    base.from_rotation(turn @ place, turn @ base.to_rotation(robot.state.position[:6]), robot.state.position[:6])
+    robot.update()
+    component = started(robot, **{"ground": "odometry/ground"} | tags)
+    if component.ground.cones.felt:
+        feel(component, turn[:, 2])
+    cycle(component, 700)
+    return component, turn[:, 2]
+
+
+def feel(component, normal):
+    component.ground.cones.felt.receive(GroundEstimate(normal=Vector(*normal)))
+
+
+@pytest.mark.parametrize("degrees", [10.0, 15.0])
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_on_a_slope_forces_are_those_of_statics(degrees, axis):
+    """By Pinocchio the forces carry the robot at contacts that are uphill of the wheels' lowest points."""
+    component, normal = on_slope(degrees, axis, friction=0.45)
+    model, _ = component.model.kinematics.pinocchio
+    state = component.model.state
+    problem = component.problem
+    needed = pin.rnea(model, model.createData(), state.position, state.velocity, problem.acceleration)
+    jacobian = Second(component).contact_jacobian(state.position, normal)
+    assert not component.is_holding
+    assert (jacobian.T @ problem.force)[:6] == pytest.approx(needed[:6], abs=1e-6)
+    assert needed - jacobian.T @ problem.force == pytest.approx(problem.torque, abs=1e-6)
+    assert problem.force.reshape(-1, 3).sum(axis=0)[2] == pytest.approx(
+        9.81 * component.model.kinematics.mass, rel=1e-3
+    )
+    assert component.ground.normals @ problem.force == pytest.approx(problem.force.reshape(-1, 3) @ normal)
+
+
+@pytest.mark.parametrize("ground", [None, "odometry/ground"])
+def test_on_a_felt_slope_forces_stay_in_real_cones(ground):
+    """Forces that balance the weight need tan(20 deg) = 0.36, which vertical cones allow for with less friction."""
+    component, normal = on_slope(20.0, friction=0.3, ground=ground)
+    forces = component.problem.force.reshape(-1, 3)
+    along = np.linalg.norm(forces - np.outer(forces @ normal, normal), axis=1)
+    assert (along <= 0.3 * (forces @ normal) + 1e-9).all() == (ground is not None)
+
+
+def test_torques_do_not_jump_with_the_ground():
+    """It tilts by 10 degrees within 0.3 s, and then is where one that has felt it from the start has it."""
+    component, _ = on_slope(0.0)
+    torques = []
+    for step in range(200):
+        angle = math.radians(10.0) * min(step / 60.0, 1.0)
+        if step % 20 == 0:
+            feel(component, (-math.sin(angle), 0.0, math.cos(angle)))
+        torques.append(cycle(component).torque.copy())
+    assert np.abs(np.diff(torques, axis=0)).max() < 2.0  # [Nm] in a cycle, of a robot of 1.1 kN
+
+
+def test_without_a_felt_ground_normals_are_those_of_the_file():
+    flat, _ = on_slope(0.0)
+    known = started()
+    assert np.array_equal(cycle(known).torque, cycle(flat).torque)
+    assert known.topics()[-2].name != "/odometry/ground" and flat.topics()[-2].name == "/odometry/ground"
 
 
 def test_a_recording_has_forces_and_active_constraints():

@@ -194,6 +194,26 @@ def test_the_ground_turns_below_a_robot_that_drives_onto_a_ramp(robot, speed):
     assert tilt(component(robot), base / speed + 0.5, steepest * speed / base, speed, largest=steepest) is None
 
 
+def test_others_are_told_of_the_ground(robot):
+    """Level, then on a ramp of 15 degrees: places are those of the wheels' contacts, normals those of the ramp."""
+    made = component(robot)
+    report = next(topic for topic in made.topics() if topic.name == "ground").collect
+    drive(made, 0.5, np.zeros(4))
+    level = report()
+    assert level.normal == Vector(z=1.0) and level.header.frame_id == "odom"
+    speed = 0.6
+    tilt(made, 3.0, math.radians(15.0) * speed / 1.092, speed, largest=math.radians(15.0))
+    ramp = report()
+    slope = Rotation.from_euler("z", made.law.heading) * Rotation.from_euler("y", -math.radians(15.0))
+    for normal in (*ramp.normals, ramp.normal):
+        assert (normal.x, normal.y, normal.z) == pytest.approx(slope.as_matrix()[:, 2], abs=0.015)
+    contacts = robot.twin().contacts
+    assert ramp.names == tuple(contacts.names[:4]) and all(map(math.isnan, ramp.friction))
+    places = np.array([(each.x, each.y, each.z) for each in ramp.places])
+    assert np.abs((places - places.mean(axis=0)) @ slope.as_matrix()[:, 2]).max() < 0.02
+    assert 0.0 < ramp.normal_deviations[0] < 0.02 and 0.0 <= ramp.height_deviations[0] < 0.1
+
+
 @pytest.mark.parametrize("rate", [0.2, 2.0])
 @pytest.mark.parametrize("wheels", [(), (0,), (0, 1), (0, 1, 2, 3)])
 def test_a_robot_that_tips_lifts_wheels(robot, wheels, rate):

@@ -1,5 +1,6 @@
 """Messages of declared topics against genpy's own serialisation, and the checksums of what is generated."""
 
+import math
 from dataclasses import dataclass
 
 import control_msgs.msg as control_messages
@@ -13,8 +14,11 @@ from support.unit.declarations import Header, Twist, TwistStamped, Vector
 from support.unit.genpy_messages import clock, packed  # noqa: F401, a fixture
 
 from solfer.errors import ComponentError, MissingDependency, PipeError, UnknownName
+from solfer.interfaces.geometry import Vector as Coordinates
+from solfer.interfaces.ground import GroundEstimate
 from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.codecs.table import codec
+from solfer.msg import Ground
 from solfer.transport.declared.fields import message_of, value_of
 from solfer.transport.messages import FieldsMessage
 
@@ -26,6 +30,20 @@ CHECKSUMS = {
     "JointTolerance": "f544fe9c16cf04547e135dd6063ff5be",
 }
 """Of the control_msgs of ROS Noetic."""
+
+
+def test_a_ground_is_what_genpy_reads():
+    """Friction that was not felt stays NaN, and the frame is that of odometry."""
+    known = codec("solfer/Ground")
+    felt = GroundEstimate(
+        names=("a", "b"), normals=(Coordinates(-0.6, 0.0, 0.8), Coordinates(z=1.0)), friction=(math.nan, 0.4)
+    )
+    read = Ground().deserialize(bytes(known.encode(message_of("solfer/Ground", felt)).bytes[4:]))
+    assert read.header.frame_id == "odom" and read.header.stamp and read.names == ["a", "b"]
+    assert (read.normals[0].x, read.normals[0].z, read.normal.z) == (-0.6, 0.8, 1.0)
+    assert math.isnan(read.friction[0]) and read.friction[1] == 0.4
+    again = value_of(GroundEstimate, known.decode(packed(read), "odometry"))
+    assert again.normals == felt.normals and math.isnan(again.friction[0])
 
 
 @pytest.mark.parametrize("name", CHECKSUMS)

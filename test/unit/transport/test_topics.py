@@ -11,6 +11,7 @@ from solfer.errors import ComponentError, MiddlewareError
 from solfer.interfaces.geometry import ForceAndTorque, StampedWrench
 from solfer.interfaces.geometry import Header as Stamp
 from solfer.interfaces.geometry import Vector as Coordinates
+from solfer.interfaces.ground import GroundEstimate
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
 from solfer.transport.declared.publications import Publications
@@ -20,6 +21,7 @@ KINDS = {
     "geometry_msgs/Twist": Twist,
     "geometry_msgs/TwistStamped": TwistStamped,
     "geometry_msgs/WrenchStamped": StampedWrench,
+    "solfer/Ground": GroundEstimate,
 }
 TWIST = Twist(Vector(1.0, 2.0, 3.0), Vector(z=0.5))
 VALUES = {
@@ -32,6 +34,20 @@ VALUES = {
     "geometry_msgs/WrenchStamped": (
         StampedWrench(Stamp(7.0, "wheel_1"), ForceAndTorque(Coordinates(1.0, -2.0, 230.0), Coordinates(0.1, 0.2, 0.3))),
         StampedWrench(Stamp(8.0, "wheel_1")),
+    ),
+    "solfer/Ground": (
+        GroundEstimate(
+            Stamp(7.0, "odom"),
+            ("left", "right"),
+            (Coordinates(0.5, 0.3, 0.1), Coordinates(0.5, -0.3, 0.1)),
+            (Coordinates(-0.6, 0.0, 0.8), Coordinates(0.0, 0.0, 1.0)),
+            (0.01, 0.02),
+            (0.001, 0.002),
+            friction=(0.4, 0.8),
+            point=Coordinates(0.5, 0.0, 0.1),
+            normal=Coordinates(0.0, -0.28, 0.96),
+        ),
+        GroundEstimate(),
     ),
 }
 

@@ -76,7 +76,7 @@ class InverseDynamics(Component):
             )
         robot.update()
         self._gains = configured_gains(robot, tags.gains)
-        self.ground = Ground(robot, tags)
+        self.ground = Ground(robot, tags, name)
         self._configured, stack = self._make_stack(robot)
         self.references = ReferenceSet(
             name,
@@ -143,7 +143,7 @@ class InverseDynamics(Component):
         """Offer gains, limits, friction and times beside what `ReferenceSet` offers."""
         limits = ("stack", "limits")
         tags = self.tags
-        ground = self.ground
+        cones = self.ground.cones
         speeds = (
             [LiveParameter((*limits, "speed_scale"), partial(np.copyto, self.problem.bounds.speed), self._speed_limits)]
             if tags.stack.limits.speeds
@@ -161,8 +161,8 @@ class InverseDynamics(Component):
             *speeds,
             LiveParameter((*limits, "torque_scale"), self.problem.limit_torques, self._torque_limits),
             LiveParameter((*limits, "braking"), self._take_braking, lambda tags: tags.stack.limits.braking),
-            LiveParameter(("friction",), ground.take_cones, ground.cones_of),
-            LiveParameter(("torsion",), ground.take_cones, ground.cones_of),
+            LiveParameter(("friction",), cones.take_ratios, cones.ratios_of),
+            LiveParameter(("torsion",), cones.take_ratios, cones.ratios_of),
             LiveParameter(("fade",), self._take_times),
             LiveParameter(("settle",), self._take_settling, lambda tags: tags.settle),
             LiveParameter(("follow",), self._take_times),
@@ -216,6 +216,7 @@ class InverseDynamics(Component):
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`."""
         self.references.move_world(move)
+        self.ground.cones.move_world(move)
         self._demand.is_smooth = False
 
     def send(self) -> None:
@@ -247,9 +248,10 @@ class InverseDynamics(Component):
         )
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
-        """Receive references; publish forces of contacts and active constraints on `/diagnostics`."""
+        """Receive references and the ground; publish forces and active constraints on `/diagnostics`."""
         diagnostics = TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report, rate=1.0)
-        return (*self.references.interface.topics(), diagnostics)
+        felt = self.ground.cones.felt
+        return (*self.references.interface.topics(), *(() if felt is None else felt.topics()), diagnostics)
 
     def lift(self, request: LiftContacts) -> LiftReply:
         """Lift contacts, or put them down again; nothing changes if one of them is not tracked.

@@ -36,13 +36,13 @@ class ProblemConstraints:
         self.limits = np.zeros(len(driven))
         self.names = (
             *(f"torque of {robot.dofs[dof]}" for dof in driven),
-            *(f"friction of {ground.names[owner]}" for owner in ground.owners),
+            *(f"friction of {ground.names[owner]}" for owner in ground.cones.owners),
             *(f"normal force of {name}" for name in ground.names),
             *(f"acceleration of {dof}" for dof in robot.dofs),
         )
         self.active = np.zeros(len(self.names), dtype=np.int64)
         self.values, self.lower, self.upper = np.zeros((3, len(self.names)))
-        self._cones = len(driven) + len(ground.cones)
+        self._cones = len(driven) + len(ground.cones.matrix)
         self.count = self._cones + len(ground.normals)
         self.lower[len(driven) : self._cones] = -np.inf
         self.limit_torques(torque_limits)
@@ -62,7 +62,7 @@ class ProblemConstraints:
         cones = self._cones
         first = self.count
         np.take(torque, self.driven, out=values[:drives], mode="clip")
-        np.dot(ground.cones, force, out=values[drives:cones])
+        np.dot(ground.cones.matrix, force, out=values[drives:cones])
         np.dot(ground.normals, force, out=values[cones:first])
         values[first:] = acceleration
         self.upper[cones:first] = ground.largest

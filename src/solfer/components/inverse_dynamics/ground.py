@@ -5,12 +5,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from solfer.components.inverse_dynamics.cones import FrictionCones
 from solfer.components.inverse_dynamics.tags import InverseDynamicsTags
 from solfer.errors import ComponentError, SolferError
 from solfer.points import Handler
 from solfer.points.acceleration import Acceleration
 from solfer.points.contact.contact_constraint import held_acceleration
-from solfer.points.contact.contacts import Contact, RollingContact, across
+from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
 
 
@@ -25,15 +26,15 @@ class Ground:
     Args:
         robot: The Robot.
         tags: Tags of the component.
+        name: Name of the component, for messages.
 
     Attributes:
         contacts: The contacts by name.
         rows: What they hold: the Handler of their accelerations.
         jacobian: Its Jacobian Jc, shape (k, n); live.
         starts: First force of each contact, and the end of the last one, shape (c + 1,).
-        cones: G, shape (g, k).
-        owners: Contact of each row of G, shape (g,).
-        normals: N, shape (c, k).
+        cones: G and N.
+        normals: N, shape (c, k); live.
         largest: Largest normal force of each contact, shape (c,) [N].
         fractions: How far each contact has come, from 0 for one that is lifted to 1, shape (c,).
         holds: Whether each row counts, shape (k,).
@@ -44,7 +45,7 @@ class Ground:
         ComponentError: A base that floats has no contact, or a flat foot has no sole.
     """
 
-    def __init__(self, robot: Robot, tags: InverseDynamicsTags):
+    def __init__(self, robot: Robot, tags: InverseDynamicsTags, name: str = "inverse_dynamics"):
         self.contacts = _tracked(robot, tags)
         accelerations = [held_acceleration(contact) for contact in self.contacts.values()]
         self.rows: Handler[Acceleration] = Handler(accelerations)
@@ -52,12 +53,8 @@ class Ground:
         count = len(accelerations)
         size = int(self.starts[-1])
         self.jacobian = self.rows.jacobian.reshape(size, robot.size)  # that of no point has no columns
-        blocks = [_cone(name, contact, tags) for name, contact in self.contacts.items()]
-        self.owners = np.repeat(np.arange(count), [len(block) for block in blocks])
-        self.cones = self.cones_of(tags)
-        self.normals = np.zeros((count, size))
-        for index, contact in enumerate(self.contacts.values()):
-            self.normals[index, self.starts[index] : self.starts[index + 1]] = _local(contact)[2]
+        self.cones = FrictionCones(self.contacts, self.starts, tags, name)
+        self.normals = self.cones.normals
         weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         self.unit = weight / max(count, 1)
         self.fade = tags.fade
@@ -67,17 +64,6 @@ class Ground:
         self.largest = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
         self._change()
-
-    def cones_of(self, tags: InverseDynamicsTags) -> np.ndarray:
-        """Compute G for the friction and the torsion of `tags`, shape (g, k)."""
-        cones = np.zeros((len(self.owners), int(self.starts[-1])))
-        for index, (name, contact) in enumerate(self.contacts.items()):
-            cones[self.owners == index, self.starts[index] : self.starts[index + 1]] = _cone(name, contact, tags)
-        return cones
-
-    def take_cones(self, cones: np.ndarray) -> None:
-        """Go on with another G, of `cones_of`."""
-        self.cones[:] = cones
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,6 +91,7 @@ class Ground:
         """Let all contacts have come where they are to be."""
         self._goals[:] = self.fractions[:] = self._placed
         self._change()
+        self.cones.start()
 
     def leave_out(self, absent: np.ndarray) -> tuple[str, ...]:
         """Let contacts not count until they are put down, or until the next start; return their names.
@@ -123,6 +110,7 @@ class Ground:
             largest = step / self.fade if self.fade > step else 1.0
             self.fractions += np.clip(self._goals - self.fractions, -largest, largest)
             self._change()
+        self.cones.update(step)
         self.rows.update()
 
     def _change(self) -> None:
@@ -148,32 +136,3 @@ def _tracked(robot: Robot, tags: InverseDynamicsTags) -> Mapping[str, Contact]:
             expected="a robot configuration with `contacts: {read: true}`, and a group of links with contacts",
         )
     return {name: contacts[name] for name in contacts.names if contacts[name] in tracked}
-
-
-def _local(contact: Contact) -> np.ndarray:
-    """Return the map from forces along the rows to force and torque in the contact's frame, shape (6, rows)."""
-    if not contact.holds_a_point:
-        return contact.constraint.T
-    normal = contact.normal if isinstance(contact, RollingContact) else np.array((0.0, 0.0, 1.0))
-    side = np.array(across(*normal.tolist()))
-    whole = np.zeros((6, 3))
-    whole[:3] = np.cross(side, normal), side, normal
-    return whole
-
-
-def _cone(name: str, contact: Contact, tags: InverseDynamicsTags) -> np.ndarray:
-    """Return the rows of G of a contact, shape (g, rows)."""
-    local = _local(contact)
-    normal = local[2]
-    friction = math.sqrt(0.5) * tags.friction  # a pyramid of four sides within the cone
-    sides: list[tuple[np.ndarray, float]] = [(local[0], friction), (local[1], friction)]
-    if local[3:].any():
-        if tags.sole is None and local[3:5].any():
-            raise ComponentError(
-                f"contact '{name}' holds moments, and has no sole", where=tags.where(), expected="`sole`"
-            )
-        length, width = tags.sole or (0.0, 0.0)
-        sides += [(local[3], width), (local[4], length), (local[5], tags.torsion)]
-    # a contact need not have a force along each side
-    rows = [sign * side - ratio * normal for side, ratio in sides if side.any() for sign in (1.0, -1.0)]
-    return np.array(rows).reshape(-1, local.shape[1])

@@ -72,6 +72,12 @@ class InverseDynamicsTags(FollowingTags):
         default="all", description="SRDF group of the links whose contacts carry the robot"
     )
     friction: float = Field(default=0.6, gt=0.0, le=10.0, **LIVE, description="coefficient of friction of the ground")
+    ground: str | None = Field(
+        default=None,
+        min_length=1,
+        description="topic of `solfer/Ground`, such as `odometry/ground`: contacts and friction turn with its normals; "
+        "left out, those of the robot's file count",
+    )
     sole: Annotated[tuple[HalfSize, ...], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="half length and half width of flat feet, about their contacts [m]"
     )

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
+from solfer.components.odometry.ground.ground_report import report_ground
 from solfer.components.odometry.messages import (
     SetBase,
     StampedUncertainPose,
@@ -27,6 +29,7 @@ from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
 from solfer.interfaces.declaration import Accepted, LiveParameter, Parameter, Service, TopicIn, TopicOut
 from solfer.interfaces.geometry import bare_frame
+from solfer.interfaces.ground import GROUND, GROUND_FRAME, GroundEstimate
 from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.blocks import MemoryBlock
@@ -36,7 +39,7 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
-FRAME = "odom"
+FRAME = GROUND_FRAME
 """World frame of the published pose, as in REP 105."""
 
 
@@ -199,15 +202,18 @@ class Odometry(Component):
         return (Service("set_base", "solfer/SetBase", SetBase, reply=Accepted, handler=self.set_base, commands=False),)
 
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
-        """Receive `<name>/set_pose`; publish `<name>/pose` with its covariance, diagnostics and, by a tag, tf."""
+        """Receive `<name>/set_pose`; publish `<name>/pose`, `<name>/ground`, diagnostics and, by a tag, tf."""
         interface = "geometry_msgs/PoseWithCovarianceStamped"
-        known = isinstance(self.law, FilteredOdometry)
+        law = self.law
         made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, handler=self.set_pose)]
-        if known:
+        if isinstance(law, FilteredOdometry):
             made.append(
                 TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self.wheel_states, rate=1.0)
             )
             made.append(TopicOut("pose", interface, StampedUncertainPose, self.uncertain_pose, rate=50.0))
+            made.append(
+                TopicOut("ground", GROUND, GroundEstimate, partial(report_ground, law, self._wheels), rate=10.0)
+            )
         if self.tags.transform:
             made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, collect=self._place))
         return tuple(made)

@@ -72,8 +72,8 @@ class SupportVertex(LinkPoint):
 
     @property
     def normal(self) -> np.ndarray:
-        """Unit normal of the ground in the world, shape (3,); a new array."""
-        return self._numbers[6:9].copy()
+        """Unit normal of the ground in the world, shape (3,); live. What is written has to be of length one."""
+        return self._numbers[6:9]
 
     def set_normal(self, normal: ArrayLike) -> None:
         """Set the normal of the ground in the world, any length, shape (3,).
