@@ -33,7 +33,7 @@ class CommonSlip:
 
     def __init__(self, motion: WheelMotion):
         self._motion = motion
-        self.speed, self.slip, self._before, self._gained, self._bias, self._way = np.zeros((6, 2))
+        self.speed, self.slip, self._before, self._gained, self._bias, self._slipped = np.zeros((6, 2))
         self._probability, self._lasts, self._excess = np.ones((3, 1))
         self.contradicted = False
         self._block = MemoryBlock(
@@ -43,7 +43,7 @@ class CommonSlip:
             gained=self._gained,
             bias=self._bias,
             slip=self.slip,
-            way=self._way,
+            slipped=self._slipped,
             mean=np.zeros(4),
             probability=self._probability,
             excess=self._excess,
@@ -53,7 +53,7 @@ class CommonSlip:
 
     def start(self) -> None:
         """Begin with wheels that roll, and nothing to compare with."""
-        for numbers in (self._gained, self._bias, self.slip, self._way):
+        for numbers in (self._gained, self._bias, self.slip, self._slipped):
             numbers[:] = 0.0
         self._lasts[:] = math.nan
         self._probability[:] = 1.0
@@ -98,14 +98,14 @@ class CommonSlip:
             tilt: Error of the tilt about x and y of the heading frame [rad], and its variance [rad^2].
 
         Returns:
-            By which way the base is too far where slip begins, in the heading frame, shape (2,) [m]; live. None else.
+            How far the base is too far where slip begins, in the heading frame, shape (2,) [m]; live. None else.
         """
         found = kernel.follow(
             self._block.address, self._motion.block.address, inliers, pushed, heading, place, axes, rotation,
             tilt,
         )  # fmt: skip
         self.contradicted = found == kernel.CONTRADICTS
-        return self._way if found == kernel.BEGINS else None
+        return self._slipped if found == kernel.BEGINS else None
 
     def velocity_variance(self, time: float) -> float:
         """Return the variance that the velocity gains in a time [s] by the accelerometer alone [m^2/s^2]."""

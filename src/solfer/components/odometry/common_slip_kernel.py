@@ -10,13 +10,13 @@ from solfer.numerics.compilation import cached, part
 SLIP = BlockLayout(
     "Slip",
     # all along x and y of the heading frame: velocity of the base by wheels, that of the IMU at the measurement before
-    # [m/s], what it has gained more than the accelerometer measured, the error of that [m/s^2], slip, and its way [m]
+    # [m/s], what it has gained more than the accelerometer measured, the error of that [m/s^2], slip, and its path [m]
     speed=(float, 2),
     before=(float, 2),
     gained=(float, 2),
     bias=(float, 2),
     slip=(float, 2),
-    way=(float, 2),
+    slipped=(float, 2),
     mean=(float, 4),  # of the wheels' velocity and the base's while wheels slip [m/s]
     probability=(float, 1),  # that wheels roll
     excess=(float, 1),  # of what no slip explains, all together [m/s]
@@ -71,7 +71,7 @@ def mean_speed(motion, inliers, rate, speed):
 @part
 def forget(block, lasts):
     """Let wheels roll."""
-    for numbers in (block.gained, block.slip, block.way):
+    for numbers in (block.gained, block.slip, block.slipped):
         numbers[:] = 0.0
     block.probability[0] = 1.0
     block.lasts[0] = lasts
@@ -109,7 +109,7 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     gained = block.gained
     bias = block.bias
     slip = block.slip
-    way = block.way
+    slipped = block.slipped
     mean = block.mean
     wx, wy, wz, time = rotation
     mean_speed(motion, inliers, wz, speed)
@@ -121,7 +121,7 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     v = speed[1] + wz * x - wx * z
     cosine = math.cos(wz * time)
     sine = math.sin(wz * time)
-    for vector in (before, gained, slip, way, mean[:2], mean[2:]):
+    for vector in (before, gained, slip, slipped, mean[:2], mean[2:]):
         turn(vector, cosine, sine)
     cosine = math.cos(heading)
     sine = math.sin(heading)
@@ -171,12 +171,12 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     variance = noise * noise + tilt[2] * (gravity * comparison_time) ** 2
     square = gained[0] * gained[0] + gained[1] * gained[1]
     if square < 4.0 * variance:
-        way[:] = 0.0
+        slipped[:] = 0.0
     if square < 4.0 * variance and not rests:
         for axis in range(2):
             bias[axis] -= gained[axis] * time / (comparison_time * learning_time)
     for axis in range(2):
-        way[axis] += gained[axis] * time
+        slipped[axis] += gained[axis] * time
     # one in a thousand intervals is one of slip, of which any velocity to 0.5 m/s is as likely
     ratio = 0.5 * square / variance - math.log(0.999 * 0.5 * 0.5 / (2.0 * 0.001 * variance))
     block.probability[0] = 1.0 / (1.0 + math.exp(min(ratio, 700.0)))

@@ -128,7 +128,7 @@ class Odometry(Component):
         self._pose[:] = 0.0
         self.streams.start()
         self._base.averages = self.streams.synchronizes
-        self._base.push = self.streams.push
+        self._base.velocity_change = self.streams.velocity_change
         self.law.start()
         self._write()
 

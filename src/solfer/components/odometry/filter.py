@@ -41,6 +41,7 @@ class ImuProgress:
         since: Time since its last sample [s].
         pending: Yaw that was integrated since its last sample [rad].
         offset: From the heading of the IMU to that of the base [rad].
+        period: Time since the measurement of the joints before [s].
         rest: Time for which the robot has stood still [s].
         sway: Mean motion of each joint, shape (n,).
     """
@@ -50,6 +51,7 @@ class ImuProgress:
         self.rate, self.rate_before = self.rates
         self.assumed = np.zeros(2)
         self.sway = np.zeros(joints)
+        self.period = 1.0
         self.start()
 
     def start(self) -> None:
@@ -113,7 +115,6 @@ class FilteredOdometry:
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.heading = 0.0
         self._smoothed = np.zeros(4)
-        self._period = 1.0
 
     @property
     def lifted(self) -> np.ndarray:
@@ -189,7 +190,7 @@ class FilteredOdometry:
         motion = self._motion
         self._base.read(measured)
         motion.wheels.update(self._base.heading)
-        self._period = period
+        self._imu.period = period
         motion.find_step()
         keep = REST_TIME / (REST_TIME + period)
         moved, legs, sway = filter_kernel.joint_motion(motion.step, motion.wheels.legs, self._imu.sway, keep)
@@ -226,7 +227,7 @@ class FilteredOdometry:
             pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        self.kalman.write_covariances(self.heading, self._motion.arm, self._period, pose, twist)
+        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, pose, twist)
 
     def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
@@ -240,16 +241,16 @@ class FilteredOdometry:
         base = self._base
         kalman = self.kalman
         if not base.fresh:
-            np.multiply(base.angular[:2], self._period, out=base.turned[:2])
+            np.multiply(base.angular[:2], self._imu.period, out=base.turned[:2])
             imu.assumed += base.turned[:2]
             return 0.0, NO_SAMPLE
-        time = imu.since + self._period
+        time = imu.since + self._imu.period
         shaken = filter_kernel.mean_rate(
             base.rotation, base.heading, base.angular, base.turned, time, base.averages,
             imu.rates, kalman.axes,
         )  # fmt: skip
         shaking_time = 0.3  # [s] for which it lasts
-        shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._period
+        shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._imu.period
         sample = NO_SAMPLE
         x, y, _ = base.turned.tolist()
         before_x, before_y = kalman.tilt.tolist()
@@ -280,7 +281,7 @@ class FilteredOdometry:
         """
         imu = self._imu
         motion = self._motion
-        imu.since += self._period
+        imu.since += self._imu.period
         if self._base.fresh:
             return float(imu.rate[2]) * imu.since - imu.pending, imu.since, 0.0
         yaw, spread = yaw_of(motion.displacements, motion.arms, motion.trusted)
@@ -292,13 +293,13 @@ class FilteredOdometry:
     def _note_rest(self, moved: float, sway: float, imu_time: float) -> None:
         """Note for how long no joint has moved and the gyroscope has measured no more than its bias and its noise."""
         imu = self._imu
-        limit = self._tags.rest * self._period
+        limit = self._tags.rest * self._imu.period
         still = moved <= limit and sway <= 0.05 * limit  # a robot that has stopped still sways
         if still and imu_time:
             deviation = math.sqrt(self.kalman.bias_variance + self._tags.gyro_noise**2 / imu_time)
             # five standard deviations of its noise, and 2 mrad/s by which a robot at rest may sway
             still = abs(float(imu.rate[2]) - self.kalman.bias) <= 5.0 * deviation + 2e-3
-        imu.rest = imu.rest + self._period if still else 0.0
+        imu.rest = imu.rest + self._imu.period if still else 0.0
 
     def _correct(self, yaw: float, imu_time: float, leg_speed: float) -> None:
         """Correct the filter by the wheels that roll, or by the accelerometer where all slip."""
@@ -306,7 +307,7 @@ class FilteredOdometry:
         kalman = self.kalman
         consensus = self.consensus
         tags = self._tags
-        period = self._period
+        period = self._imu.period
         x, y, _ = kalman.velocity.tolist()
         speed = math.hypot(x, y)
         encoder_deviation = 1e-5 if self._imu.rest > REST_TIME else 2e-3  # [m/s] of a wheel's velocity
@@ -358,17 +359,17 @@ class FilteredOdometry:
         base = self._base
         kalman = self.kalman
         x, y, z = base.angular.tolist()
-        way = self.slip.follow(
-            *base.push,
+        slipped = self.slip.follow(
+            *base.velocity_change,
             kalman.axes,
             self.consensus.inliers,
             heading=base.heading,
             rotation=(x, y, z - kalman.bias, time),
             tilt=(*kalman.tilt.tolist(), float(kalman.covariance[TILT, TILT])),
         )
-        if way is not None:
+        if slipped is not None:
             kalman.lose_velocity(SLIP_DEVIATION**2)
-            self.position[:2] -= about_vertical(np.append(way, 0.0), self.heading)[:2]
+            self.position[:2] -= about_vertical(np.append(slipped, 0.0), self.heading)[:2]
 
     def _tolerance(self, speed: float) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, radii, and slopes."""
@@ -386,7 +387,7 @@ class FilteredOdometry:
         kalman = self.kalman
         base = self._base
         wheels = motion.wheels
-        period = self._period
+        period = self._imu.period
         yaw = measured - (kalman.bias + kalman.noise) * imu_time
         kalman.integrate(self.heading + 0.5 * yaw, period, imu_time, unknown)
         ground.settle(self._tags.settle, period)

@@ -12,7 +12,7 @@ from solfer.numerics.twist_transport import BaseKinematics
 from solfer.robot import Robot
 
 
-class Push(NamedTuple):
+class VelocityChange(NamedTuple):
     """What an accelerometer measures.
 
     Attributes:
@@ -34,7 +34,7 @@ class MeasuredBase:
     Attributes:
         averages: Whether `angular` is the mean since the measurement before, and not that of one moment.
         fresh: Whether the IMU has a new sample.
-        push: What its accelerometer measures; to be set before `start`.
+        velocity_change: What its accelerometer measures; to be set before `start`.
         rotation: Rotation from the base to the State's world, shape (3, 3).
         heading: Angle about the vertical from the State's world to the base's x axis [rad].
         turned: Rotation vector of the base since the sample before, in the heading frame, shape (3,) [rad]; zero
@@ -49,7 +49,7 @@ class MeasuredBase:
         self._state = robot.state
         self._rates = np.zeros(6)
         self.fresh = True
-        self.push = Push(np.full(3, math.nan), np.zeros(3))
+        self.velocity_change = VelocityChange(np.full(3, math.nan), np.zeros(3))
         self.rotation = self._known = np.eye(3)
         self.turned, self.angular = np.zeros((2, 3))
         self.heading = 0.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry.sensing.imu_samples import CAPACITY, ImuSamples
-from solfer.components.odometry.sensing.measured_base import Push
+from solfer.components.odometry.sensing.measured_base import VelocityChange
 from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
 from solfer.components.odometry.sensing.samples_kernel import LONGEST_LAG
 from solfer.components.odometry.sensing.stamps import StampCheck
@@ -125,7 +125,6 @@ class Streams:
     Attributes:
         elapsed: Time from the measurement before to this one [s].
         measured: Whether the IMU has measured the base in the meantime.
-        push: What the accelerometer measures.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
         silence: Of joints and IMU together.
         stamp_checks: Checks of the stamps of joints and IMU.
@@ -141,7 +140,6 @@ class Streams:
         imu_check = StampCheck(self._measurements.stamps, offset)
         chart = robot.kinematics.base or BaseChart()
         self._samples = ImuSamples(offset, imu_check, np.ascontiguousarray(chart.rotation))
-        self.push = Push(self._samples.pushed, np.zeros(3))
         self.stamp_checks = self._measurements.stamps, imu_check
         self._written = np.zeros((2, 3))
         self._time = math.nan
@@ -154,6 +152,12 @@ class Streams:
         """Whether there are histories of both."""
         return self._histories is not None
 
+    @property
+    def velocity_change(self) -> VelocityChange:
+        """What the accelerometer measures; known from `start` on."""
+        place = np.zeros(3) if self._histories is None else self._histories[1].history.place
+        return VelocityChange(self._samples.pushed, place)
+
     def start(self) -> None:
         """Begin with what the State has; pipes and their histories exist by now."""
         joints = SensorHistory.find(self._robot, range(6, self._robot.size))
@@ -164,8 +168,6 @@ class Streams:
         self.silence.start()
         self._measurements.start()
         self._samples.start()
-        if imu is not None:
-            self.push = Push(self._samples.pushed, imu.history.place)
         if self._histories is not None:
             self._receive(*self._histories)
             waiting = self._measurements.waiting
