@@ -15,15 +15,17 @@ RELIABILITY = 0.03
 class CommonSlip:
     """Finds out whether all wheels slip together, such as against a step, and how fast the base is meanwhile.
 
-    Over some 0.4 s the wheels and the accelerometer gain the same velocity, within 12 mm/s and what the tilt errs by;
-    a constant difference is learned. Where that is a thousand times less likely than slip, wheels slip: the base goes
-    on with the velocity that it had before and what the accelerometer has measured since. On average it does not go
-    faster than the wheels, nor elsewhere than they go, within 0.05 m/s; where it hardly moves it is taken to rest but
-    for swaying. Slip ends where both velocities are the same again, or the wheels rest. Where no slip explains what the
-    accelerometer measures, it is wrong, or wheels slide: they count, and are not compared for 2 s.
+    Over some 0.4 s the wheels and the accelerometer gain the same velocity, within 12 mm/s, what the tilt errs by, and
+    what the plane through the contacts has turned by lately; a constant difference is learned. Where that is a thousand
+    times less likely than slip, wheels slip: the base goes on with the velocity that it had before and what the
+    accelerometer has measured since. On average it does not go faster than the wheels, nor elsewhere than they go,
+    within 0.05 m/s; where it hardly moves it is taken to rest but for swaying. Slip ends where both velocities are the
+    same again, or the wheels rest. Where no slip explains what the accelerometer measures, it is wrong, or wheels slide:
+    they count, and are not compared for 2 s.
 
     Args:
         motion: The wheels.
+        slope: Slope of the plane through their contacts, shape (2,); live.
 
     Attributes:
         speed: Velocity of the base by the wheels in the heading frame, shape (2,) [m/s]; live.
@@ -31,7 +33,7 @@ class CommonSlip:
         contradicted: Whether the accelerometer measures what no slip explains.
     """
 
-    def __init__(self, motion: WheelMotion):
+    def __init__(self, motion: WheelMotion, slope: np.ndarray):
         self._motion = motion
         self.speed, self.slip, self._before, self._gained, self._bias, self._slipped = np.zeros((6, 2))
         self._probability, self._lasts, self._excess = np.ones((3, 1))
@@ -45,6 +47,8 @@ class CommonSlip:
             slip=self.slip,
             slipped=self._slipped,
             mean=np.zeros(4),
+            slope=slope,
+            usual=np.zeros(2),
             probability=self._probability,
             excess=self._excess,
             lasts=self._lasts,

@@ -18,6 +18,8 @@ SLIP = BlockLayout(
     slip=(float, 2),
     slipped=(float, 2),
     mean=(float, 4),  # of the wheels' velocity and the base's while wheels slip [m/s]
+    slope=(float, 2),  # of the plane through the contacts
+    usual=(float, 2),  # that of the last second
     probability=(float, 1),  # that wheels roll
     excess=(float, 1),  # of what no slip explains, all together [m/s]
     # for how long they have slipped [s]; below 0 nothing is compared, NaN: there is nothing to compare with yet
@@ -121,7 +123,7 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     v = speed[1] + wz * x - wx * z
     cosine = math.cos(wz * time)
     sine = math.sin(wz * time)
-    for vector in (before, gained, slip, slipped, mean[:2], mean[2:]):
+    for vector in (before, gained, slip, slipped, mean[:2], mean[2:], block.usual):
         turn(vector, cosine, sine)
     cosine = math.cos(heading)
     sine = math.sin(heading)
@@ -135,7 +137,14 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
         forget(block, 0.0)
         return ROLLS
     rests = math.hypot(u, v) < 0.02  # [m/s]: wheels that rest do not spin
+    turned = 0.0  # the plane, or an IMU that drifts
+    for axis in range(2):
+        if not block.lasts[0] > 0.0:
+            block.usual[axis] += (1.0 - math.exp(-time)) * (block.slope[axis] - block.usual[axis])
+        turned += (block.slope[axis] - block.usual[axis]) ** 2
     if block.lasts[0] > 0.0:
+        if turned > 0.05 * 0.05:  # [rad]
+            return doubt(block)
         x = u - slip[0] - gain[0]
         y = v - slip[1] - gain[1]
         keep = math.exp(-time / (0.1 if rests else 0.25))  # a robot that pushes sways
@@ -168,7 +177,7 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     keep = math.exp(-time / (0.1 if rests else comparison_time))
     for axis in range(2):
         gained[axis] = keep * gained[axis] + gain[axis]
-    variance = noise * noise + tilt[2] * (gravity * comparison_time) ** 2
+    variance = noise * noise + (tilt[2] + turned) * (gravity * comparison_time) ** 2
     square = gained[0] * gained[0] + gained[1] * gained[1]
     if square < 4.0 * variance:
         slipped[:] = 0.0
@@ -186,7 +195,8 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     slip[0] = u - x
     slip[1] = v - y
     unexplained = math.hypot(gained[0] - slip[0], gained[1] - slip[1])
-    if unexplained > 0.05 or rests:  # [m/s]
+    along = (gained[0] * u + gained[1] * v) / (math.hypot(u, v) * math.sqrt(square))
+    if unexplained > 0.05 or along < 0.8 or rests:  # [m/s]
         return doubt(block)
     gained[:] = 0.0
     block.excess[0] = 0.0

@@ -107,8 +107,8 @@ class FilteredOdometry:
         )
         self.consensus = WheelConsensus(count, tags.slip_time)
         self._motion = WheelMotion(wheels)
-        self.slip = CommonSlip(self._motion)
         self.ground = GroundPlane(self._motion, self.kalman, math.tan(math.radians(tags.level)))
+        self.slip = CommonSlip(self._motion, self.ground.slope)
         self._imu = ImuProgress(wheels.joints)
         self.filter: LowPass | None = None
         self.smoothing: LowPass | None = None
