@@ -20,8 +20,8 @@ class CommonSlip:
     times less likely than slip, wheels slip: the base goes on with the velocity that it had before and what the
     accelerometer has measured since. On average it does not go faster than the wheels, nor elsewhere than they go,
     within 0.05 m/s; where it hardly moves it is taken to rest but for swaying. Slip ends where both velocities are the
-    same again, or the wheels rest. Where no slip explains what the accelerometer measures, it is wrong, or wheels slide:
-    they count, and are not compared for 2 s.
+    same again, or the wheels rest. Where no slip explains what the accelerometer measures, it is wrong, or wheels
+    slide: they count, and are not compared for 2 s.
 
     Args:
         motion: The wheels.
