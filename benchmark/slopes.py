@@ -2,16 +2,15 @@
 """How CENTAURO drives on slopes in all directions, and on uneven ground: a table of short drives by `wheeled_motion`.
 
 Run with `./run exec python benchmark/slopes.py [CASE...] [--slopes DEGREES...] [--level] [--estimated] [--seed N]
-[--engine NAME] [--transport FILE] [--jobs N]`. A case is one of CASES; default: all. In each one the robot begins on
-level ground, but on `uneven`, where it begins on waves of 1 to 3 cm that the seeds 1 to 3 draw. Columns are
-whether the drive was done, or what it rests at; the largest error of a vertex and of the height above the ground [mm];
-the smallest margin of the centre of mass in the support polygon [m]; the largest tilt of the pelvis from its tilt at
-the start, and that at the end [deg]. The exit code is 1 if a drive was not done. `--level` asks for a level pelvis
-(`tunning: level`); `--seed` draws a wrong robot, and with `--estimated` the base is that of the odometry, as of
-`benchmark/driving.py`.
+[--engine NAME] [--transport FILE] [--jobs N] [--json]`. A case is one of CASES; default: all. In each one the robot
+begins on level ground, but on `uneven`, where it begins on waves of 1 to 3 cm that the seeds 1 to 3 draw. In the table
+are the largest error of a vertex and of the height above the ground [mm]; the smallest margin of the centre of mass in
+the support polygon [m]; the largest tilt of the pelvis from its tilt at the start, and that at the end [deg]; the
+duration as a ratio to that of the references; and what it rests at if it was not done: then the exit code is 1.
+`--level` asks for a level pelvis (`tunning: level`); `--seed` draws a wrong robot, and with `--estimated` the base is
+that of the odometry, as of `benchmark/driving.py`.
 """
 
-import argparse
 import logging
 import math
 import sys
@@ -24,7 +23,7 @@ from driving_cases.courses import Part
 from driving_cases.drive import drive
 from driving_cases.driven import driven
 from driving_cases.errors import wrong_robot
-from form import add_engine
+from form import Figures, add_engine, parser_of
 
 from solfer.supervision import supervise
 
@@ -84,20 +83,9 @@ def run(case: str, slope: float, options: dict[str, Any]) -> dict[str, Any]:
         return drive(case, CASES[case][1], seed, world=str(world), **options)
 
 
-def as_row(case: str, slope: float, line: dict[str, Any]) -> str:
-    """Return figures as a row of the table."""
-    numbers = (
-        f"{1e3 * line['vertex_max']:8.1f} {1e3 * line['height_max']:8.1f} {line['margin']:8.3f} "
-        f"{math.degrees(line['tilt_max']):6.1f} {math.degrees(line['tilt_end']):6.1f} {line['duration']:6.2f} "
-        f"{line['joint_error']:6.3f}"
-    )
-    end = "done" if line["done"] else f"held: {line['why']}; {line['holds']}"
-    return f"{case:14s} {slope:4.0f} {numbers}  {end}"
-
-
 def main() -> int:
     """Run what the command line asks for; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser = parser_of(__doc__)
     parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
     parser.add_argument("--slopes", type=float, nargs="+", default=[5.0, 10.0, 15.0], metavar="DEGREES")
     parser.add_argument("--level", action="store_true", help="ask for a level pelvis")
@@ -119,12 +107,20 @@ def main() -> int:
         for case in given.cases or CASES
         for slope in ((1.0, 2.0, 3.0) if case == "uneven" else given.slopes)
     ]
-    print("case            deg   vertex   height   margin   tilt    end   time  joint")
-    is_done = True
+    figures, is_done = Figures(given.json), True
     with ProcessPoolExecutor(given.jobs) as pool:
         for (case, slope, _), line in zip(drives, pool.map(run, *zip(*drives, strict=True)), strict=True):
             is_done &= line["done"]
-            print(as_row(case, slope, line), flush=True)
+            figures.row(
+                f"{case} {slope:g}",
+                vertex_mm=1e3 * line["vertex_max"],
+                height_mm=1e3 * line["height_max"],
+                margin=line["margin"],
+                tilt=math.degrees(line["tilt_max"]),
+                tilt_end=math.degrees(line["tilt_end"]),
+                duration=line["duration"],
+                held="" if line["done"] else line["why"] or line["holds"],
+            )
     return 0 if is_done else 1
 
 
