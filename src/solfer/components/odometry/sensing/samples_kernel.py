@@ -100,7 +100,7 @@ def _integrate(stamps, rows, first, count, force, origin):
     for later in range(max(first, 1), count):
         turned_at(stamps, rows, later - 1, later, 1.0, rows[later, 9:15])
         if rows[later, 12] != rows[later, 12] and rows[later, 6] == rows[later, 6]:
-            rows[later, 12:15] = 0.0  # it begins anew
+            rows[later, 12:15] = 0.0  # integrate again from here: the accelerometer is back
 
 
 _V = "float64[::1]"
