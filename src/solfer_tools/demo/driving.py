@@ -52,7 +52,7 @@ class ErrorWatch:
             if SAFE_STOP in reports[name].summary:
                 raise RealTimeLost(
                     f"{name}: {reports[name].summary}",
-                    expected="a machine that is less busy, `--rate 200`, or `--middleware ROS --lockstep`",
+                    expected="a machine that is less busy, or `--middleware ROS --lockstep`",
                 )
             raise MiddlewareError(
                 f"{name}: {reports[name].summary}",
