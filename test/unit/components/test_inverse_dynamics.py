@@ -332,6 +332,23 @@ def test_torques_that_do_not_come_are_named_and_held(caplog):
     assert not component.is_holding
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_any_motor_that_is_dead_is_named(sign):
+    """Also the weakest one, which cannot do what its friction might be on a robot of that weight."""
+    component = started()
+    robot = component.model
+    watch = component._watch
+    for dof in component.efforts:
+        watch.start()
+        robot.command.torque[:] = 0.1
+        robot.command.torque[dof] = sign * 0.5 * robot.kinematics.effort_limit[dof]
+        robot.state.torque[:] = robot.command.torque
+        robot.state.torque[dof] = 0.0
+        for _ in range(900):
+            watch.update(1.0 / RATE)
+        assert f"joint '{robot.dofs[dof]}'" in watch.fault
+
+
 @pytest.mark.parametrize(("part", "is_lost"), [(0.0, False), (0.5, False), (1.0, False), (3.0, True)])
 def test_dampers_of_the_lower_level_are_no_lost_torque(part, is_lost):
     """They turn joints that move otherwise than commanded: whatever part of that arrives is right, and no more."""

@@ -20,7 +20,7 @@ WATCH = BlockLayout(
     measured=(float, "dofs"),
     sent=(float, "dofs"),
     difference=(float, "dofs"),
-    limit=float,
+    limits=(float, "dofs"),
     # contacts: computed and measured forces, which of all contacts they are, and how they move
     count=int,
     force_count=int,
@@ -63,8 +63,10 @@ class DynamicsWatch:
         self._ground = ground
         self._efforts = efforts.astype(np.int64)
         count = len(ground.normals)
-        # [Nm] friction of wrists is more than they carry: 3 cm times the weight
-        self._limit = 0.03 * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
+        # [Nm] friction of wrists is more than they carry: 3 cm times the weight, or a part of what the motor can do
+        kinematics = robot.kinematics
+        weight = float(kinematics.mass * np.linalg.norm(robot.gravity))
+        self._limits = np.minimum(0.03 * weight, 0.4 * kinematics.effort_limit)
         self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._springs, self._part = np.zeros((2, robot.size))
         self._sent, self._difference = np.zeros((2, robot.size))
@@ -93,7 +95,7 @@ class DynamicsWatch:
             measured=self._robot.state.torque,
             sent=self._sent,
             difference=self._difference,
-            limit=self._limit,
+            limits=self._limits,
             count=len(ground.normals),
             force_count=len(force),
             normals=ground.normals,
@@ -173,7 +175,7 @@ def _lost(block, coefficient, is_calm):
         away = block.measured[dof] - block.torque[dof]
         away -= min(max(away, lower), upper)
         block.difference[dof] += coefficient * (away - block.difference[dof])
-        if abs(block.difference[dof]) > max(0.5 * abs(block.sent[dof]), block.limit) and found < 0:
+        if abs(block.difference[dof]) > max(0.5 * abs(block.sent[dof]), block.limits[dof]) and found < 0:
             found = dof
     return found if any_measured and is_calm else -1
 
