@@ -31,7 +31,8 @@ class ModelCorrection:
         sum (p_i - c_m) x f_i + t_i = (R e) x F + dL/dt,   F = sum f_i
 
     With dL/dt as noise, the two horizontal rows of this measure the constant e [m] linearly. It is the zero moment
-    point with the acceleration that F itself measures, F_xy / m. e_z counts only where the base is tilted. F_z / (m g) - 1
+    point with the acceleration that F itself measures, F_xy / m. What of e is vertical cannot be seen: e_z is found only
+    where the base has been tilted in different ways. F_z / (m g) - 1
     measures the error of the mass as a share of it, with the vertical acceleration as noise. Source: S. Kajita et al.,
     "Introduction to Humanoid Robotics", 2014, section 3.2.
 

@@ -147,7 +147,7 @@ def contradicts(block, excess):
         innovation, variance = innovate(block, axis)
         if innovation**2 > 9.0 * (variance + 0.003**2):
             return True
-    return excess**2 > 9.0 * (block.share_variance[0] + 0.02**2)
+    return (excess - block.offset[3]) ** 2 > 9.0 * (block.share_variance[0] + 0.02**2)
 
 
 @part
