@@ -25,24 +25,25 @@ CONSTANT = 0.001
 class ModelCorrection:
     """Estimates how far the model's centre of mass and its mass are off, and lets the model follow, slowly.
 
-    The forces f_i of the ground at p_i, with moments t_i, turn the robot about its true centre of mass c by the change of
-    its angular momentum L. About the model's centre c_m, with c = c_m + R e and the orientation R of the base,
+    The forces f_i of the ground at p_i, with moments t_i, change the angular momentum L about the true centre of mass
+    c. About the model's centre c_m, with c = c_m + R e and the orientation R of the base,
 
         sum (p_i - c_m) x f_i + t_i = (R e) x F + dL/dt,   F = sum f_i
 
     With dL/dt as noise, the two horizontal rows of this measure the constant e [m] linearly. It is the zero moment
-    point with the acceleration that F itself measures, F_xy / m. What of e is vertical cannot be seen: e_z is found only
-    where the base has been tilted in different ways. F_z / (m g) - 1
-    measures the error of the mass as a share of it, with the vertical acceleration as noise. Source: S. Kajita et al.,
-    "Introduction to Humanoid Robotics", 2014, section 3.2.
+    point with the acceleration that F itself measures, F_xy / m. What of e is vertical cannot be seen: e_z is found
+    only where the base has been tilted in different ways. F_z / (m g) - 1 measures the error of the mass as a share of
+    it, with the vertical acceleration as noise. Source: S. Kajita et al., "Introduction to Humanoid Robotics", 2014,
+    section 3.2.
 
     The model follows in one place, its arrays of masses, which the dynamics and all centres of mass share: masses and
     inertias of all bodies get one factor, and the centre of mass of the base's body is moved by e m / m_base.
 
     Forces have to be measured at all contacts that carry the robot. Sensors there see all of the error. Forces that are
-    estimated from torques of the legs contain the legs' weights as the model has them: e and the mass are then those
-    without the error of the legs. Forces that are estimated with the equations of the base from the same model
-    contain its whole mass, and show none of its error.
+    estimated from torques of the legs contain the weights of the legs as the model has them: what of e and of the mass
+    lies in the legs is not seen, and their weights at wrong places bias the rest. `deviation` does not know of that.
+    Forces that are estimated with the equations of the base contain the whole mass of the model, and show none of its
+    error.
 
     Args:
         robot: The Robot; others that share what it measures see the correction.
@@ -146,7 +147,7 @@ class ModelCorrection:
         self._found = correct(self._block.address, step)
 
     def report(self, component: str) -> Status:
-        """Return the estimates for `/diagnostics`; a warning where forces cannot be used or an estimate is at a bound."""
+        """Return the estimates for `/diagnostics`: a warning where forces cannot be used, or one is at its bound."""
         offset = self.offset
         deviation = self.deviation
         is_bounded = bool((np.abs(offset[:3]) >= LARGEST).any() or abs(offset[3]) >= LARGEST_SHARE)

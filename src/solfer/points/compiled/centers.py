@@ -21,8 +21,8 @@ from solfer.points.compiled.rigid import placed
 def center_of_mass(row, program, with_jacobian):
     """Compute the centre of mass; a joint moves it by its subtree's part of the mass, at the subtree's centre of mass.
 
-    Parameters: parents of the joints; masses, levers (3), inertias (9), memory for the moments of subtrees (3 of 9), and
-    the masses of subtrees.
+    Parameters: parents of the joints; masses, levers (3), inertias (9), memory for the moments of subtrees (3 of 9),
+    and the masses of subtrees.
     """
     joints = joints_of(program)
     placements = placements_of(program)
