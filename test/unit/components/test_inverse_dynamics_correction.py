@@ -80,6 +80,41 @@ def other(model, aside, share):
     return made
 
 
+def test_a_second_component_begins_with_the_file():
+    """On a Robot that it shares with one that has corrected the model."""
+    carried = Carried((0.02, 0.0, 0.0), 0.1)
+    inertial = carried.robot.kinematics.tree.inertial
+    # beside the work space of kernels
+    bodies = len(inertial) // 23
+    before = inertial[: 13 * bodies].copy()
+    carried.run(8.0)
+    assert not np.allclose(before, inertial[: 13 * bodies])
+    second = InverseDynamics(carried.robot.companion(), carried.component.tags)
+    second.set_rate(1.0 / STEP)
+    second.correction.start()
+    assert np.array_equal(before, inertial[: 13 * bodies])
+
+
+def test_an_orientation_that_is_wrong_does_not_count():
+    """The base seems to be tilted by 0.02 rad: places, centre and forces of sensors turn with it."""
+    carried = Carried((0.015, -0.01, 0.0))
+    tilt = pin.exp3(np.array((0.02, 0.0, 0.0)))
+    carried.robot.contacts.positions[:] = carried.robot.contacts.positions @ tilt.T
+    placements = carried.robot.kinematics.tree.placements.reshape(-1, 4, 3)
+    placements[:] = placements @ tilt.T
+    correction = carried.correction
+    places = carried.robot.contacts.positions[:WHEELS]
+    center = tilt @ carried.center
+    rows = np.vstack((np.tile(np.eye(3), WHEELS), np.hstack([pin.skew(p - center) for p in places])))
+    up = tilt @ (0.0, 0.0, 9.81 * pin.computeTotalMass(carried.true))
+    forces = np.linalg.lstsq(rows, np.append(up, np.zeros(3)))[0].reshape(WHEELS, 3)
+    for _ in range(1600):
+        carried.robot.contacts.forces[:WHEELS] = forces + carried.random.normal(0.0, 0.5, (WHEELS, 3))
+        correction.update(STEP)
+    assert correction.reason == "estimates"
+    assert correction.offset[:2] == pytest.approx((0.015, -0.01), abs=5e-4)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_drawn_error_is_found_and_the_model_follows(seed):
     """With any heading; the vertical error of a level robot cannot be found, and stays zero."""

@@ -34,7 +34,7 @@ class ModelCorrection:
     point with the acceleration that F itself measures, F_xy / m. What of e is vertical cannot be seen: e_z is found
     only where the base has been tilted in different ways. F_z / (m g) - 1 measures the error of the mass as a share of
     it, with the vertical acceleration as noise. Source: S. Kajita et al., "Introduction to Humanoid Robotics", 2014,
-    section 3.2.
+    section 3.2. A wrong tilt of the base turns both sides alike, and does not count.
 
     The model follows in one place, its arrays of masses, which the dynamics and all centres of mass share: masses and
     inertias of all bodies get one factor, and the centre of mass of the base's body is moved by e m / m_base.
@@ -88,7 +88,8 @@ class ModelCorrection:
         self._twin = twin.kinematics.tree.inertial
         self._ground = ground
         self._base = base
-        self._original = tree.inertial.copy()
+        # the twin has the model of the file, also where another component has corrected the Robot's
+        self._original = self._twin.copy()
         self.offset, self.applied = np.zeros((2, 4))
         self.covariance = np.zeros((3, 3))
         self._share_variance = np.zeros(1)
