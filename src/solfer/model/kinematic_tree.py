@@ -20,10 +20,13 @@ class KinematicTree:
             shape (n + 1, 12).
         velocity: Velocities of the DoFs [rad/s, m/s], shape (n,).
         parents: The joint that carries each joint, shape (n + 1,).
+        inertial: What the next four are views of, with nine numbers a joint of work space for kernels before the last
+            of them, shape (23 (n + 1),). It is live: who writes other masses to it changes all that is computed later.
         masses: Mass of what is fixed to each joint [kg], zero for the world, shape (n + 1,).
         levers: Centre of that mass in the joint's frame [m], shape (n + 1, 3).
         inertias: Rotational inertia of that mass about its centre, axes of the joint's frame, shape (n + 1, 3, 3)
             [kg m^2].
+        subtrees: Mass of each joint and all that it carries [kg], shape (n + 1,).
         armature: Inertia of the rotors that count in the inertia matrix, as seen at the joints, shape (n,) [kg m^2].
         followers: DoFs that follow others.
     """
@@ -32,9 +35,11 @@ class KinematicTree:
     placements: np.ndarray
     velocity: np.ndarray
     parents: np.ndarray
+    inertial: np.ndarray
     masses: np.ndarray
     levers: np.ndarray
     inertias: np.ndarray
+    subtrees: np.ndarray
     armature: np.ndarray
     followers: Followers
 

@@ -338,14 +338,25 @@ def _tree(model: pin.Model, data: pin.Data, followers: Followers) -> KinematicTr
             expected="the version of `pin` that requirements.txt names",
         )
     inertias = list(model.inertias)
+    inertial = np.zeros(23 * bodies)
+    masses, levers, rotational, _, subtrees = np.split(inertial, np.array((1, 4, 13, 22)) * bodies)
+    masses[1:] = [inertia.mass for inertia in inertias[1:]]
+    levers[:] = np.concatenate([inertia.lever for inertia in inertias])
+    rotational[:] = np.concatenate([inertia.inertia.ravel() for inertia in inertias])
+    parents = np.array(list(model.parents), dtype=np.int64)
+    subtrees[:] = masses
+    for joint in range(bodies - 1, 0, -1):
+        subtrees[parents[joint]] += subtrees[joint]
     return KinematicTree(
         jacobian=data.J.T,
         placements=placements,
         velocity=np.zeros(model.nv),
-        parents=np.array(list(model.parents), dtype=np.int64),
-        masses=np.array([0.0] + [inertia.mass for inertia in inertias[1:]]),
-        levers=np.array([inertia.lever for inertia in inertias]),
-        inertias=np.array([inertia.inertia for inertia in inertias]),
+        parents=parents,
+        inertial=inertial,
+        masses=masses,
+        levers=levers.reshape(bodies, 3),
+        inertias=rotational.reshape(bodies, 3, 3),
+        subtrees=subtrees,
         armature=np.zeros(model.nv),
         followers=followers,
     )

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import PointError
-from solfer.model.kinematic_tree import KinematicTree
 from solfer.model.view import RobotView
 from solfer.numerics.pointers import address
 from solfer.points.compiled import centers, momentum, posture
@@ -31,23 +30,13 @@ class CenterOfMass(CompiledPoint):
 
     def __init__(self, robot: RobotView):
         super().__init__(3, robot)
-        tree = robot.kinematics.tree
-        moments = np.zeros(3 * len(tree.masses))
-        self._numbers = np.concatenate((tree.masses, tree.levers.ravel(), subtree_masses(tree), moments))
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         parents = self.robot.kinematics.tree.parents
-        row = Instruction(centers.center_of_mass, self, numbers=self._numbers, table=parents)
+        numbers = self.robot.kinematics.tree.inertial
+        row = Instruction(centers.center_of_mass, self, numbers=numbers, table=parents)
         return folded(self, np.arange(self.cols), row)
-
-
-def subtree_masses(tree: KinematicTree) -> np.ndarray:
-    """Compute the mass of each joint and all that it carries [kg], shape (n + 1,)."""
-    masses = tree.masses.copy()
-    for joint in range(len(masses) - 1, 0, -1):
-        masses[tree.parents[joint]] += masses[joint]
-    return masses
 
 
 class AngularMomentum(CompiledPoint):
@@ -64,14 +53,12 @@ class AngularMomentum(CompiledPoint):
 
     def __init__(self, robot: RobotView):
         super().__init__(3, robot)
-        tree = robot.kinematics.tree
-        memory = np.zeros(9 * len(tree.masses))
-        self._numbers = np.concatenate((tree.masses, tree.levers.ravel(), tree.inertias.ravel(), memory))
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         parents = self.robot.kinematics.tree.parents
-        row = Instruction(momentum.angular_momentum, self, numbers=self._numbers, table=parents)
+        numbers = self.robot.kinematics.tree.inertial
+        row = Instruction(momentum.angular_momentum, self, numbers=numbers, table=parents)
         return folded(self, np.arange(self.cols), row)
 
 

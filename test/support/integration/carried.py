@@ -42,6 +42,20 @@ def with_other_masses(urdf: str, share: float, seed: int) -> str:
     return re.sub(r"<inertial>.*?</inertial>", scaled, urdf, flags=re.DOTALL)
 
 
+def with_other_trunk(urdf: str, distance: float, seed: int, links: tuple[str, ...] = ("pelvis", "torso_2")) -> str:
+    """Return a description in which the centres of mass of links are aside by a distance [m] in a drawn direction."""
+    way = np.random.default_rng(1000 + seed).normal(size=3)
+    way *= distance / np.linalg.norm(way)
+
+    def moved(found: re.Match[str]) -> str:
+        return f'{found[1]}{" ".join(map(str, np.array(found[2].split(), dtype=float) + way))}"'
+
+    for link in links:
+        urdf, count = re.subn(rf'(<link name="{link}">\s*<inertial>\s*<origin xyz=")([^"]+)"', moved, urdf)
+        assert count == 1, link
+    return urdf
+
+
 def free_arms(folder):
     """Write the configuration with arms that have no stiffness."""
     for name in ("support", "robots"):

@@ -12,6 +12,7 @@ from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.following.reference_interface import record_of
 from solfer.components.following.reference_set import ReferenceSet, take_numbers
 from solfer.components.gains import GAINS, configured_gains, live_gains
+from solfer.components.inverse_dynamics.correction import ModelCorrection
 from solfer.components.inverse_dynamics.demand import DemandedAccelerations, FedReference
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
@@ -59,6 +60,7 @@ class InverseDynamics(Component):
         problem: The QP.
         ground: The contacts.
         references: References of its tasks.
+        correction: What corrects the model; None without the tag.
 
     Raises:
         SolferError: The tags name something that the robot does not have, or do not fit it.
@@ -87,7 +89,9 @@ class InverseDynamics(Component):
             obstacles=self._obstacles,
         )
         self.inputs.update(self.references.inputs)
-        self._demand = self._make_demand(robot, stack)
+        twin = robot.twin()
+        self._demand = self._make_demand(robot, stack, twin)
+        self.correction = ModelCorrection(robot, twin, self.ground) if tags.correct_model else None
         robot.dynamics.subscribe((BIAS, INERTIA))
         passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
         speeds = self._driven_by_speed()
@@ -133,6 +137,8 @@ class InverseDynamics(Component):
         torque_limits = self._torque_limits(self.tags)
         self.problem = WholeBodyProblem(robot, self.ground, bounds, torque_limits=torque_limits, demand=self._demand)
         self._watch.connect(self.problem.force, self._demand.slip)
+        if self.correction is not None:
+            self.correction.connect()
         self.references.connect(self.period)
 
     def actions(self) -> tuple[Action, ...]:
@@ -175,6 +181,8 @@ class InverseDynamics(Component):
         if not self._standing:
             self._standing = [(command[gain], command[gain].copy()) for gain in GAINS if gain in command]
         self._motion.start(self.start_position)
+        if self.correction is not None:
+            self.correction.start()
         self._demand.stack.update()
         self._configured.start()
         self.references.start()
@@ -191,6 +199,8 @@ class InverseDynamics(Component):
         """Compute one cycle."""
         step = self.time_step
         self._cycles += 1
+        if self.correction is not None:
+            self.correction.update(step)
         self.references.update(step, self.pace)
         demand = self._demand
         state = self.model.state
@@ -280,6 +290,8 @@ class InverseDynamics(Component):
         logger.add("torque", self._torques.value, dofs, "Nm")
         logger.add("forces", problem.force, forces, "N")
         logger.add("active", problem.active, problem.names)
+        if self.correction is not None:
+            logger.add("model_offset", self.correction.offset, ("x", "y", "z", "mass"), ("m", "m", "m", ""))
 
     def _make_stack(self, robot: Robot) -> tuple[ConfiguredTasks, Stack]:
         """Make the tasks on a Robot; those of the second level weigh less."""
@@ -289,10 +301,9 @@ class InverseDynamics(Component):
                 task.weight *= SECOND_LEVEL_WEIGHT
         return configured, Stack(configured.levels)
 
-    def _make_demand(self, robot: Robot, stack: Stack) -> DemandedAccelerations:
+    def _make_demand(self, robot: Robot, stack: Stack, twin: Robot) -> DemandedAccelerations:
         """Make what the tasks demand, with the gains of all rows; the drift is that of a twin of the robot."""
         tags = self.tags
-        twin = robot.twin()
         twin.state.position[:] = robot.state.position
         twin.update()
         shadow, shadow_stack = self._make_stack(twin)
@@ -416,13 +427,10 @@ class InverseDynamics(Component):
         ]
         entries.append(Entry("active constraints", self._active()))
         summary = f"it holds: {self._holding.reason}" if self.is_holding else "tasks are followed"
-        return Statuses(
-            status=(
-                Status(
-                    int(self.is_holding), f"{self.name}: tasks", summary, hardware_id=self.name, values=tuple(entries)
-                ),
-            )
-        )
+        level = int(self.is_holding)
+        tasks = Status(level, f"{self.name}: tasks", summary, hardware_id=self.name, values=tuple(entries))
+        correction = self.correction
+        return Statuses(status=(tasks,) if correction is None else (tasks, correction.report(self.name)))
 
 
 def _as_tag(numbers: np.ndarray) -> float | tuple[float, ...]:

@@ -78,6 +78,10 @@ class InverseDynamicsTags(FollowingTags):
         description="topic of `solfer/Ground`, such as `odometry/ground`: contacts and friction turn with its normals; "
         "left out, those of the robot's file count",
     )
+    correct_model: bool = Field(
+        default=False,
+        description="whether the model's masses and centre of mass are corrected by the measured forces of contacts",
+    )
     sole: Annotated[tuple[HalfSize, ...], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="half length and half width of flat feet, about their contacts [m]"
     )

@@ -21,7 +21,8 @@ from solfer.points.compiled.rigid import placed
 def center_of_mass(row, program, with_jacobian):
     """Compute the centre of mass; a joint moves it by its subtree's part of the mass, at the subtree's centre of mass.
 
-    Parameters: parents of the joints; masses, levers (3), masses and moments (3) of subtrees.
+    Parameters: parents of the joints; masses, levers (3), inertias (9), memory for the moments of subtrees (3 of 9),
+    and the masses of subtrees.
     """
     joints = joints_of(program)
     placements = placements_of(program)
@@ -30,11 +31,11 @@ def center_of_mass(row, program, with_jacobian):
     dofs = program.dofs
     bodies = dofs + 1
     parents = carray(integers(row.table), (bodies,))
-    numbers = numbers_of(row, 8 * bodies)
+    numbers = numbers_of(row, 23 * bodies)
     masses = numbers[:bodies]
     levers = numbers[bodies : 4 * bodies]
-    subtrees = numbers[4 * bodies : 5 * bodies]
-    moments = numbers[5 * bodies :]
+    moments = numbers[13 * bodies : 16 * bodies]
+    subtrees = numbers[22 * bodies :]
     moments[:3] = 0.0
     for body in range(1, bodies):
         x, y, z = placed(placements[body], levers[3 * body], levers[3 * body + 1], levers[3 * body + 2])
