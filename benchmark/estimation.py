@@ -31,6 +31,7 @@ from estimation_cases.log import Log
 from estimation_cases.methods import require_topics
 from estimation_cases.picture import draw
 from estimation_cases.play import METHODS, Played
+from estimation_cases.summaries import mean_normalised, ratios
 from form import add_engine
 
 from solfer.errors import SolferError
@@ -132,15 +133,13 @@ def required(parser: argparse.ArgumentParser, given: argparse.Namespace) -> None
         parser.error(f"{given.logs} is not a folder")
 
 
-def lines_of(tasks: list[Task], jobs: int) -> Iterator[dict[str, Any]]:
-    """Yield the lines of all tasks in their order."""
+def lines_of(tasks: list[Task], jobs: int) -> Iterator[list[dict[str, Any]]]:
+    """Yield the lines of each task in their order."""
     if jobs == 1:
-        for task in tasks:
-            yield from run(task)
+        yield from map(run, tasks)
         return
     with ProcessPoolExecutor(jobs) as pool:
-        for lines in pool.map(run, tasks):
-            yield from lines
+        yield from pool.map(run, tasks)
 
 
 def main() -> int:
@@ -155,6 +154,7 @@ def main() -> int:
     add_engine(parser)
     parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between sensors and methods")
     parser.add_argument("--method", nargs="+", choices=METHODS, default=METHODS, help="default: all")
+    parser.add_argument("--normalised", action="store_true", help="means over all draws of normalised squared errors")
     parser.add_argument("--logs", type=Path, metavar="DIR", help="folder in which logs are kept")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the paths of the last one into a PNG file")
@@ -172,15 +172,20 @@ def main() -> int:
             for name in given.course
             for seed in seeds
         ]
-        for line in lines_of(tasks, given.jobs):
-            failed = line.pop("missed")
-            is_missed = is_missed or bool(failed)
-            if failed:
-                print(f"{line['course']}, seed {line['seed']}: {', '.join(failed)} above the goal", file=sys.stderr)
-            print(
-                json.dumps(line) if given.json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True
-            )
+        for lines in lines_of(tasks, given.jobs):
+            for line in lines:
+                failed = line.pop("missed")
+                is_missed = is_missed or bool(failed)
+                if failed:
+                    print(f"{line['course']}, seed {line['seed']}: {', '.join(failed)} above the goal", file=sys.stderr)
+            for line in mean_normalised(lines) if given.normalised else lines + ratios(lines):
+                show(line, given.json)
     return int(is_missed)
+
+
+def show(line: dict[str, Any], as_json: bool) -> None:
+    """Print a line."""
+    print(json.dumps(line) if as_json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True)
 
 
 if __name__ == "__main__":
