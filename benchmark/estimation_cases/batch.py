@@ -41,6 +41,8 @@ class Intervals(NamedTuple):
         ways: Ways of the base by each wheel, as if it did not turn, shape (K, 4, 2) [m].
         arms: From the base to each contact, shape (K, 4, 2) [m].
         deviations: Of the ways, shape (K, 4) [m]; infinite: the wheel does not count.
+        rolled: How far wheels roll or steer, by which they scrub, shape (K,) [m].
+        missed: Variances of what the gyroscope misses between its samples, shape (K,) [rad^2].
     """
 
     time: np.ndarray
@@ -48,6 +50,8 @@ class Intervals(NamedTuple):
     ways: np.ndarray
     arms: np.ndarray
     deviations: np.ndarray
+    rolled: np.ndarray
+    missed: np.ndarray
 
 
 class Estimate(NamedTuple):
@@ -81,7 +85,7 @@ def estimate(measured: Intervals, errors: Errors) -> Estimate:
     In the interval j of the length T the base turns by y and goes by d, and with the bias b, scrubbing c, and the ratio
     e by which the radius of a wheel at r is too large, are measured
 
-        gyroscope     u_j  = y_j + b_j T + n,                            n ~ N(0, noise^2 T)
+        gyroscope     u_j  = y_j + b_j T + n,                            n ~ N(0, noise^2 T + missed_j)
         wheel i       w_ij = (1 - e_i) (d_j + (y_j + c_j T) z x r_ij) + m,   m ~ N(0, deviation_ij^2)
 
     where b is a random walk, c a Gauss-Markov process in proportion to the speed, and the e_i are constant, each with
@@ -101,9 +105,7 @@ def estimate(measured: Intervals, errors: Errors) -> Estimate:
     states[:, YAW] = measured.yaw
     usable = np.isfinite(measured.deviations)
     states[:, WAY:BIAS] = (usable[..., None] * measured.ways).sum(axis=1) / np.maximum(usable.sum(axis=1), 1)[:, None]
-    speed = np.linalg.norm(states[:, WAY:BIAS], axis=1) / measured.time + np.abs(measured.yaw) / measured.time
-    chains = _chains(measured, errors, speed)
-    robust = np.ones((count, 4))
+    chains, robust = _chains(measured, errors), np.ones((count, 4))
     for _ in range(ITERATIONS):
         jacobian, residuals = _wheels(measured, states, radii)
         weights = np.where(usable, robust / measured.deviations**2, 0.0)
@@ -146,16 +148,16 @@ def _wheels(measured: Intervals, states: np.ndarray, radii: np.ndarray) -> tuple
     return jacobian, measured.ways - grown * way
 
 
-def _chains(measured: Intervals, errors: Errors, speed: np.ndarray) -> sparse.csr_array:
+def _chains(measured: Intervals, errors: Errors) -> sparse.csr_array:
     """Return the rows of gyroscope, bias, scrubbing and radii, each by its deviation."""
     count = len(measured.time)
     first = STATES * np.arange(count)
     root = np.sqrt(measured.time)
-    gyroscope = 1.0 / (errors.noise * root)
+    gyroscope = 1.0 / _gyroscope(measured, errors)
     walk = np.append(1.0 / errors.bias, 1.0 / (errors.walk * root[:-1]))
     keep = np.exp(-measured.time[:-1] / SCRUB_TIME)
     # at rest wheels scrub by a tenth of a millimetre in a minute at most
-    deviation = np.maximum(SCRUB_SHARE * speed, 1e-6)
+    deviation = np.maximum(SCRUB_SHARE * measured.rolled / measured.time, 1e-6)
     scrub = 1.0 / (deviation * np.sqrt(1.0 - np.append(0.0, keep) ** 2))
     rows = np.arange(count)
     entries = (
@@ -173,5 +175,10 @@ def _chains(measured: Intervals, errors: Errors, speed: np.ndarray) -> sparse.cs
 
 def _measured_by_chains(measured: Intervals, errors: Errors) -> np.ndarray:
     """Return what these rows measure: the gyroscope's turns, and zeros."""
-    gyroscope = measured.yaw / (errors.noise * np.sqrt(measured.time))
+    gyroscope = measured.yaw / _gyroscope(measured, errors)
     return np.concatenate((gyroscope, np.zeros(2 * len(gyroscope) + 4)))
+
+
+def _gyroscope(measured: Intervals, errors: Errors) -> np.ndarray:
+    """Return the deviations of the turns that the gyroscope measures, shape (K,) [rad]."""
+    return np.sqrt(errors.noise**2 * measured.time + measured.missed)

@@ -9,10 +9,15 @@ from estimation_cases.batch import Errors, Intervals, estimate
 from estimation_cases.measurements import Sample
 from estimation_cases.methods import BIAS, GYROSCOPE, RADIUS, WALK
 
+from solfer.components.odometry.filter import SHAKE_RATIO
 from solfer.numerics.rotations import rotation_from_quaternion
 
 CYCLES = 10
 """Measurements from a key frame to the next."""
+SHAKING_TIME = 0.3
+"""For how long a base shakes as it does [s], of `odometry`."""
+WHEEL = 0.078
+"""Radius of a wheel [m]."""
 RESTS = 0.006
 """Mean speed of all joints within an interval below which the robot rests [rad/s]: three steps of the encoders."""
 SLIP_SHARE, ENCODERS, RESTING = 0.008, 2e-3, 1e-5
@@ -117,14 +122,19 @@ class Smoother:
         number = np.diff(keys)
         touches = np.logical_and.reduceat(touching[1:], keys[:-1])
         touches[np.count_nonzero(touches, axis=1) < 2] = True
-        rests = np.abs(np.diff(joints[keys], axis=0)).max(axis=1) <= RESTS * time
+        moved = np.abs(np.diff(joints[keys], axis=0)).max(axis=1)
+        rests = moved <= RESTS * time
         rests &= np.roll(rests, 1) & np.roll(rests, 2) & np.roll(rests, -1)
         ways[rests] = 0.0
         speeds = np.linalg.norm(ways, axis=2) / time[:, None]
         deviations = np.where(rests[:, None], RESTING, SLIP_SHARE * speeds + ENCODERS)
         deviations *= (time / np.sqrt(number))[:, None]
         deviations[~touches] = math.inf
-        found = estimate(Intervals(time, yaw, ways, arms / number[:, None, None], deviations), self._errors)
+        legs = np.abs(np.diff(joints[keys][:, self.body.legs], axis=0)).max(axis=1) / time
+        missed = (SHAKE_RATIO * legs) ** 2 * 2.0 * SHAKING_TIME * time
+        arms /= number[:, None, None]
+        measured = Intervals(time, yaw, ways, arms, deviations, rolled=moved * WHEEL, missed=missed)
+        found = estimate(measured, self._errors)
         found = found._replace(ways=found.ways - tilting[:, 0])
         poses = found.poses()
         at = np.cumsum(times)

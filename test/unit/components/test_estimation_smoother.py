@@ -21,8 +21,11 @@ def driven(bias, radii, ratio=0.0, random=None):
     white = ratio * ERRORS.noise * np.sqrt(PERIOD) * random.standard_normal(count)
     arms = np.broadcast_to(ARMS, (count, 4, 2))
     yaw = (rates + bias) * PERIOD + white
-    deviations = np.full((count, 4), deviation)
-    return rates, speeds, batch.Intervals(np.full(count, PERIOD), yaw, ways, arms, deviations)
+    deviations, still = np.full((count, 4), deviation), np.zeros(count)
+    measured = batch.Intervals(
+        np.full(count, PERIOD), yaw, ways, arms, deviations, rolled=speeds * PERIOD, missed=still
+    )
+    return rates, speeds, measured
 
 
 def test_the_smoother_finds_an_analytic_way():

@@ -115,6 +115,8 @@ class FilteredOdometry:
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.heading = 0.0
         self._smoothed = np.zeros(4)
+        self._velocities = np.zeros((count, 3))
+        self._velocity_covariance = np.zeros((3, 3))
 
     @property
     def lifted(self) -> np.ndarray:
@@ -144,6 +146,7 @@ class FilteredOdometry:
         self._imu.start()
         self.ground.start()
         motion.spreads[:] = 0.0
+        self._velocity_covariance[:] = 0.0
         self._weigh()
         motion.trusted[:] = motion.weights
         filter_kernel.turn_rotation(base.rotation, -base.heading, kalman.axes)
@@ -227,7 +230,9 @@ class FilteredOdometry:
             pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, pose, twist)
+        slips = bool(self.slip.lasts)  # then the velocity is that of the filter
+        known = self.kalman.velocity_covariance if slips else self._velocity_covariance
+        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose=pose, twist=twist)
 
     def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
@@ -431,9 +436,11 @@ class FilteredOdometry:
         self.angular[2] -= self.kalman.bias
         if self.filter is not None:
             self.filter.step(self.angular)
+        spread_time = 0.1  # [s] over which wheels are compared
         filter_kernel.velocity_of_base(
-            wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity
-        )
+            wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity,
+            self._velocities, spread_time / (spread_time + self._imu.period), self._velocity_covariance,
+        )  # fmt: skip
         if self.slip.lasts:
             self.velocity[:2] -= self.slip.slip
         if self.smoothing is not None:
