@@ -29,8 +29,8 @@ class Smoother:
 
     Wheels and gyroscope are measured as `odometry` does, with the same deviations: a wheel at r whose joints move by dq
     measures the way -(J dq + p x r) of the base, which tilts by p. The floor is level: the plane through the contacts
-    that touch is horizontal, which shows the IMU's error of the tilt, and the base is above it. Measurements between key
-    frames are added up in the heading frame in the middle, as far as the gyroscope knows it: its bias turns that by
+    that touch is horizontal, which shows the IMU's error of the tilt, and the base is above it. Measurements between
+    key frames are added up in the heading frame in the middle, as far as the gyroscope knows it: its bias turns that by
     0.1 mrad. `batch.estimate` has the unknowns and the equations. It does not fit slopes and transports with faults.
 
     Args:
@@ -124,7 +124,7 @@ class Smoother:
         touches[np.count_nonzero(touches, axis=1) < 2] = True
         moved = np.abs(np.diff(joints[keys], axis=0)).max(axis=1)
         rests = moved <= RESTS * time
-        rests &= np.roll(rests, 1) & np.roll(rests, 2) & np.roll(rests, -1)
+        rests &= np.append(True, rests[:-1])  # the base sways once joints stop
         ways[rests] = 0.0
         speeds = np.linalg.norm(ways, axis=2) / time[:, None]
         deviations = np.where(rests[:, None], RESTING, SLIP_SHARE * speeds + ENCODERS)

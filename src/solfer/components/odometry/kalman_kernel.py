@@ -454,7 +454,6 @@ def _write_covariances(start, heading, arm, white, velocity, pose, twist):
             c, d = (0.0, -arm[2]) if j == 0 else (arm[2], 0.0) if j == 1 else (-arm[1], arm[0])
             twist[i, j] = velocity[i, j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
 
-
     twist[2, 2] += (
         left * left * errors[TILT, TILT]
         - 2.0 * left * ahead * errors[TILT, TILT + 1]
