@@ -1,4 +1,4 @@
-"""A batch smoother, which knows past and future: a bound of what odometry can know."""
+"""A batch smoother, which knows past and future, beside what odometry knows."""
 
 import math
 from pathlib import Path
