@@ -2,16 +2,18 @@
 """How well odometry knows where CENTAURO is, and ground forces what carries it, on courses with sensors that err.
 
 Run with `./run exec python benchmark/estimation.py [--json] [--course NAME...] [--seed N] [--noise K] [--draws D]
-[--world FILE] [--engine NAME] [--transport FILE] [--method NAME...] [--logs DIR] [--jobs N] [--picture FILE]`. A course
-is one of `estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`; the robot
-follows it by where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is written of
-what joints, base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with the errors
-of `config/robots/centauro/robot.yaml`, times K (1 and 3), a cycle late, and radii of the wheels that differ by up to
-0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D times. With
+[--world FILE] [--engine NAME] [--transport FILE] [--method NAME...] [--normalised] [--logs DIR] [--jobs N] [--picture
+FILE]`. A course is one of `estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`;
+the robot follows it by where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is
+written of what joints, base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with
+the errors of `config/robots/centauro/robot.yaml`, times K (1 and 3), a cycle late, and radii of the wheels that differ
+by up to 0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D times. With
 `--transport` a file of faults, such as `config/transport/busy.yaml`, is between them and all methods, and the loops of
 these leave cycles out. Methods are those of `odometry`, of which `geometric` is the paper's, and two from the
-literature: `rolling_squares` and `point_contacts`. With `--json` each line is an object; progress is on stderr. The
-exit code is 1 if `filter` misses a goal at the shipped noise.
+literature: `rolling_squares` and `point_contacts`. `smoother` knows past and future of a log on level ground; beside it
+a line has the ratios of the RMS errors of `filter` to its own. `--normalised` prints the means over all draws of the
+squared errors of `filter` by its covariances instead, which are 1 where these are right. With `--json` each line is an
+object; progress is on stderr. The exit code is 1 if `filter` misses a goal at the shipped noise.
 """
 
 import argparse
@@ -31,6 +33,7 @@ from estimation_cases.log import Log
 from estimation_cases.methods import require_topics
 from estimation_cases.picture import draw
 from estimation_cases.play import METHODS, Played
+from estimation_cases.summaries import mean_normalised, ratios
 from form import add_engine
 
 from solfer.errors import SolferError
@@ -40,6 +43,7 @@ from solfer.simulation.world.world import read_world
 from solfer.supervision import supervise
 
 SHIPPED = ("loop", "drawn", "patch", "lifted", "ridge")
+CAUSAL = tuple(name for name in METHODS if name != "smoother")
 SEEDS, NOISES = (1, 2, 3, 4, 5), (1.0, 3.0)
 NEXT_DRAW = 1000
 """Difference of the seeds of sensors that measure one log."""
@@ -132,15 +136,13 @@ def required(parser: argparse.ArgumentParser, given: argparse.Namespace) -> None
         parser.error(f"{given.logs} is not a folder")
 
 
-def lines_of(tasks: list[Task], jobs: int) -> Iterator[dict[str, Any]]:
-    """Yield the lines of all tasks in their order."""
+def lines_of(tasks: list[Task], jobs: int) -> Iterator[list[dict[str, Any]]]:
+    """Yield the lines of each task in their order."""
     if jobs == 1:
-        for task in tasks:
-            yield from run(task)
+        yield from map(run, tasks)
         return
     with ProcessPoolExecutor(jobs) as pool:
-        for lines in pool.map(run, tasks):
-            yield from lines
+        yield from pool.map(run, tasks)
 
 
 def main() -> int:
@@ -154,7 +156,8 @@ def main() -> int:
     parser.add_argument("--world", type=Path, help="file of the world; default: that of the course")
     add_engine(parser)
     parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between sensors and methods")
-    parser.add_argument("--method", nargs="+", choices=METHODS, default=METHODS, help="default: all")
+    parser.add_argument("--method", nargs="+", choices=METHODS, default=CAUSAL, help="default: all but smoother")
+    parser.add_argument("--normalised", action="store_true", help="means over all draws of normalised squared errors")
     parser.add_argument("--logs", type=Path, metavar="DIR", help="folder in which logs are kept")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the paths of the last one into a PNG file")
@@ -172,15 +175,20 @@ def main() -> int:
             for name in given.course
             for seed in seeds
         ]
-        for line in lines_of(tasks, given.jobs):
-            failed = line.pop("missed")
-            is_missed = is_missed or bool(failed)
-            if failed:
-                print(f"{line['course']}, seed {line['seed']}: {', '.join(failed)} above the goal", file=sys.stderr)
-            print(
-                json.dumps(line) if given.json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True
-            )
+        for lines in lines_of(tasks, given.jobs):
+            for line in lines:
+                failed = line.pop("missed")
+                is_missed = is_missed or bool(failed)
+                if failed:
+                    print(f"{line['course']}, seed {line['seed']}: {', '.join(failed)} above the goal", file=sys.stderr)
+            for line in mean_normalised(lines) if given.normalised else lines + ratios(lines):
+                show(line, given.json)
     return int(is_missed)
+
+
+def show(line: dict[str, Any], as_json: bool) -> None:
+    """Print a line."""
+    print(json.dumps(line) if as_json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True)
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ class WheeledBody:
         to_imu: Rotation from the IMU to the base, shape (3, 3).
         imu: Place of the IMU from the base, its axes [m].
         touching: Which wheels touch, shape (4,).
+        legs: Which joints are those of legs, or others that do not roll, shape (joints,).
     """
 
     def __init__(self, contacts: Path):
@@ -45,7 +46,7 @@ class WheeledBody:
         turn = robot.kinematics.rotation(base).T
         self.to_imu = turn @ robot.kinematics.rotation("imu_link")
         self.imu = turn @ (robot.kinematics.position("imu_link") - robot.kinematics.position(base))
-        self.touching = np.ones(4, dtype=bool)
+        self.touching, self.legs = np.ones(4, dtype=bool), wheels.legs
 
     def place(self, rotation: np.ndarray, joints: JointMessage) -> None:
         """Take what was measured of the joints, with the base in a rotation to the world."""

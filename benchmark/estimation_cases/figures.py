@@ -43,3 +43,16 @@ def drift(truth: np.ndarray, estimate: np.ndarray, way: np.ndarray, length: floa
         cosine, sine = np.cos(heading), np.sin(heading)
         steps.append(np.stack((cosine * step[:, 0] + sine * step[:, 1], cosine * step[:, 1] - sine * step[:, 0])))
     return math.sqrt(np.mean(np.sum((steps[1] - steps[0]) ** 2, axis=0)))
+
+
+def normalised(error: np.ndarray, covariance: np.ndarray) -> float:
+    """Return the squared error by its covariance, for each dimension: on average 1 if the covariance is right.
+
+    Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, "Estimation with Applications to Tracking and Navigation",
+    Wiley 2001, section 5.4.
+
+    Args:
+        error: Error, shape (n,).
+        covariance: Its covariance, shape (n, n).
+    """
+    return float(error @ np.linalg.solve(covariance, error)) / len(error)

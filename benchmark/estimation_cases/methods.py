@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from estimation_cases.figures import normalised
 from estimation_cases.log import PERIOD, ROBOT
 from estimation_cases.measurements import Sample
 
@@ -144,8 +145,8 @@ class Plugins:
         x, y, z = truth.velocity[:3]
         velocity = plugin.component.law.velocity - (cosine * x + sine * y, cosine * y - sine * x, z)
         return (
-            float(tilt @ np.linalg.solve(pose[3:5, 3:5], tilt)) / 2.0,
-            float(velocity @ np.linalg.solve(twist[:3, :3] + 1e-12 * np.eye(3), velocity)) / 3.0,
+            normalised(tilt, pose[3:5, 3:5]),
+            normalised(velocity, twist[:3, :3] + 1e-12 * np.eye(3)),
         )
 
     def covariance(self) -> np.ndarray:

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from estimation_cases.figures import figures, from_start
+from estimation_cases.figures import figures, from_start, normalised
 from estimation_cases.log import Log
 from estimation_cases.measurements import Measurements, Sample
 from estimation_cases.methods import OWN, Plugins
 from estimation_cases.point_contacts import PointContacts
 from estimation_cases.rolling_squares import RollingSquares
+from estimation_cases.smoother import Smoother
 
 from solfer.middleware.memory import FaultsRecord
 
@@ -21,7 +22,15 @@ BEGIN = 10.0
 EVERY = 10
 """Cycles from one look at the covariances to the next."""
 
-BASELINES: dict[str, Any] = {"rolling_squares": RollingSquares, "point_contacts": PointContacts}
+NORMALISED = {
+    "anees": [0, 1, 3],
+    "anees_position": [0, 1],
+    "anees_height": [2],
+    "anees_heading": [3],
+}
+"""Figures of the squared error at the end by its covariance, and which of x, y, z and heading they are of."""
+
+BASELINES: dict[str, Any] = {"rolling_squares": RollingSquares, "point_contacts": PointContacts, "smoother": Smoother}
 METHODS = (*OWN, *BASELINES)
 
 
@@ -44,6 +53,7 @@ class Played:
     def __init__(self, log: Log, seed: int, noise: float, names: tuple[str, ...], faults: FaultsRecord | None = None):
         self._own = tuple(name for name in names if name in OWN)
         self._others: dict[str, Any] = {}
+        self._noise = noise
         self.truth, honesty, force = [], [], []
         self.estimates: dict[str, Any] = {name: [] for name in names}
         measurements = Measurements(log, seed, noise)
@@ -62,6 +72,9 @@ class Played:
                 if cycle % EVERY == 0:
                     honesty.append(plugins.honesty(sample))
                     force.append((sample.force[:, 2], plugins.forces, plugins.touching))
+        for method in self._others.values():
+            if isinstance(method, Smoother):
+                method.smooth()
         self.truth = np.array(self.truth)
         self.estimates = {name: np.array(poses) for name, poses in self.estimates.items()}
         self.figures = {name: figures(self.truth, poses) for name, poses in self.estimates.items()}
@@ -81,7 +94,8 @@ class Played:
         plugins.begin()
         for name in names:
             if name in BASELINES:
-                self._others[name] = method = BASELINES[name](plugins.contacts, received)
+                make = partial(Smoother, noise=self._noise) if name == "smoother" else BASELINES[name]
+                self._others[name] = method = make(plugins.contacts, received)
                 plugins.loop(name, partial(_cycle, method, plugins))
         return True
 
@@ -93,15 +107,17 @@ class Played:
 
     def _honest(self, line: dict[str, float], covariance: np.ndarray, honesty: list[tuple[float, float]]) -> None:
         """Add how honest the filter's covariance is."""
-        error = (from_start(self.estimates["filter"]) - from_start(self.truth))[-1, [0, 1, 3]]
+        error = (from_start(self.estimates["filter"]) - from_start(self.truth))[-1]
         heading = float(self.estimates["filter"][0, 3])
         cosine, sine = math.cos(heading), math.sin(heading)
-        turn = np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))
-        known = turn @ covariance[np.ix_((0, 1, 3), (0, 1, 3))] @ turn.T
-        line["anees"] = float(error @ np.linalg.solve(known, error)) / 3.0
+        turn = np.eye(4)
+        turn[:2, :2] = (cosine, sine), (-sine, cosine)
+        known = turn @ covariance @ turn.T
+        for key, which in NORMALISED.items():
+            line[key] = normalised(error[which], known[np.ix_(which, which)])
         line["anees_tilt"], line["anees_velocity"] = np.mean(honesty, axis=0).tolist()
         line["position_deviation"] = math.sqrt(known[0, 0] + known[1, 1])
-        line["heading_deviation"] = math.degrees(math.sqrt(known[2, 2]))
+        line["heading_deviation"] = math.degrees(math.sqrt(known[3, 3]))
 
 
 def _cycle(method: Any, plugins: Plugins) -> None:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from solfer.components.odometry import filter_kernel
 from solfer.components.odometry import kalman_kernel as kernel
 from solfer.components.odometry.kalman import (
     FLOOR_DEVIATION,
@@ -268,3 +269,15 @@ def test_the_covariance_is_propagated_and_corrected_as_matrices_are():
     np.testing.assert_allclose(state, STATE + 0.2 * gain, rtol=1e-10)
     left = np.eye(size) - np.outer(gain, row)
     np.testing.assert_allclose(covariance, left @ expected @ left.T + 0.3 * np.outer(gain, gain), atol=1e-8)
+
+
+def test_the_velocity_has_the_covariance_of_a_mean():
+    """Without smoothing it is the covariance of samples by their number."""
+    speeds = np.random.default_rng(3).normal(0.0, 0.01, (4, 3))
+    velocity, each, covariance = np.zeros(3), np.zeros((4, 3)), np.zeros((3, 3))
+    filter_kernel.velocity_of_base(
+        np.diag(-speeds.ravel()), np.ones(12), np.zeros(3), np.zeros((4, 3)), np.ones(4),
+        velocity, each, 0.0, covariance,
+    )  # fmt: skip
+    np.testing.assert_allclose(velocity, speeds.mean(axis=0), atol=1e-15)
+    np.testing.assert_allclose(covariance, np.cov(speeds, rowvar=False) / 4.0, atol=1e-15)

@@ -61,6 +61,24 @@ class ImuProgress:
         self.assumed[:] = 0.0
 
 
+class VelocitySpread:
+    """How far the velocities of the base that single wheels measure are from their mean, which is published.
+
+    Args:
+        count: Number of wheels k.
+
+    Attributes:
+        each: Velocity of the base's origin by each wheel in the heading frame, shape (k, 3) [m/s].
+        covariance: Covariance of their mean, shape (3, 3) [m^2/s^2].
+        smoothed: Mean and yaw rate after a low-pass filter, shape (4,) [m/s, rad/s].
+    """
+
+    def __init__(self, count: int):
+        self.each = np.zeros((count, 3))
+        self.covariance = np.zeros((3, 3))
+        self.smoothed = np.zeros(4)
+
+
 class FilteredOdometry:
     """The base's pose and its covariance by `WheelInertialFilter`.
 
@@ -114,7 +132,7 @@ class FilteredOdometry:
         self.smoothing: LowPass | None = None
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.heading = 0.0
-        self._smoothed = np.zeros(4)
+        self._spread = VelocitySpread(count)
 
     @property
     def lifted(self) -> np.ndarray:
@@ -144,6 +162,7 @@ class FilteredOdometry:
         self._imu.start()
         self.ground.start()
         motion.spreads[:] = 0.0
+        self._spread.covariance[:] = 0.0
         self._weigh()
         motion.trusted[:] = motion.weights
         filter_kernel.turn_rotation(base.rotation, -base.heading, kalman.axes)
@@ -227,7 +246,9 @@ class FilteredOdometry:
             pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, pose, twist)
+        slips = bool(self.slip.lasts)  # then the velocity is that of the filter
+        known = self.kalman.velocity_covariance if slips else self._spread.covariance
+        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose=pose, twist=twist)
 
     def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
@@ -431,14 +452,16 @@ class FilteredOdometry:
         self.angular[2] -= self.kalman.bias
         if self.filter is not None:
             self.filter.step(self.angular)
+        spread_time = 0.1  # [s] over which wheels are compared
         filter_kernel.velocity_of_base(
-            wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity
-        )
+            wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity,
+            self._spread.each, spread_time / (spread_time + self._imu.period), self._spread.covariance,
+        )  # fmt: skip
         if self.slip.lasts:
             self.velocity[:2] -= self.slip.slip
         if self.smoothing is not None:
-            self._smoothed[:3] = self.velocity
-            self._smoothed[3] = self.angular[2]
-            self.smoothing.step(self._smoothed)
-            self.velocity[:] = self._smoothed[:3]
-            self.angular[2] = self._smoothed[3]
+            self._spread.smoothed[:3] = self.velocity
+            self._spread.smoothed[3] = self.angular[2]
+            self.smoothing.step(self._spread.smoothed)
+            self.velocity[:] = self._spread.smoothed[:3]
+            self.angular[2] = self._spread.smoothed[3]

@@ -476,22 +476,37 @@ def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
             rise[i] *= forget
 
 
-def _velocity_of_base(jacobian, rates, angular, arms, weights, velocity):
-    """Write the velocity of the base at which the material of wheels rests on average [m/s]."""
+def _velocity_of_base(jacobian, rates, angular, arms, weights, velocity, each, keep, covariance):
+    """Write the velocity of the base at which the material of wheels rests on average [m/s], and its covariance.
+
+    This is that of a weighted mean of independent wheels, by how far `each` of them is from it, smoothed: with the
+    shares p of the wheels and their residuals r, the sum of p^2 by 1 minus itself, times the sum of p r r^T.
+    """
     wx, wy, wz = angular
     total = 0.0
     velocity[:] = 0.0
     for i in range(len(arms)):
         x, y, z = arms[i]
-        turned = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
+        each[i, 0], each[i, 1], each[i, 2] = wz * y - wy * z, wx * z - wz * x, wy * x - wx * y
         total += weights[i]
         for axis in range(3):
-            speed = turned[axis]
             for k in range(len(rates)):
-                speed += jacobian[3 * i + axis, k] * rates[k]
-            velocity[axis] -= weights[i] * speed
+                each[i, axis] -= jacobian[3 * i + axis, k] * rates[k]
+            velocity[axis] += weights[i] * each[i, axis]
+    squares = 0.0
     for axis in range(3):
         velocity[axis] /= total
+    for i in range(len(arms)):
+        squares += (weights[i] / total) ** 2
+    for row in range(3):
+        for column in range(row + 1):
+            scatter = 0.0
+            for i in range(len(arms)):
+                share = weights[i] / total
+                scatter += share * (each[i, row] - velocity[row]) * (each[i, column] - velocity[column])
+            known = squares / (1.0 - squares) * scatter if squares < 0.999 else 0.0
+            covariance[row, column] = keep * covariance[row, column] + (1.0 - keep) * known
+            covariance[column, row] = covariance[row, column]
 
 
 def _turned(rotation, known, heading, out):
@@ -531,7 +546,7 @@ learn_spreads = cached(f"void(int64, {_V}, {_F}, {_B}, {_F})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
 follow_plane = cached(f"int64(int64, int64, {_F}, {_V}, {_V}, boolean, {_F})", _follow_plane)
 find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_lifted)
-velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
+velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V}, {_M}, {_F}, {_M})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
 turn_twist = cached(f"void({_M}, {_F}, {_M}, {_M}, {_M}, {_M})", _turn_twist)

@@ -328,8 +328,20 @@ class WheelInertialFilter:
         """Measure the height, which is as expected, with a standard deviation [m]."""
         kernel.condition(self._address, 2, deviation * deviation)
 
+    @property
+    def velocity_covariance(self) -> np.ndarray:
+        """Covariance of v, shape (3, 3) [m^2/s^2]; a new array."""
+        return np.ascontiguousarray(self.covariance[VELOCITY:GYRO_BIAS, VELOCITY:GYRO_BIAS])
+
     def write_covariances(
-        self, heading: float, arm: np.ndarray, period: float, pose: np.ndarray, twist: np.ndarray
+        self,
+        heading: float,
+        arm: np.ndarray,
+        period: float,
+        velocity: np.ndarray,
+        *,
+        pose: np.ndarray,
+        twist: np.ndarray,
     ) -> None:
         """Write the covariances of the pose of the base's origin, in W, and of its twist, in H.
 
@@ -337,10 +349,13 @@ class WheelInertialFilter:
             heading: Heading [rad].
             arm: From the base's origin to the ground point in H, shape (3,) [m].
             period: Interval for which the angular velocity is a mean [s].
+            velocity: Covariance of the velocity by the wheels in H, shape (3, 3) [m^2/s^2].
             pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        kernel.write_covariances(self._address, heading, arm, self._variances.noise / period, pose, twist)
+        kernel.write_covariances(
+            self._address, heading, arm, self._variances.noise / period, velocity, pose, twist,
+        )  # fmt: skip
 
 
 _ORIGIN = np.zeros(3)

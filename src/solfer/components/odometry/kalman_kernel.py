@@ -410,13 +410,17 @@ def _condition(start, which, variance):
             covariance[i, k] -= column[i] * column[k] / spread
 
 
-def _write_covariances(start, heading, arm, white, pose, twist):
+def _write_covariances(start, heading, arm, white, velocity, pose, twist):
     """Write the covariances of a pose and of a twist; see `WheelInertialFilter.write_covariances`.
 
     The angular velocity errs by the gyroscope's variance `white` and by its biases, and the base's origin moves by that
-    and by the arm.
+    and by the arm. The velocity errs by its covariance, and leads uphill by the error of the tilt.
     """
-    errors = _filter_at(start).covariance
+    kalman = _filter_at(start)
+    errors = kalman.covariance
+    ahead = kalman.state[VELOCITY]
+    left = kalman.state[VELOCITY + 1]
+    resting = 1e-5  # [m/s] by encoders
     cosine = math.cos(heading)
     sine = math.sin(heading)
     pose[:] = 0.0
@@ -448,7 +452,15 @@ def _write_covariances(start, heading, arm, white, pose, twist):
         a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
         for j in range(3):
             c, d = (0.0, -arm[2]) if j == 0 else (arm[2], 0.0) if j == 1 else (-arm[1], arm[0])
-            twist[i, j] = errors[VELOCITY + i, VELOCITY + j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
+            twist[i, j] = velocity[i, j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
+
+    twist[2, 2] += (
+        left * left * errors[TILT, TILT]
+        - 2.0 * left * ahead * errors[TILT, TILT + 1]
+        + ahead * ahead * errors[TILT + 1, TILT + 1]
+    )
+    for i in range(3):
+        twist[i, i] += resting * resting
 
 
 _F = "float64"
@@ -462,4 +474,4 @@ integrate = cached(f"void(int64, {_F}, {_F}, {_F}, UniTuple(float64, 3))", _inte
 level = cached(f"boolean(int64, {_F}, {_F}, {_F})", _level)
 measure = cached(f"boolean(int64, int64, {_F}, {_F})", _measure)
 condition = cached(f"void(int64, int64, {_F})", _condition)
-write_covariances = cached(f"void(int64, {_F}, {_V}, {_F}, {_M}, {_M})", _write_covariances)
+write_covariances = cached(f"void(int64, {_F}, {_V}, {_F}, {_M}, {_M}, {_M})", _write_covariances)
