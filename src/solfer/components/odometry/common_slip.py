@@ -30,14 +30,15 @@ class CommonSlip:
     Attributes:
         speed: Velocity of the base by the wheels in the heading frame, shape (2,) [m/s]; live.
         slip: By how much that is too fast, shape (2,) [m/s]; live.
-        contradicted: Whether the accelerometer measures what no slip explains.
+        lasts: For how long all wheels have slipped [s]; 0: they roll.
     """
 
     def __init__(self, motion: WheelMotion, slope: np.ndarray):
         self._motion = motion
         self.speed, self.slip, self._before, self._gained, self._bias, self._slipped = np.zeros((6, 2))
+        self._usual = np.zeros(2)
         self._probability, self._lasts, self._excess = np.ones((3, 1))
-        self.contradicted = False
+        self.lasts = 0.0
         self._block = MemoryBlock(
             kernel.SLIP,
             speed=self.speed,
@@ -48,7 +49,7 @@ class CommonSlip:
             slipped=self._slipped,
             mean=np.zeros(4),
             slope=slope,
-            usual=np.zeros(2),
+            usual=self._usual,
             probability=self._probability,
             excess=self._excess,
             lasts=self._lasts,
@@ -56,18 +57,17 @@ class CommonSlip:
         self.start()
 
     def start(self) -> None:
-        """Begin with wheels that roll, and nothing to compare with."""
-        for numbers in (self._gained, self._bias, self.slip, self._slipped):
+        """Begin with wheels that roll on level ground, and nothing to compare with."""
+        for numbers in (self._gained, self._bias, self.slip, self._slipped, self._usual):
             numbers[:] = 0.0
         self._lasts[:] = math.nan
         self._probability[:] = 1.0
-        self.contradicted = False
+        self.lasts = 0.0
 
     @property
-    def lasts(self) -> float:
-        """For how long all wheels have slipped [s]; 0: they roll."""
-        lasts = float(self._lasts[0])
-        return lasts if lasts > 0.0 else 0.0
+    def contradicted(self) -> bool:
+        """Whether the accelerometer measured what no slip explains, in the last 2 s."""
+        return bool(self._lasts[0] < 0.0)
 
     @property
     def probability(self) -> float:
@@ -108,7 +108,8 @@ class CommonSlip:
             self._block.address, self._motion.block.address, inliers, pushed, heading, place, axes, rotation,
             tilt,
         )  # fmt: skip
-        self.contradicted = found == kernel.CONTRADICTS
+        lasts = float(self._lasts[0])
+        self.lasts = lasts if lasts > 0.0 else 0.0
         return self._slipped if found == kernel.BEGINS else None
 
     def velocity_variance(self, time: float) -> float:
