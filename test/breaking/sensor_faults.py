@@ -23,9 +23,6 @@ SENSORS = ("joint_states", "imu")
 PERIOD, LASTS = 0.02, 3.0
 """Period of those who command; how long a fault lasts that ends [s]."""
 
-FRICTION, JAMMED = 3.0, 500.0
-"""Friction torques of the gear of a motor without current, and of what jams [Nm]."""
-
 LEGS, ARMS, WHEELS = "hip knee ankle", "arm", "wheel"
 """Parts of the names of joints."""
 
@@ -317,31 +314,17 @@ def second_stick(trial: "SensorTrial") -> None:
     trial.world.bus.every(PERIOD, lambda: writer.write(velocity))
 
 
-def _braked(trial: "SensorTrial", name: str, torque: float, is_driven: bool) -> None:
-    """Hold a joint by a friction torque [Nm], beside its motor or instead of it."""
-    body, dof = trial.world.simulation.body, 6 + trial.joints.index(name)
-    trial.size = name
-    brake, apply = body.robot.group([body.joints.index(name)]), body.apply
-
-    def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
-        driven = np.array(torques)
-        driven[dof] *= is_driven
-        apply(driven, speeds)
-        brake.hold_speeds(np.zeros(1), [torque])
-
-    body.apply = applied
-
-
 def dead_arm(trial: "SensorTrial") -> None:
-    """Take the current from the motor of an arm's joint: what hangs on it turns it against the friction of its gear."""
-    name = trial.joint(ARMS)
-    trial.falls = [trial.joints.index(name)]
-    _braked(trial, name, FRICTION, is_driven=False)
+    """Take the power from the motor of an arm's joint: what hangs on it turns it."""
+    trial.size = trial.joint(ARMS)
+    trial.falls = [trial.joints.index(trial.size)]
+    trial.world.simulation.set_drive(trial.size, "free")
 
 
 def jammed_wheel(trial: "SensorTrial") -> None:
     """Jam a wheel."""
-    _braked(trial, trial.joint(WHEELS), JAMMED, is_driven=True)
+    trial.size = trial.joint(WHEELS)
+    trial.world.simulation.set_drive(trial.size, "stuck")
 
 
 def imu_tilt_drift(trial: "SensorTrial") -> None:

@@ -14,7 +14,7 @@ import rostest
 from std_srvs.srv import SetBool
 from system import START, Robot, end, insist, soak, started, subscribers, wait_for, wait_for_plugin
 
-from solfer.srv import PushLink, ResetSimulation, Screenshot, SetFriction, StepSimulation
+from solfer.srv import PushLink, ResetSimulation, Screenshot, SetDrive, SetFriction, StepSimulation
 
 LISTENERS = ("/simulator", "/joint_states", "/robot_state_publisher")
 
@@ -75,9 +75,10 @@ class SimulatorServicesTest(unittest.TestCase):
         self.assertTrue(service("pause", SetBool, data=False).success)
         self.robot.arrive({"torso_yaw": 0.3}, START)
 
-    def test_a_push_and_friction(self):
+    def test_a_push_friction_and_a_drive(self):
         self.assertTrue(service("push", PushLink, link="torso_2", force=[0.0, 100.0, 0.0], duration=0.2).success)
         self.assertTrue(service("set_friction", SetFriction, surface="ground", coefficient=0.9).success)
+        self.assertTrue(service("set_drive", SetDrive, joint="torso_yaw", state="sound").success)
 
     @soak
     def test_a_screenshot(self):

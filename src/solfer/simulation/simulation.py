@@ -12,6 +12,7 @@ from solfer.simulation.loading.wheels import wheels_of
 from solfer.simulation.physics import STEP, PhysicsEngine
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
+from solfer.simulation.robot_body.motors import DRIVE_STATES, DriveState
 from solfer.simulation.robot_body.placement import START_ORIGIN, StartPlacement, put
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
@@ -64,6 +65,7 @@ class Simulation:
         self.start = bundle.start
         self._groups = bundle.groups
         self._count = 0
+        self._broken: set[str] = set()
         if engine is None or isinstance(engine, str):
             engine = make_engine(engine or world.engine, gui)
         self._engine = engine
@@ -173,8 +175,9 @@ class Simulation:
     ) -> None:
         """Begin again at rest in a named state (default: the start), upright on the ground below the robot.
 
-        Commands and pushes are forgotten, movable parts of the world are where they were, noise begins again. Time goes
-        on, and friction stays as it was set. What follows is bitwise what follows the same reset at any other time.
+        Commands and pushes are forgotten, drives are repaired, movable parts of the world are where they were, noise
+        begins again. Time goes on, and friction stays as it was set. What follows is bitwise what follows the same
+        reset at any other time.
 
         Args:
             state: Name of the state.
@@ -197,6 +200,8 @@ class Simulation:
         self.pushes.clear()
         self.torque[:] = 0.0
         self._motor_torque[:] = 0.0
+        for joint in tuple(self._broken):
+            self.set_drive(joint, "sound")
         self._read()
         self._remember()
         self.lower_level.start(self.q)
@@ -246,6 +251,24 @@ class Simulation:
             raise UnknownName(
                 "part of the world, link or group", name, [*self.world.names, *self.body.owner, *self._groups]
             )
+
+    def set_drive(self, joint: str, state: DriveState) -> None:
+        """Break the drive of a joint, or repair it; a reset repairs all.
+
+        Args:
+            joint: Name of the joint.
+            state: `sound`; `free`: without power; `stuck`: the joint does not move, whatever is commanded.
+
+        Raises:
+            UnknownName: The robot has no such joint, or a drive no such state.
+        """
+        if joint not in self.body.joints:
+            raise UnknownName("joint", joint, self.body.joints)
+        if state not in DRIVE_STATES:
+            raise UnknownName("state of a drive", state, DRIVE_STATES)
+        self.lower_level.drives.power(self.kinematics.dofs.index(joint), state != "free")
+        self.body.change_drive(joint, state)
+        self._broken = self._broken - {joint} if state == "sound" else self._broken | {joint}
 
     def contacts(self) -> dict[str, np.ndarray]:
         """Return the force of the world on each link that touches it, in world axes, shape (3,) [N]."""

@@ -133,6 +133,8 @@ def test_steps_advance_a_paused_simulation_exactly(world):
         ("set_friction", {"surface": "ground", "coefficient": NAN}, "friction"),
         ("set_friction", {"surface": "wheels", "coefficient": -1.0}, "friction"),
         ("set_friction", {"surface": "wheels", "coefficient": 1e300}, "from 0 to 10"),
+        ("set_drive", {"joint": "j_wheel_5", "state": "free"}, "j_wheel_4"),
+        ("set_drive", {"joint": "j_wheel_1", "state": "broken"}, "sound"),
     ],
 )
 def test_a_wrong_request_is_refused_and_changes_nothing(idle, service, fields, error):

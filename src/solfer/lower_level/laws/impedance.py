@@ -54,6 +54,7 @@ class ImplicitImpedance:
     Attributes:
         position, velocity, effort, stiffness, damping: q_d, v_d, tau_ff, and the diagonals of K and D; to be written
             by the caller, shape (size,).
+        upper: Largest torques, shape (size,) [Nm, N]; a caller that writes zero takes a drive its power.
         torque: The torques of the newest `update`, within the effort limits, shape (size,) [Nm, N].
     """
 
@@ -64,7 +65,8 @@ class ImplicitImpedance:
         size = dynamics.size
         self._kernel = kernel
         table = self._table = np.zeros((kernel.ROWS, size))
-        table[kernel.UPPER] = effort_limit
+        self.upper = table[kernel.UPPER]
+        self.upper[:] = effort_limit
         table[kernel.FASTEST] = velocity_limit
         self.position, self.velocity, self.effort = (
             table[row] for row in (kernel.POSITION, kernel.VELOCITY, kernel.EFFORT)

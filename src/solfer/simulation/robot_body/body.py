@@ -13,7 +13,7 @@ from solfer.model.urdf.description import Description
 from solfer.simulation.loading.wheels import NO_WHEELS, TorusWheel
 from solfer.simulation.physics import PhysicsEngine
 from solfer.simulation.robot_body.base import FloatingBase
-from solfer.simulation.robot_body.motors import BodyMotors
+from solfer.simulation.robot_body.motors import BodyMotors, DriveState
 from solfer.simulation.world.records import Friction
 
 SEARCH_DISTANCES = (0.005, 0.05, 0.5, 100.0)
@@ -64,8 +64,8 @@ class Body:
         self.owner = self.robot.owner
         self.links = self.robot.links
         self.base_link = self.links[-1]
-        self._set_losses(description, lossless, kinematics)
-        self._motors = BodyMotors(self.robot, len(self.joints), kinematics, motors=motors)
+        of_joints = self._set_losses(description, lossless, kinematics)
+        self._motors = BodyMotors(self.robot, len(self.joints), kinematics, motors=motors, friction=of_joints)
         self._followers = Followers(self.joints, description.mimics)
         self._set_gears()
         self._base = base = FloatingBase(self.robot, kinematics.base)
@@ -125,12 +125,16 @@ class Body:
         if self._followers:
             self._follow(q[self._first :], v[self._first :])
         if self._motors.rows:
-            motor_torque[:] = [torques[row] for row in self._motors.rows]
+            self._motors.read(torques, motor_torque)
         self._base.read(q, v)
 
     def apply(self, torque: np.ndarray, speed: np.ndarray) -> None:
         """Set what the next step does: torques of the model's DoFs, shape (model size,); speeds of the motors."""
         self._motors.apply(torque, speed)
+
+    def change_drive(self, joint: str, state: DriveState) -> None:
+        """Break the drive of a joint, or repair it; one on a torque is without power besides where it is free."""
+        self._motors.change(self.joints.index(joint), state)
 
     def push_motors(self) -> None:
         """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
@@ -153,11 +157,13 @@ class Body:
         ):
             self.robot.add_gear(int(joint), int(leader), ratio)
 
-    def _set_losses(self, description: Description, lossless: Collection[str], kinematics: Kinematics) -> None:
-        """Set the damping and the friction of the joints."""
+    def _set_losses(self, description: Description, lossless: Collection[str], kinematics: Kinematics) -> list[float]:
+        """Set the damping and the friction of the joints; return the friction."""
         joints = [None if name in lossless else description.joints[name] for name in self.joints]
+        friction = [joint.friction if joint else 0.0 for joint in joints]
         self.robot.set_losses(
             [joint.damping if joint else 0.0 for joint in joints],
-            [joint.friction if joint else 0.0 for joint in joints],
+            friction,
             free_inertia(kinematics, neutral_posture(kinematics))[self._first :],
         )
+        return friction

@@ -1,9 +1,19 @@
 """The motors of a robot."""
 
+from collections.abc import Sequence
+from typing import Literal, get_args
+
 import numpy as np
 
 from solfer.model.kinematics import Kinematics
 from solfer.simulation.physics import RobotInEngine
+
+DriveState = Literal["sound", "free", "stuck"]
+"""What a drive does: its work, nothing, or it holds its joint whatever is commanded."""
+
+DRIVE_STATES = get_args(DriveState)
+BRAKE = 1e5
+"""Largest effort of what holds a joint that is stuck [Nm, N]."""
 
 
 class BodyMotors:
@@ -14,19 +24,32 @@ class BodyMotors:
         count: Number of its joints.
         kinematics: The model.
         motors: DoFs with motors that hold a speed.
+        friction: Friction of the joints [Nm, N].
 
     Attributes:
         rows: Joints whose motors hold a speed.
     """
 
-    def __init__(self, robot: RobotInEngine, count: int, kinematics: Kinematics, motors: np.ndarray):
+    def __init__(
+        self,
+        robot: RobotInEngine,
+        count: int,
+        kinematics: Kinematics,
+        motors: np.ndarray,
+        friction: Sequence[float],
+    ):
         self._robot = robot
+        self._friction = friction
         self._count = count
         self._first = kinematics.size - count
         self.rows = [int(dof) - self._first for dof in motors]
         self._drive_torques([row for row in range(count) if row not in self.rows])
         self._motors = robot.group(self.rows)
-        self._efforts = np.minimum(kinematics.effort_limit[motors], 1e6).tolist()  # motors may have no limit
+        self._limits = np.minimum(kinematics.effort_limit[motors], 1e6).tolist()  # motors may have no limit
+        self._efforts = self._limits.copy()
+        self._states: list[DriveState] = ["sound"] * len(self.rows)
+        self._stuck: list[int] = []
+        self._free: list[int] = []
 
     def push(self) -> None:
         """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
@@ -37,7 +60,27 @@ class BodyMotors:
         if len(self._torque_dofs):
             self._torques.apply_torques(torque[self._torque_dofs])
         if self.rows:
+            if self._stuck:
+                speed[self._stuck] = 0.0
             self._motors.hold_speeds(speed, self._efforts)
+
+    def read(self, efforts: Sequence[float], out: np.ndarray) -> None:
+        """Write the efforts of the motors that hold a speed, of those of all joints [Nm, N]."""
+        out[:] = [efforts[row] for row in self.rows]
+        if self._free:
+            out[self._free] = 0.0  # an engine may have that of the last step with a motor
+
+    def change(self, row: int, state: DriveState) -> None:
+        """Break the drive of a joint, or repair it; one on a torque is without power besides where it is free."""
+        if row not in self.rows:
+            effort = BRAKE if state == "stuck" else self._friction[row]
+            self._robot.group([row]).hold_speeds(np.zeros(1), [effort])
+            return
+        motor = self.rows.index(row)
+        self._efforts[motor] = {"sound": self._limits[motor], "free": 0.0, "stuck": BRAKE}[state]
+        self._states[motor] = state
+        self._stuck = [number for number, each in enumerate(self._states) if each == "stuck"]
+        self._free = [number for number, each in enumerate(self._states) if each == "free"]
 
     def _drive_torques(self, rows: list[int]) -> None:
         """Choose the joints whose torques `apply` sets."""

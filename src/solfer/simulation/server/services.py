@@ -7,6 +7,7 @@ from typing import Protocol
 
 from solfer.errors import SimulationError
 from solfer.interfaces.declaration import Service
+from solfer.simulation.robot_body.motors import DriveState
 from solfer.simulation.robot_body.placement import StartPlacement
 from solfer.simulation.simulation import Simulation
 from solfer.transport.lower_level import Answer, answered_service
@@ -51,6 +52,14 @@ class FrictionRequest:
 
     surface: str
     coefficient: float
+
+
+@dataclass(frozen=True)
+class DriveRequest:
+    """A state of a joint's drive; see `Simulation.set_drive`."""
+
+    joint: str
+    state: DriveState
 
 
 @dataclass(frozen=True)
@@ -110,10 +119,14 @@ def simulator_services(server: SteppedSimulation) -> tuple[Service, ...]:
     def set_friction(request: FrictionRequest) -> None:
         simulation.set_friction(request.surface, request.coefficient)
 
+    def set_drive(request: DriveRequest) -> None:
+        simulation.set_drive(request.joint, request.state)
+
     return (
         answered_service("reset", "solfer/ResetSimulation", ResetRequest, work=reset),
         answered_service("pause", "std_srvs/SetBool", Flag, work=lambda request: server.pause(request.data)),
         answered_service("step", "solfer/StepSimulation", StepRequest, work=step),
         answered_service("push", "solfer/PushLink", PushRequest, work=push),
         answered_service("set_friction", "solfer/SetFriction", FrictionRequest, work=set_friction),
+        answered_service("set_drive", "solfer/SetDrive", DriveRequest, work=set_drive),
     )
