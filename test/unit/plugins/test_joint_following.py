@@ -15,14 +15,15 @@ DOFS = ("x", "shoulder", "elbow", "roll")
 class FollowedJoints:
     """Two joints with position controllers, a wheel with a velocity controller, and what watches them."""
 
-    def __init__(self, measured=(True, True, True, True), stiffness=None):
-        self.state = {"position": np.zeros(4), "velocity": np.zeros(4)}
+    def __init__(self, measured=(True, True, True, True), stiffness=None, efforts=True):
+        self.state = {"position": np.zeros(4), "velocity": np.zeros(4), "torque": np.zeros(4)}
         self.place, self.speed = np.zeros(2), np.zeros(1)
         fields = [("position", self.place), *([] if stiffness is None else [("stiffness", np.array(stiffness))])]
         joints = SimpleNamespace(dofs=np.array([1, 2]), fields=fields)
         wheel = SimpleNamespace(dofs=np.array([3]), fields=[("velocity", self.speed)])
-        robot = SimpleNamespace(dofs=DOFS, state=self.state)
-        known = dict.fromkeys(("position", "velocity"), np.array(measured))
+        kinematics = SimpleNamespace(effort_limit=np.array([0.0, 100.0, 50.0, 30.0]))
+        robot = SimpleNamespace(dofs=DOFS, state=self.state, kinematics=kinematics)
+        known = dict.fromkeys(("position", "velocity"), np.array(measured)) | {"effort": np.full(4, efforts)}
         self.following = JointFollowing("legs", [joints, wheel], robot, known)
 
     def run(self, duration, moves=lambda time: None):
@@ -54,6 +55,19 @@ def test_a_joint_that_stays_away_is_named(place):
     fault, time = arm.run(1.0)
     assert time == pytest.approx(0.5, abs=0.011)
     assert fault.what == f"joint '{DOFS[1 + place]}' does not follow 'legs': it is at 0.000 instead of -1.100 rad"
+
+
+@pytest.mark.parametrize(
+    ("away", "effort", "measured", "is_named"),
+    [(-0.1, -50.0, True, True), (0.1, 49.5, True, True), (0.1, -50.0, True, False), (0.1, 45.0, True, False),
+     (0.02, 50.0, True, False), (0.1, 50.0, False, False)],
+)  # fmt: skip
+def test_a_joint_that_is_pulled_in_vain_is_named(away, effort, measured, is_named):
+    arm = FollowedJoints(stiffness=(100.0, 100.0), efforts=measured)
+    arm.place[1], arm.state["torque"][2] = away, effort
+    fault, time = arm.run(1.0)
+    assert (fault is not None and f"instead of {away:.3f} rad, with {effort:.0f} Nm" in fault.what) == is_named
+    assert time == pytest.approx(0.3 if is_named else 1.0, abs=0.011)
 
 
 @pytest.mark.parametrize(("desired", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (2.5, 0.4)])

@@ -3,24 +3,31 @@
 from solfer.numerics.compilation import cached
 
 
-def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
-    """Return the first joint that has been 1 rad or m from its command for 0.5 s; -1: there is none.
+def _find_astray(desired, measured, dofs, places, record, stiffness, efforts, limits, passed):
+    """Return the first joint that does not reach its command; -1: there is none.
 
-    Wheels that steer on the ground were half a radian behind where a busy loop left cycles out.
+    It has been 1 rad or m from it for 0.5 s, or 0.05 rad or m for 0.3 s with all the effort of its motor. Wheels that
+    steer on the ground were half a radian behind where a busy loop left cycles out.
 
     Args:
         desired: Commanded positions.
         measured: Measured positions of all DoFs.
         dofs: Which of them are commanded.
         places: Which of those are watched.
-        record: First row: for how long each joint has been far away.
+        record: For how long each joint has been far away, and in vain with all effort.
         stiffness: Those without stiffness do not count.
+        efforts: Measured efforts of all DoFs.
+        limits: Efforts of the commanded ones from which on a motor does all that it can.
         passed: Time since the cycle before [s].
     """
     for k in places:
-        is_away = abs(desired[k] - measured[dofs[k]]) > 1.0 and stiffness[k] > 0.0
-        record[0, k] = record[0, k] + passed if is_away else 0.0
-        if record[0, k] > 0.5:
+        away = desired[k] - measured[dofs[k]]
+        effort = efforts[dofs[k]] if away > 0.0 else -efforts[dofs[k]]
+        is_held = stiffness[k] > 0.0
+        record[0, k] = record[0, k] + passed if is_held and abs(away) > 1.0 else 0.0
+        is_vain = is_held and abs(away) > 0.05 and effort >= limits[k]
+        record[1, k] = record[1, k] + passed if is_vain else 0.0
+        if record[0, k] > 0.5 or record[1, k] > 0.3:
             return k
     return -1
 
@@ -56,5 +63,5 @@ _ROW = "float64[::1]"
 _DOFS = "int64[::1]"
 _ROWS = "float64[:, ::1]"
 
-find_astray = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, {_ROW}, float64)", _find_astray)
+find_astray = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, {_ROW}, {_ROW}, {_ROW}, float64)", _find_astray)
 find_stuck = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, float64)", _find_stuck)

@@ -13,7 +13,8 @@ class JointFollowing:
     """Compares what is commanded to the lower level with what is measured, once a cycle.
 
     - A joint with a position controller does not follow where it has been farther than 1 rad or m from its command
-      for 0.5 s: springs under a load yield less. Without stiffness it is not watched.
+      for 0.5 s: springs under a load yield less; or 0.05 rad or m for 0.3 s, while its motor does all that it can.
+      Without stiffness it is not watched.
     - A joint with a velocity controller does not follow where it lags by 0.5 rad or m: by what it is commanded to go
       in all the time in which it goes less than a fifth of that.
 
@@ -44,7 +45,8 @@ class JointFollowing:
             own = fields[interface], state[interface], np.array(pipe.dofs), places, np.zeros((2, len(pipe.dofs)))
             if interface == "position":
                 stiffness = fields.get("stiffness", np.ones(len(pipe.dofs)))
-                self.watched.append((find_astray, (*own, stiffness)))
+                limits = np.where(measured["effort"], 0.98 * robot.kinematics.effort_limit, np.inf)[pipe.dofs]
+                self.watched.append((find_astray, (*own, stiffness, state["torque"], limits)))
             else:
                 self.watched.append((find_stuck, own))
 
@@ -69,7 +71,8 @@ class JointFollowing:
         desired, measured, dofs, _, record = given[:5]
         dof = dofs[place]
         if len(given) > 5:
-            what = f"it is at {measured[dof]:.3f} instead of {desired[place]:.3f} rad"
+            force = f", with {given[6][dof]:.0f} Nm" if record[1, place] else ""
+            what = f"it is at {measured[dof]:.3f} instead of {desired[place]:.3f} rad{force}"
         else:
             what = f"it has turned by {record[1, place]:.2f} rad, and lags by {record[0, place]:.2f} rad"
         return JointFault(
