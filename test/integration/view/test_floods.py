@@ -63,20 +63,24 @@ class Served:
         while not self._stop.is_set():
             self.page.receive(0.03)
             gap = time.monotonic() - last
-            if gap > self._gap:  # for a processor of a busy machine the page cannot but wait
+            if gap > self._gap:  # for a processor of a busy machine page and test cannot but wait
                 now = self._waited()
-                self._gap = max(self._gap, gap - max(now[task] - waited.get(task, 0.0) for task in now))
+                for process in now:
+                    gap -= max(now[process][task] - waited[process].get(task, 0.0) for task in now[process])
+                self._gap = max(self._gap, gap)
             if self.page.gui[beat] != before:
                 before = dict(self.page.gui[beat])
                 last = time.monotonic()
                 waited = self._waited()
 
     def _waited(self):
-        """Return how long each thread of the process has been ready without a processor [s], by its number."""
+        """Return how long threads of the process, and of this one, have been ready without a processor [s]."""
         waited = {}
-        for task in Path(f"/proc/{self.process.pid}/task").iterdir():
-            with suppress(OSError):  # it has ended
-                waited[task.name] = 1e-9 * int((task / "schedstat").read_text().split()[1])
+        for process in (self.process.pid, os.getpid()):
+            waited[process] = {}
+            for task in Path(f"/proc/{process}/task").iterdir():
+                with suppress(OSError):  # it has ended
+                    waited[process][task.name] = 1e-9 * int((task / "schedstat").read_text().split()[1])
         return waited
 
     @property
@@ -242,7 +246,7 @@ def test_a_flood_neither_delays_others_nor_stays(served, kind):
             cut(connection)
 
 
-@pytest.mark.parametrize("size", [70_000, 1_000_000, 50_000_000])
+@pytest.mark.parametrize("size", [70_000, 1_000_000, 20_000_000])
 @pytest.mark.parametrize("address", ["address", "foxglove"])
 def test_a_message_that_is_too_large_closes_its_connection(served, address, size):
     message = encoded(_messages.GuiUpdateMessage("a", {"value": size * "x"}))
