@@ -65,7 +65,6 @@ class Simulation:
         self.start = bundle.start
         self._groups = bundle.groups
         self._count = 0
-        self._broken: set[str] = set()
         if engine is None or isinstance(engine, str):
             engine = make_engine(engine or world.engine, gui)
         self._engine = engine
@@ -200,7 +199,7 @@ class Simulation:
         self.pushes.clear()
         self.torque[:] = 0.0
         self._motor_torque[:] = 0.0
-        for joint in tuple(self._broken):
+        for joint in self.body.broken_drives:
             self.set_drive(joint, "sound")
         self._read()
         self._remember()
@@ -268,7 +267,6 @@ class Simulation:
             raise UnknownName("state of a drive", state, DRIVE_STATES)
         self.lower_level.drives.power(self.kinematics.dofs.index(joint), state != "free")
         self.body.change_drive(joint, state)
-        self._broken = self._broken - {joint} if state == "sound" else self._broken | {joint}
 
     def contacts(self) -> dict[str, np.ndarray]:
         """Return the force of the world on each link that touches it, in world axes, shape (3,) [N]."""

@@ -79,6 +79,7 @@ def test_an_elbow_that_is_stuck_or_free(simulation):
     ("joint", "state", "nearest"), [("j_wheel_5", "free", "j_wheel_4"), ("j_wheel_1", "fre", "free")]
 )
 def test_what_is_unknown_changes_nothing(simulation, joint, state, nearest):
+    simulation.reset()
     with pytest.raises(UnknownName, match=nearest):
         simulation.set_drive(joint, state)
-    assert not simulation._broken
+    assert not simulation.body.broken_drives

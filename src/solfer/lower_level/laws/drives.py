@@ -54,7 +54,7 @@ class Drives:
         swinging = held[springs.two_mass[held]] if springs else held[:0]
         self.torque_dofs, self.speed_dofs = np.concatenate((moved, swinging)), np.setdiff1d(held, swinging)
         self._law = _law(kinematics, self.torque_dofs, springs, posture=posture)
-        self._upper = self._law.upper.copy()
+        self._limits = kinematics.effort_limit
         self._law.damping[swinging] = 1e7  # [Nms/rad], with which a motor holds its speed
         self.torque = self._law.torque
         self.speed = np.zeros(len(self.speed_dofs))
@@ -82,7 +82,8 @@ class Drives:
 
     def power(self, dof: int, on: bool) -> None:
         """Switch the power of a drive on a torque on or off; without it, its motor has friction and inertia alone."""
-        self._law.upper[dof] = self._upper[dof] if on else 0.0
+        if dof in self.torque_dofs:
+            self._law.limit(dof, float(self._limits[dof]) if on else 0.0)
 
     def rest(self) -> None:
         """Set torques and speeds to zero until the next `update`."""

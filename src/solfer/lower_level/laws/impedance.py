@@ -54,7 +54,6 @@ class ImplicitImpedance:
     Attributes:
         position, velocity, effort, stiffness, damping: q_d, v_d, tau_ff, and the diagonals of K and D; to be written
             by the caller, shape (size,).
-        upper: Largest torques, shape (size,) [Nm, N]; a caller that writes zero takes a drive its power.
         torque: The torques of the newest `update`, within the effort limits, shape (size,) [Nm, N].
     """
 
@@ -65,8 +64,7 @@ class ImplicitImpedance:
         size = dynamics.size
         self._kernel = kernel
         table = self._table = np.zeros((kernel.ROWS, size))
-        self.upper = table[kernel.UPPER]
-        self.upper[:] = effort_limit
+        table[kernel.UPPER] = effort_limit
         table[kernel.FASTEST] = velocity_limit
         self.position, self.velocity, self.effort = (
             table[row] for row in (kernel.POSITION, kernel.VELOCITY, kernel.EFFORT)
@@ -84,6 +82,10 @@ class ImplicitImpedance:
     def place(self, q: np.ndarray) -> None:
         """Begin with a robot at rest that was put to q, shape (size,), and is held there."""
         self._table[[self._kernel.BEFORE, self._kernel.TORQUE]] = 0.0
+
+    def limit(self, dof: int, torque: float) -> None:
+        """Change the largest torque of a drive [Nm, N]; 0: it has no power."""
+        self._table[self._kernel.UPPER, dof] = torque
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque` for the step of `dt` [s] that begins at position q and velocity v, shape (size,)."""

@@ -136,6 +136,12 @@ class Body:
         """Break the drive of a joint, or repair it; one on a torque is without power besides where it is free."""
         self._motors.change(self.joints.index(joint), state)
 
+    @property
+    def broken_drives(self) -> tuple[str, ...]:
+        """Joints whose drives are not sound."""
+        states = zip(self.joints, self._motors.states, strict=True)
+        return tuple(joint for joint, state in states if state != "sound")
+
     def push_motors(self) -> None:
         """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
         self._motors.push()

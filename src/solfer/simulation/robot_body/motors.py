@@ -28,6 +28,7 @@ class BodyMotors:
 
     Attributes:
         rows: Joints whose motors hold a speed.
+        states: What the drives of all joints do.
     """
 
     def __init__(
@@ -47,7 +48,7 @@ class BodyMotors:
         self._motors = robot.group(self.rows)
         self._limits = np.minimum(kinematics.effort_limit[motors], 1e6).tolist()  # motors may have no limit
         self._efforts = self._limits.copy()
-        self._states: list[DriveState] = ["sound"] * len(self.rows)
+        self.states: list[DriveState] = ["sound"] * count
         self._stuck: list[int] = []
         self._free: list[int] = []
 
@@ -72,15 +73,15 @@ class BodyMotors:
 
     def change(self, row: int, state: DriveState) -> None:
         """Break the drive of a joint, or repair it; one on a torque is without power besides where it is free."""
+        self.states[row] = state
         if row not in self.rows:
             effort = BRAKE if state == "stuck" else self._friction[row]
             self._robot.group([row]).hold_speeds(np.zeros(1), [effort])
             return
         motor = self.rows.index(row)
         self._efforts[motor] = {"sound": self._limits[motor], "free": 0.0, "stuck": BRAKE}[state]
-        self._states[motor] = state
-        self._stuck = [number for number, each in enumerate(self._states) if each == "stuck"]
-        self._free = [number for number, each in enumerate(self._states) if each == "free"]
+        self._stuck = [number for number, each in enumerate(self.rows) if self.states[each] == "stuck"]
+        self._free = [number for number, each in enumerate(self.rows) if self.states[each] == "free"]
 
     def _drive_torques(self, rows: list[int]) -> None:
         """Choose the joints whose torques `apply` sets."""
