@@ -19,6 +19,9 @@ joint as a share of its limit, speeds of base, heading and wheels, and tilt; in 
 how long at most [s]; and in how many the robot drove as commanded in the end. Where a call ends, another one goes on
 with the next seed.
 
+With `--drives` drives of Fig. 5 break in the same way: a wheel, what steers it, a leg or an arm is without power, or
+stuck; consecutive seeds have each of the eight.
+
 With `--sizes` the feedback pipes get the messages of one motion with each of these faults, larger and smaller, until
 the smallest size is found that is named within 0.5 s; `--trials` seeds draw joints, axes and signs. In the table are
 the largest of their sizes and the geometric mean; of a trial just below the largest, in which the robot has to keep its
@@ -203,13 +206,17 @@ SENSOR_FIGURES = ("joint", "base", "turn", "wheel", "tilt")
 
 
 class SensorTable:
-    """The worst of each fault of a sensor.
+    """The worst of each fault of a sensor or drive.
+
+    Args:
+        option: The option of these faults.
 
     Attributes:
         failed: The command that repeats each trial that failed, what it was, and its findings.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, option: str) -> None:
+        self._option = option
         self._rows: dict[str, list[Outcome]] = {}
         self.failed: list[str] = []
 
@@ -218,7 +225,7 @@ class SensorTable:
         self._rows.setdefault(trial.fault, []).append(outcome)
         if outcome.findings:
             what = f"{trial.motion}, {trial.fault} {outcome.size}".strip()
-            command = f"./run exec python benchmark/chaos.py --sensors --trials 1 --seed {trial.seed}"
+            command = f"./run exec python benchmark/chaos.py {self._option} --trials 1 --seed {trial.seed}"
             self.failed.append(f"{command}  # {what}: {'; '.join(outcome.findings)}")
 
     def show(self, figures: Figures) -> None:
@@ -239,14 +246,16 @@ class SensorTable:
 
 
 def run_sensors(options: argparse.Namespace) -> int:
-    """Run trials with wrong sensors; return the exit code."""
-    from breaking.sensors import check_outcome, drawn
+    """Run trials with wrong sensors or broken drives; return the exit code."""
+    from breaking.sensor_faults import DRIVES
+    from breaking.sensors import ORDER, check_outcome, drawn
 
-    table, begin = SensorTable(), time.monotonic()
+    faults, option = (list(DRIVES), "--drives") if options.drives else (ORDER, "--sensors")
+    table, begin = SensorTable(option), time.monotonic()
     try:
         for number in range(options.trials):
             seed = options.seed + number
-            trial = drawn(seed)
+            trial = drawn(seed, faults)
             outcome = check_outcome(trial, trial.run())
             table.add(trial, outcome)
             left = (time.monotonic() - begin) / (number + 1) * (options.trials - number - 1)
@@ -317,13 +326,14 @@ def main() -> int:
     )
     parser.add_argument("--stop", type=float, default=0.0, help="stop a process of Fig. 5 for so long instead [s]")
     parser.add_argument("--sensors", action="store_true", help="wrong sensors of Fig. 5, on the virtual clock")
+    parser.add_argument("--drives", action="store_true", help="drives of Fig. 5 that break, on the virtual clock")
     parser.add_argument("--sizes", action="store_true", help="smallest sizes of wrong sensors that are named")
     parser.add_argument("--alarms", action="store_true", help="sensors that are right and never to be named")
     parser.add_argument("--logs", type=Path, help="folder that keeps the output of the processes (default: none)")
     options = parser.parse_args()
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, interrupt)
-    runs = {"sensors": run_sensors, "sizes": run_sizes, "alarms": run_alarms}
+    runs = {"sensors": run_sensors, "drives": run_sensors, "sizes": run_sizes, "alarms": run_alarms}
     for name in (name for name in runs if getattr(options, name)):
         try:
             return runs[name](options)

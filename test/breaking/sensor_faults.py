@@ -16,6 +16,7 @@ from solfer.transport.messages import FieldsMessage, copied
 
 if TYPE_CHECKING:
     from breaking.sensors import SensorTrial
+    from solfer.simulation.robot_body.motors import DriveState
 
 SENSORS = ("joint_states", "imu")
 """Topics of what the robot measures."""
@@ -314,17 +315,22 @@ def second_stick(trial: "SensorTrial") -> None:
     trial.world.bus.every(PERIOD, lambda: writer.write(velocity))
 
 
+def _break_drive(trial: "SensorTrial", part: str, state: "DriveState") -> None:
+    """Break the drive of a joint; what hangs on one without power turns it."""
+    trial.size = trial.joint(part)
+    if state == "free":
+        trial.falls = [trial.joints.index(trial.size)]
+    trial.world.simulation.set_drive(trial.size, state)
+
+
 def dead_arm(trial: "SensorTrial") -> None:
-    """Take the power from the motor of an arm's joint: what hangs on it turns it."""
-    trial.size = trial.joint(ARMS)
-    trial.falls = [trial.joints.index(trial.size)]
-    trial.world.simulation.set_drive(trial.size, "free")
+    """Take the power from the motor of an arm's joint."""
+    _break_drive(trial, ARMS, "free")
 
 
 def jammed_wheel(trial: "SensorTrial") -> None:
     """Jam a wheel."""
-    trial.size = trial.joint(WHEELS)
-    trial.world.simulation.set_drive(trial.size, "stuck")
+    _break_drive(trial, WHEELS, "stuck")
 
 
 def imu_tilt_drift(trial: "SensorTrial") -> None:
@@ -531,7 +537,14 @@ FAULTS |= {
 }
 """What may be wrong, by name."""
 
-MECHANICAL = {"dead_arm", "jammed_wheel"}
+DRIVES = {
+    f"{state}_{name}": partial(_break_drive, part=part, state=state)
+    for name, part in (("wheel", WHEELS), ("steering", "ankle_yaw"), ("leg", "hip knee ankle_pitch"), ("arm", ARMS))
+    for state in ("free", "stuck")
+}
+"""Drives that break, by name."""
+
+MECHANICAL = {"dead_arm", "jammed_wheel", *DRIVES}
 """Faults that move the robot by themselves."""
 
 COMMANDS = {"command_spikes"}

@@ -4,7 +4,7 @@ import copy
 import logging
 import math
 import multiprocessing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from support.paper.full_control import Nodes
 
-from breaking.sensor_faults import COMMANDS, FAULTS, LASTS, MECHANICAL, PERIOD, SENSORS, WHEELS
+from breaking.sensor_faults import COMMANDS, DRIVES, FAULTS, LASTS, MECHANICAL, PERIOD, SENSORS, WHEELS
 from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
@@ -47,7 +47,7 @@ class Outcome:
         tilt: Largest tilt [rad].
         rest: Mean speed of the base in the last second [m/s].
         pause: Smallest mean speed of the base over a second [m/s].
-        when: When the largest figures were, since the fault began [s].
+        when: When the largest figures were, and `stop` of a plugin, since the fault began [s].
         stopped: Plugins that do not run in the end.
         named: Warnings, with the time since the fault [s], and in the end why plugins were aborted.
         obeys: Whether it drives as commanded in the end.
@@ -192,7 +192,7 @@ class SensorTrial:
         self.world, self.joints = robot.world, robot.joints
         self.begin_of_fault = robot.world.bus.time
         if self.fault:
-            FAULTS[self.fault](self)
+            (FAULTS | DRIVES)[self.fault](self)
 
     def _run(self, robot: DrivenRobot) -> Outcome:
         world, outcome, saying = robot.world, Outcome(), Saying(lambda: robot.world.bus.time)
@@ -216,7 +216,8 @@ class SensorTrial:
         outcome.stopped = list(stopped)
         outcome.named = [(time - self.begin_of_fault, text) for time, text in saying.said]
         reasons = [managed.reason for managed in world.set.plugins if managed.reason]
-        outcome.named += [(duration, reason) for reason in reasons]
+        outcome.named += [(outcome.when.get("stop", duration), reason) for reason in reasons]
+        outcome.named.sort()
         outcome.obeys = "locomotion" not in stopped and outcome.rest >= OBEYS * MOTIONS[self.motion][0]
         reasons += [f"{name}: {plugin.health()[1]}" for name, plugin in stopped.items()]
         outcome.advice = (reasons or [text for _, text in saying.said[-1:]] or [""])[0]
@@ -240,6 +241,8 @@ class SensorTrial:
             outcome.note("turn", abs(float(v[5])), time)
             up = float(simulation.state.now.rotation("pelvis")[2, 2])
             outcome.note("tilt", math.acos(min(1.0, max(-1.0, up))), time)
+            if any(plugin.life is not PluginState.RUNNING for plugin in robot.world.plugins.values()):
+                outcome.when.setdefault("stop", time)
             return speed
 
         return look
@@ -417,7 +420,7 @@ ORDER = np.random.default_rng(0).permutation(list(FAULTS)).tolist()
 """Faults in the order of seeds: consecutive ones draw each of them."""
 
 
-def drawn(seed: int) -> SensorTrial:
+def drawn(seed: int, faults: Sequence[str] = ORDER) -> SensorTrial:
     """Draw motion and size of a trial, the fault of which has its turn."""
     motion = str(np.random.default_rng(seed).choice(list(MOTIONS)))
-    return SensorTrial(motion, ORDER[seed % len(ORDER)], seed)
+    return SensorTrial(motion, faults[seed % len(faults)], seed)
