@@ -256,6 +256,14 @@ class LowerLevel:
         self.drives.rest()
         self.safeguard.restart(q)
 
+    def power(self, dof: int, on: bool) -> None:
+        """Switch the power of a drive on or off; with power again, its joint goes smoothly to where it is commanded."""
+        self.drives.power(dof, on)
+        if on:
+            for controller in self.controllers.values():
+                for joint in np.flatnonzero(controller.dofs == dof):
+                    controller.resume(int(joint), float(self._measured.value[dof]))
+
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Compute torques and speeds of the drives for the step of `dt` [s] that begins at q, v, shape (model size,).
 

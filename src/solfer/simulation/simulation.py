@@ -252,7 +252,7 @@ class Simulation:
             )
 
     def set_drive(self, joint: str, state: DriveState) -> None:
-        """Break the drive of a joint, or repair it; a reset repairs all.
+        """Break the drive of a joint, or repair it; a reset repairs all. A repaired one goes smoothly to its command.
 
         Args:
             joint: Name of the joint.
@@ -265,7 +265,7 @@ class Simulation:
             raise UnknownName("joint", joint, self.body.joints)
         if state not in DRIVE_STATES:
             raise UnknownName("state of a drive", state, DRIVE_STATES)
-        self.lower_level.drives.power(self.kinematics.dofs.index(joint), state != "free")
+        self.lower_level.power(self.kinematics.dofs.index(joint), state != "free")
         self.body.change_drive(joint, state)
 
     def contacts(self) -> dict[str, np.ndarray]:

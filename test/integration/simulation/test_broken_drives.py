@@ -75,6 +75,24 @@ def test_an_elbow_that_is_stuck_or_free(simulation):
     assert np.array_equal(simulation.q, sound)
 
 
+@pytest.mark.parametrize("joint", ["j_arm1_4", "hip_yaw_1", "ankle_yaw_3"])
+@pytest.mark.parametrize("state", ["free", "stuck"])
+def test_a_joint_that_is_repaired_far_from_its_command_goes_there_smoothly(simulation, joint, state):
+    dof = simulation.kinematics.dofs.index(joint)
+    simulation.reset()
+    simulation.set_drive(joint, state)
+    goal = simulation.q[dof] + 0.6
+    command(simulation, 1.0, (joint,), position=np.array([goal]))
+    assert abs(simulation.q[dof] - goal) > 0.25
+    simulation.set_drive(joint, "sound")
+    speeds = []
+    for _ in range(20):
+        command(simulation, 0.1, (joint,), position=np.array([goal]))
+        speeds.append(abs(simulation.v[dof]))
+    assert simulation.q[dof] == pytest.approx(goal, abs=0.05)
+    assert max(speeds) < 0.3 * simulation.kinematics.velocity_limit[dof]
+
+
 @pytest.mark.parametrize(
     ("joint", "state", "nearest"), [("j_wheel_5", "free", "j_wheel_4"), ("j_wheel_1", "fre", "free")]
 )

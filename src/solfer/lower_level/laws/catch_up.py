@@ -59,6 +59,13 @@ class CatchUp:
         self._age[joints] = LONGEST_PAUSE
         self._news[joints] = False
 
+    def fall_behind(self, joint: int, command: float, distance: float) -> None:
+        """Let the target of a joint, an index, be at rest at a distance before its command [rad, m]."""
+        self._last[joint] = command
+        self.distance[joint] = distance
+        self._rate[joint] = 0.0
+        self.active = True
+
     def renew(self, indices: np.ndarray) -> None:
         """Mark the joints at `indices` as commanded again."""
         self._news[indices] = True

@@ -90,6 +90,9 @@ class LowerLevelController(abc.ABC):
         """Hold the joints at `joints`, indices or a mask: their velocities become zero, all else stays."""
         self.velocity[joints] = 0.0
 
+    def resume(self, joint: int, position: float) -> None:  # noqa: B027 wheels have none
+        """Move a joint, an index, to its command from its position [rad, m]: its drive works again."""
+
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass."""
         self.velocity[self._watchdog.advance(dt)] = 0.0
@@ -249,6 +252,14 @@ class ImpedanceController(LowerLevelController):
         self._leftover.stop()
         for field, ramp in self._ramps.items():
             ramp.begin(self.default_gains[field], 0.0)
+
+    def resume(self, joint: int, position: float) -> None:
+        """See `LowerLevelController.resume`: `CatchUp` leads its target to the command, in the revolution of the joint."""
+        ahead = self.position[joint] - position
+        ahead -= whole_revolutions(ahead, self._revolutions[joint])
+        self.position[joint] = position + ahead
+        self.target[joint] = position
+        self._catch_up.fall_behind(joint, self.position[joint], distance=ahead)
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass: the springs' targets move on towards the accepted position."""
