@@ -194,6 +194,23 @@ def test_an_accelerometer_that_no_slip_explains_moves_nothing(rolling, caplog, a
     assert rolling.way - before == pytest.approx(2.0 * SPEED, abs=0.1)
 
 
+@pytest.mark.parametrize("rate", [0.2, -0.2])
+def test_a_gyroscope_that_jumps_is_no_slip(rolling, caplog, rate):
+    """Wheels seem to spin up within a period, since the base is far above them."""
+    law = rolling.plugin.component.law
+    rolling.roll(1.0, accelerated(rolling, 0.0))
+
+    def jump(sample):
+        accelerated(rolling, 0.0)(sample)
+        sample.imu.angular[1] += rate
+
+    for _ in range(20):
+        rolling.roll(0.02, jump)
+        rolling.roll(0.1, accelerated(rolling, 0.0))
+        assert not law.slip.lasts
+    assert "all wheels slip" not in caplog.text and "the accelerometer is wrong" in caplog.text
+
+
 def test_time_that_goes_back_begins_anew(rolling):
     assert rolling.way > 0.1
     bus = rolling._plugins._bus

@@ -44,6 +44,7 @@ class CommonSlip:
             speed=self.speed,
             before=self._before,
             gained=self._gained,
+            swing=np.zeros(2),
             bias=self._bias,
             slip=self.slip,
             slipped=self._slipped,

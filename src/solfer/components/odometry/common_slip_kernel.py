@@ -14,6 +14,7 @@ SLIP = BlockLayout(
     speed=(float, 2),
     before=(float, 2),
     gained=(float, 2),
+    swing=(float, 2),  # what its rotation has added to the wheels' velocity [m/s]
     bias=(float, 2),
     slip=(float, 2),
     slipped=(float, 2),
@@ -119,8 +120,11 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     x = axes[0, 0] * place[0] + axes[0, 1] * place[1] + axes[0, 2] * place[2]
     y = axes[1, 0] * place[0] + axes[1, 1] * place[1] + axes[1, 2] * place[2]
     z = axes[2, 0] * place[0] + axes[2, 1] * place[1] + axes[2, 2] * place[2] - motion.arm[2]
-    u = speed[0] + wy * z - wz * y
-    v = speed[1] + wz * x - wx * z
+    swing = wy * z - wz * y, wz * x - wx * z
+    swung = math.hypot(swing[0] - block.swing[0], swing[1] - block.swing[1])
+    block.swing[0], block.swing[1] = swing
+    u = speed[0] + swing[0]
+    v = speed[1] + swing[1]
     cosine = math.cos(wz * time)
     sine = math.sin(wz * time)
     for vector in (before, gained, slip, slipped, mean[:2], mean[2:], block.usual):
@@ -136,7 +140,9 @@ def _follow(start, motion_start, inliers, pushed, heading, place, axes, rotation
     if not math.isfinite(gain[0] + gain[1] + block.lasts[0]):  # there is nothing to compare with
         forget(block, 0.0)
         return ROLLS
-    rests = math.hypot(u, v) < 0.02  # [m/s]: wheels that rest do not spin
+    if block.lasts[0] == 0.0 and swung > 0.03 + 4.0 * time:  # [m/s]: a gyroscope that jumps, or a blow
+        return doubt(block)
+    rests = math.hypot(speed[0], speed[1]) < 0.02  # [m/s]: wheels that rest do not spin
     turned = 0.0  # the plane, or an IMU that drifts
     for axis in range(2):
         if not block.lasts[0] > 0.0:
