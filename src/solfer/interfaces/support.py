@@ -29,8 +29,25 @@ class LiftContacts:
 
 
 @dataclass(frozen=True)
+class StepContact:
+    """A step of a wheel, to a place seen from where it is in the heading frame of the base.
+
+    Attributes:
+        contact: Name of the contact.
+        ahead, left, up: To where it stands then [m].
+        clearance: How far it is above both places on its way [m]; 0: 0.05.
+    """
+
+    contact: str = ""
+    ahead: float = 0.0
+    left: float = 0.0
+    up: float = 0.0
+    clearance: float = 0.0
+
+
+@dataclass(frozen=True)
 class LiftReply:
-    """Answer to `LiftContacts`: whether it is carried out, and why not."""
+    """Answer to `LiftContacts` and `StepContact`: whether it is carried out, and why not."""
 
     success: bool = True
     message: str = ""

@@ -18,11 +18,20 @@ from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import Lifting, MotionGuard, SupportPolygon, WeightShift
+from solfer.components.wheeled_motion.support import (
+    LegReach,
+    Lifting,
+    LoadBalance,
+    MotionGuard,
+    Stepping,
+    SupportPolygon,
+    WeightShift,
+)
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,
     CASTER,
+    CONSTRAINTS,
     TASK_POINTS,
     DrivingTags,
     SteeringRecord,
@@ -33,7 +42,7 @@ from solfer.components.wheeled_motion.tasks import DrivingTasks
 from solfer.components.wheeled_motion.wheels import DrivenWheels, moved_by
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
-from solfer.interfaces.support import BASE_PORT, VERTICES_PORT, LiftContacts, LiftReply
+from solfer.interfaces.support import BASE_PORT, VERTICES_PORT, LiftContacts, LiftReply, StepContact
 from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.numerics.planar_move import PlanarMove, about_z
 from solfer.robot import Robot
@@ -90,9 +99,20 @@ class WheeledMotion(Component):
         polygon = SupportPolygon(self.wheels.offsets.vertices, self.wheels.center, tags.support_margin)
         shift = WeightShift(self.references, self.wheels, self.joints)
         self._lifting = Lifting(
-            self.wheels, self.references, shift, polygon=polygon, holding=self.tasks.holding, margin=tags.lift_margin
+            self.wheels,
+            self.references,
+            shift,
+            polygon=polygon,
+            holding=self.tasks.holding,
+            stepping=Stepping(LegReach(self.wheels, moved), self._balance()),
+            margin=tags.lift_margin,
         )
         self._delay = ClockDelay()
+
+    def _balance(self) -> LoadBalance:
+        """Make what lets wheels on steps share the weight."""
+        rows = self.tasks.rows.get(CONSTRAINTS, slice(0))
+        return LoadBalance(self.wheels, self.references.lifted, self.tasks.rates.forward[rows])
 
     @property
     def drive(self) -> Drive:
@@ -215,7 +235,8 @@ class WheeledMotion(Component):
         step = self.time_step
         is_paced = self._pace.is_found
         self._take_over(self._set_step(step))
-        self._lifting.update(step)
+        if self._lifting.update(step):
+            self.targets.leave_vertices()
         self.received.leave_out()
         self._pace.advance(is_paced, self.joints.is_first, self._guard.is_held, self.pace, step)
         self._find_errors()
@@ -261,7 +282,7 @@ class WheeledMotion(Component):
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`: references of base and vertices stay where they are as seen from the robot."""
-        for part in (self.references, self.targets, self.drive, self._steering, self._lifting.shift, self.wheels):
+        for part in (self.references, self.targets, self.drive, self._steering, self._lifting, self.wheels):
             part.displace(move)
 
     def send(self) -> None:
@@ -304,7 +325,7 @@ class WheeledMotion(Component):
         )
 
     def services(self) -> tuple[Service, ...]:
-        """Offer the services `<name>/lift` and `<name>/get_reference`."""
+        """Offer the services `<name>/lift`, `<name>/step` and `<name>/get_reference`."""
         return (
             Service(
                 "lift",
@@ -312,6 +333,14 @@ class WheeledMotion(Component):
                 LiftContacts,
                 reply=LiftReply,
                 handler=self._lifting.lift,
+                timeout=Lifting.TIMEOUT,
+            ),
+            Service(
+                "step",
+                "solfer/StepContact",
+                StepContact,
+                reply=LiftReply,
+                handler=self._lifting.step,
                 timeout=Lifting.TIMEOUT,
             ),
             Service(

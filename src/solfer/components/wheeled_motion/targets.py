@@ -174,6 +174,11 @@ class Targets:
         """Let the base alone: something else drives it."""
         self._base = Stream()
 
+    def leave_vertices(self) -> None:
+        """Let the vertices alone: one stands elsewhere now."""
+        self._vertices = Stream()
+        self._age = math.inf
+
     def displace(self, move: PlanarMove) -> None:
         """Move with the base, whose estimate has jumped; vertices are seen from it, but for their heights."""
         move.move(self._places[0])

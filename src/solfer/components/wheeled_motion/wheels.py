@@ -8,6 +8,7 @@ from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, Ro
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, STEERING, TASK_POINTS, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
+from solfer.model.kinematics import Kinematics
 from solfer.numerics.planar_move import PlanarMove
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.robot import Robot
@@ -52,6 +53,16 @@ class DrivenWheels:
     def center(self) -> CenterOfMass:
         """Centre of mass, up to date with the points."""
         return self.points[TASK_POINTS[BASE]].center  # type: ignore[attr-defined]
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Kinematics of the robot."""
+        return self._robot.kinematics
+
+    @property
+    def position(self) -> np.ndarray:
+        """Position of the robot, shape (n,); live."""
+        return self._robot.state.position
 
     @property
     def is_whole(self) -> bool:

@@ -3,6 +3,16 @@
 from solfer.components.wheeled_motion.support.guard import MotionGuard, TaskRates
 from solfer.components.wheeled_motion.support.lifting import Lifting
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
+from solfer.components.wheeled_motion.support.step import LegReach, LoadBalance, Stepping
 from solfer.components.wheeled_motion.support.weight import WeightShift
 
-__all__ = ["Lifting", "MotionGuard", "SupportPolygon", "TaskRates", "WeightShift"]
+__all__ = [
+    "LegReach",
+    "Lifting",
+    "LoadBalance",
+    "MotionGuard",
+    "Stepping",
+    "SupportPolygon",
+    "TaskRates",
+    "WeightShift",
+]

@@ -60,9 +60,12 @@ class WeightShift:
         x, y = turned(self._references.heading, *self._shift.tolist())
         self.begin(-x, -y)
 
-    def end(self) -> None:
-        """Let vertices be desired where the return has left them."""
-        self._references.vertices[:, :2] += self._moved
+    def end(self, vertices: np.ndarray | None = None) -> None:
+        """Let vertices be desired where they were before, or where `vertices` are, shape (k, 3) [m]."""
+        if vertices is None:
+            self._references.vertices[:, :2] += self._moved
+        else:
+            self._references.vertices[:, :2] = vertices[:, :2]
         self.start()
 
     def keep_places(self, period: float) -> None:
