@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from viser._messages import RunJavascriptMessage
+
 from solfer.model.urdf.description import Description
 from solfer.transport import Middleware
 from solfer.transport.middleware import HealthReport
@@ -26,6 +28,22 @@ from solfer_tools.view.time_line import TimeLine
 
 if TYPE_CHECKING:
     from solfer_tools.view.foxglove_server import FoxgloveServer
+
+# On a phone viser's panel covers the right half of the picture. This puts it below the picture, as wide as the page;
+# viser gives its parts no names, so that they are found by their own styles (BottomPanel.tsx).
+_SHEET = """
+document.getElementById("solfer-sheet")?.remove();
+const sheet = document.createElement("style");
+sheet.id = "solfer-sheet";
+const panel = '[style*="min-height: 3.5em"]';
+sheet.textContent = `@media (max-width: 36em) {
+  div:has(> ${panel}) { flex-direction: column; }
+  div:has(> ${panel}) > div:not(${panel}) { width: 100%; height: 0 !important; }
+  ${panel} { position: relative !important; order: 1; flex: none; width: 100% !important; max-height: 52% !important; }
+  ${panel} [style="width: 20em;"] { width: 100% !important; }
+}`;
+document.head.appendChild(sheet);
+"""
 
 
 class Page:
@@ -64,6 +82,7 @@ class Page:
         gui = self._viser.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
         gui.main_panel.dock_right()  # beside the picture, not above it
+        server.send(RunJavascriptMessage(_SHEET))
         self._viser.initial_camera.position = CAMERA
         self._viser.initial_camera.look_at = TARGET
         self._viser.initial_camera.fov = self.FIELD_OF_VIEW
