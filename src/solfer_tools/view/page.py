@@ -82,11 +82,11 @@ class Page:
         gui = self._viser.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
         gui.main_panel.dock_right()  # beside the picture, not above it
-        server.send(RunJavascriptMessage(_SHEET))
         self._viser.initial_camera.position = CAMERA
         self._viser.initial_camera.look_at = TARGET
         self._viser.initial_camera.fov = self.FIELD_OF_VIEW
         self._status = StatusBar(server, description.name, simulation)
+        server.send(RunJavascriptMessage(_SHEET))
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description, ShownWorld(middleware))
         self._views = OwnViews(self._viser, self._requests)
