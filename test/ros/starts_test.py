@@ -140,6 +140,7 @@ class StartsTest(unittest.TestCase):
             (("go", "1,x"), ("'1,x', expected X,Y",)),
             (("go", "1,2", "--speed", "9"), ("a number from 0.001 to 5 [m/s]",)),
             (("go",), ("X,Y[,HEADING]",)),
+            (("go", "1,2", "--positions", "--velocities"), ("--velocities", "not allowed with", "--positions")),
         )
         for arguments, parts in cases:
             code, output = forked((*NAVIGATION, *arguments), {})

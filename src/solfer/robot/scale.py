@@ -27,6 +27,8 @@ class RobotScale:
         weight: Weight of all links [N].
         torque: Largest effort limit of a joint [Nm, N].
         wheel: Radius of its largest wheel, ring and tube [m].
+        tube: Radius of its thickest wheel's tube [m].
+        ring: Radius of its largest wheel's ring [m].
         rate: Rate of the control cycle [Hz].
     """
 
@@ -35,6 +37,8 @@ class RobotScale:
     weight: float = math.inf
     torque: float = math.inf
     wheel: float = math.inf
+    tube: float = math.inf
+    ring: float = math.inf
     rate: float = 0.0
 
     @classmethod
@@ -42,15 +46,15 @@ class RobotScale:
         """Measure a robot that has `contacts`, and a control cycle of `rate` [Hz]; zero: not known."""
         speeds = [joint.velocity for joint in description.moving_joints if joint.type != "prismatic"]
         efforts = [joint.effort for joint in description.moving_joints]
-        wheels: list[float | None] = [
-            (each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in contacts if each.type == "wheel"
-        ]
+        wheels = [each for each in contacts if each.type == "wheel"]
         return cls(
             span=max(_span(description), 1.0),  # a URDF does not know how long the last links are
             speed=_largest(speeds),
             weight=_largest([GRAVITY * sum(link.mass or 0.0 for link in description.links.values())]),
             torque=_largest(efforts),
-            wheel=_largest(wheels),
+            wheel=_largest([(each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in wheels]),
+            tube=_largest([each.minor_axis for each in wheels]),
+            ring=_largest([each.major_axis for each in wheels]),
             rate=rate,
         )
 
@@ -68,11 +72,13 @@ def _beside_default(number: WrittenNumber, unit: str) -> str:
     if number.default <= 0.0 or number.value <= 0.0 or (number.units and not unit) or number.compared == "nothing":
         return ""
     ratio = number.value / number.default
-    much, little = _SLIPS.get(unit, (_THOUSAND, 0.0))
+    # what has no unit, as weights and damping, may be as small as it likes
+    much, little = _SLIPS.get(unit, (_THOUSAND, _THOUSANDTH if unit else 0.0))
     if little < ratio < much:
         return ""
     other = _OTHER_UNITS.get(unit)
-    meant = f"; {number.value:g} {other[0]} are {other[1] * number.value:.4g} {unit}" if other else ""
+    is_nearer = other is not None and (other[1] > 1.0) == (ratio < 1.0)
+    meant = f"; {number.value:g} {other[0]} are {other[1] * number.value:.4g} {unit}" if other and is_nearer else ""
     written = f"{number.value:g} {unit}".rstrip()
     usual = f"{number.default:g} {unit}".rstrip()
     return f"{written} is {ratio:.4g} times the default, {usual}{meant}"
@@ -129,9 +135,25 @@ def _wheel(scale: RobotScale, value: float) -> str:
 
 
 def _radius(scale: RobotScale, value: float) -> str:
-    if math.isinf(scale.wheel) or 3.0 * value >= scale.wheel:
+    return _part_of_wheel(scale, value, scale.wheel, what="radius")
+
+
+def _tube(scale: RobotScale, value: float) -> str:
+    return _part_of_wheel(scale, value, scale.tube, what="tube")
+
+
+def _ring(scale: RobotScale, value: float) -> str:
+    return _part_of_wheel(scale, value, scale.ring, what="ring")
+
+
+def _part_of_wheel(scale: RobotScale, value: float, expected: float, what: str) -> str:
+    """Compare a length with the one of the robot's wheels, if that is known, or with the wheels [m]."""
+    if math.isinf(expected):
         return _wheel(scale, value)
-    return f"{value:g} m, and the robot's wheels have a radius of {scale.wheel:.3g} m"
+    if value <= 3.0 * expected <= 9.0 * value:
+        return ""
+    meant = f"; {_smaller(value)}" if value > expected else ""
+    return f"{value:g} m, and the robot's wheels have a {what} of {expected:.3g} m{meant}"
 
 
 def _distance(_: RobotScale, value: float) -> str:
@@ -239,11 +261,11 @@ def _slope(_: RobotScale, value: float) -> str:
 
 
 _THOUSAND = 1000.0  # of who writes thousandths of a unit
+_THOUSANDTH = 1.001 / _THOUSAND  # rounded up
 _SLIPS: dict[str, tuple[float, float]] = {
-    "m": (_THOUSAND, 1.001 / _THOUSAND),
     "deg": (_THOUSAND, 1.0 / 30.0),  # of who writes radians
-    "rad/s": (30.0, 0.0),  # of who writes degrees
-    "rad/s2": (30.0, 0.0),
+    "rad/s": (30.0, _THOUSANDTH),  # of who writes degrees
+    "rad/s2": (30.0, _THOUSANDTH),
     "s": (100.0, 0.0),
 }
 """How many times the default of its field a number hardly is, by its unit: from, and up to."""
@@ -260,6 +282,8 @@ _RULES: dict[tuple[str, str], Rule] = {
     ("m", ""): _length,
     ("m", "wheel"): _wheel,
     ("m", "radius"): _radius,
+    ("m", "tube"): _tube,
+    ("m", "ring"): _ring,
     ("m", "world"): _distance,
     ("rad/s", ""): _joint_speed,
     ("deg/s", ""): _degrees_a_second,

@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from viser._messages import RunJavascriptMessage
+
 from solfer.model.urdf.description import Description
 from solfer.transport import Middleware
 from solfer.transport.middleware import HealthReport
@@ -26,6 +28,22 @@ from solfer_tools.view.time_line import TimeLine
 
 if TYPE_CHECKING:
     from solfer_tools.view.foxglove_server import FoxgloveServer
+
+# On a phone viser's panel covers the right half of the picture. This puts it below the picture, as wide as the page;
+# viser gives its parts no names, so that they are found by their own styles (BottomPanel.tsx).
+_SHEET = """
+document.getElementById("solfer-sheet")?.remove();
+const sheet = document.createElement("style");
+sheet.id = "solfer-sheet";
+const panel = '[style*="min-height: 3.5em"]';
+sheet.textContent = `@media (max-width: 36em) {
+  div:has(> ${panel}) { flex-direction: column; }
+  div:has(> ${panel}) > div:not(${panel}) { width: 100%; height: 0 !important; }
+  ${panel} { position: relative !important; order: 1; flex: none; width: 100% !important; max-height: 52% !important; }
+  ${panel} [style="width: 20em;"] { width: 100% !important; }
+}`;
+document.head.appendChild(sheet);
+"""
 
 
 class Page:
@@ -68,6 +86,7 @@ class Page:
         self._viser.initial_camera.look_at = TARGET
         self._viser.initial_camera.fov = self.FIELD_OF_VIEW
         self._status = StatusBar(server, description.name, simulation)
+        server.send(RunJavascriptMessage(_SHEET))
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description, ShownWorld(middleware))
         self._views = OwnViews(self._viser, self._requests)

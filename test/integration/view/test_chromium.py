@@ -1,14 +1,8 @@
 """A person at the page: Debian's Chromium, by its mouse, on CENTAURO in lock-step with it."""
 
-import base64
-import itertools
-import json
 import os
-import shutil
-import subprocess
 import time
-import urllib.request
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +10,8 @@ import pytest
 
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
+from support.chromium import CHROMIUM, browser, element  # noqa: E402
 from support.page import view  # noqa: E402
-from websockets.sync.client import connect  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.robot.description.shipped import robot_of  # noqa: E402
@@ -25,9 +19,6 @@ from solfer_tools.scene import LiveScene  # noqa: E402
 from solfer_tools.study import SimulatedRun, read_study  # noqa: E402
 from solfer_tools.view import Page, PageServer  # noqa: E402
 from solfer_tools.view.commands.own_view import CAMERA, TARGET  # noqa: E402
-
-CHROMIUM = shutil.which("chromium")
-FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 pytestmark = [pytest.mark.soak, pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")]
 
@@ -53,104 +44,6 @@ document.getElementById('solfer-banner').style.visibility = 'hidden';
 
 HAND = "arm1_7"
 GAIN = "stack.tasks.left.gain"
-
-
-def element(text):
-    """Return the script of the innermost element with a text."""
-    return f"[...document.querySelectorAll('*')].filter(e => e.textContent.trim() === {json.dumps(text)}).at(-1)"
-
-
-class Browser:
-    """One page."""
-
-    def __init__(self, address):
-        self._connection = connect(address, max_size=None, origin=None)
-        self._numbers = itertools.count(1)
-        self._place = (0.0, 0.0)
-
-    def ask(self, method, **parameters):
-        """Send a command, and return its result."""
-        number = next(self._numbers)
-        self._connection.send(json.dumps({"id": number, "method": method, "params": parameters}))
-        while True:
-            answer = json.loads(self._connection.recv(timeout=60.0))
-            if answer.get("id") == number:
-                return answer["result"]
-
-    def evaluate(self, script):
-        """Return the value of an expression on the page."""
-        return self.ask("Runtime.evaluate", expression=script, returnByValue=True)["result"].get("value")
-
-    def wait(self, script, patience=40.0):
-        """Wait until an expression is true."""
-        end = time.monotonic() + patience
-        while not self.evaluate(script):
-            assert time.monotonic() < end, f"{script}\n{self.evaluate('document.body.innerText')}"
-            time.sleep(0.2)
-
-    def click(self, text):
-        """Click on what has a text."""
-        self.wait(f"!!{element(text)}")
-        with self.pressed(self.place(element(text))):
-            pass
-
-    def mouse(self, kind, place, pressed=True):
-        """Let the mouse do something at a pixel: `mouseMoved`, `mousePressed` or `mouseReleased`."""
-        self._place = x, y = place
-        button = "left" if pressed else "none"
-        clicks = int(pressed)
-        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=clicks, clickCount=clicks)
-
-    @contextmanager
-    def pressed(self, place):
-        """Keep the mouse's button pressed, from a pixel on to where it has moved."""
-        self.mouse("mousePressed", place)
-        try:
-            yield
-        finally:
-            self.mouse("mouseReleased", self._place)
-
-    def key(self, key):
-        """Press a key that is named as in the browser, and release it."""
-        for kind in ("keyDown", "keyUp"):
-            self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key)
-
-    def place(self, script):
-        """Return the pixel in the middle of an element, scrolled into sight; `script` is an expression of it."""
-        self.evaluate(f"{script}.scrollIntoView({{block: 'center'}})")
-        return self.evaluate(f"(r => [r.x + r.width / 2, r.y + r.height / 2])({script}.getBoundingClientRect())")
-
-    def picture(self, path):
-        """Write what is seen as PNG."""
-        path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"]))
-
-
-@contextmanager
-def browser(folder, address):
-    """Open a page."""
-    command = [
-        CHROMIUM,
-        *FLAGS,
-        "--remote-debugging-port=0",
-        f"--user-data-dir={folder}",
-        "--window-size=1280,800",
-    ]
-    with subprocess.Popen([*command, address], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
-        try:
-            port = _port(folder / "DevToolsActivePort")
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=20.0) as answer:
-                pages = [each for each in json.load(answer) if each["type"] == "page"]
-            yield Browser(pages[0]["webSocketDebuggerUrl"])
-        finally:
-            process.terminate()
-
-
-def _port(file):
-    end = time.monotonic() + 30.0
-    while not file.exists() or not file.read_text().strip():
-        assert time.monotonic() < end, "Chromium does not start"
-        time.sleep(0.1)
-    return int(file.read_text().split()[0])
 
 
 class Shown:

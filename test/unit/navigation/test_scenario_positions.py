@@ -225,26 +225,58 @@ def go(bus, *waypoints, **options):
     return Navigation(middleware, course, "navigation", RATE)
 
 
+@pytest.mark.parametrize("options", [{}, {"positions": True}])
 @pytest.mark.parametrize("topic", ["locomotion/base", "locomotion/base/reference"])
-def test_way_points_are_positions_where_these_are_received(bus, topic):
+def test_way_points_are_positions_where_these_are_received(bus, topic, options):
     """From the target's own reference on: a base that has a heading, and one of a task, go where they are sent."""
+    velocities = MemoryMiddleware(bus, "driver").reader("locomotion/cmd_vel", "geometry_msgs/Twist")
     base = GuidedBase(bus, heading=0.7, topic=topic)
-    drive(bus, go(bus, (1.5, 0.4), (1.2, 0.9, -0.5), positions=True))
-    assert base.received
+    drive(bus, go(bus, (1.5, 0.4), (1.2, 0.9, -0.5), **options))
+    assert base.received and not velocities.read()
     np.testing.assert_allclose(base.pose, (1.2, 0.9, 0.9, -0.5), atol=0.012)
 
 
-def test_velocities_wait_for_a_target_that_receives_positions_first(bus):
-    """Its topics begin one after the other: a target that starts must not be taken for one without velocities."""
+def test_way_points_wait_for_wheels_that_turn_first(bus):
+    """At a pace of zero the place stays; it is ahead by what shows the direction, and not past the goal later."""
     base = GuidedBase(bus)
-    navigation = go(bus, (2.0, 0.0))
+    base.pace = lambda: 0.0 if bus.time < 6.0 else 1.0
+    furthest = 0.0
+
+    def watch():
+        nonlocal furthest
+        furthest = max(furthest, base.pose[0])
+
+    bus.every(PERIOD, watch)
+    drive(bus, go(bus, (1.0, 0.0)))
+    assert furthest < 1.012
+    np.testing.assert_allclose(base.pose, (1.0, 0.0, 0.9, 0.0), atol=0.012)
+
+
+@pytest.mark.parametrize("first", ["positions", "velocities"])
+def test_velocities_are_for_a_target_without_positions(bus, first):
+    """Topics of a target begin one after the other: which comes first does not matter, what is asked for does."""
+    options = {"positions": False} if first == "positions" else {}
+    base = GuidedBase(bus, topic="locomotion/base" if first == "positions" else "elsewhere")
+    navigation = go(bus, (2.0, 0.0), **options)
     velocities = None
     for count in range(int(4 * RATE)):
-        if count == int(2 * RATE):
+        if count == (int(2 * RATE) if first == "positions" else 0):
             velocities = MemoryMiddleware(bus, "driver").reader("locomotion/cmd_vel", "geometry_msgs/Twist")
         bus.run_until(bus.time + 1.0 / RATE)
         navigation.cycle()
     assert velocities.read() and velocities.message.fields["linear"]["x"] > 0.1 and not base.received
+
+
+def test_positions_that_come_after_velocities_are_preferred(bus):
+    MemoryMiddleware(bus, "driver").reader("locomotion/cmd_vel", "geometry_msgs/Twist")
+    navigation = go(bus, (1.0, 0.0))
+    base = None
+    for count in range(int(3 * RATE)):
+        if count == int(0.4 * RATE):
+            base = GuidedBase(bus)
+        bus.run_until(bus.time + 1.0 / RATE)
+        navigation.cycle()
+    assert base.received
 
 
 def test_a_target_of_neither_is_one_error(bus):

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from solfer.components.odometry.tags import OdometryTags
+from solfer.components.wheeled_motion.tags import WheeledMotionTags
 from solfer.config import Problems, load, read
 from solfer.robot.description.shipped import RobotFiles, robot_files
 from solfer.robot.plausibility import check_plausibility
@@ -78,3 +79,24 @@ def test_a_radius_is_compared_with_the_wheels(repository, tmp_path, tags, printe
     (tmp_path / "tags.yaml").write_text(tags)
     record = read(tmp_path / "tags.yaml", OdometryTags)
     assert warned(load(repository / "config/centauro.yaml", "joint_states"), None, record) == printed
+
+
+@pytest.mark.parametrize(
+    "tag, printed",
+    [
+        ("minor_axis: 0.0068", ["minor_axis: 0.0068 m, and the robot's wheels have a tube of 0.068 m"]),
+        ("minor_axis: 0.03", []),
+        (
+            "major_axis: 0.1",
+            [
+                "major_axis: 0.1 m, and the robot's wheels have a ring of 0.01 m; "
+                "0.1 mm are 0.0001 m, 0.1 cm are 0.001 m"
+            ],
+        ),
+        ("major_axis: 0.001", ["major_axis: 0.001 m, and the robot's wheels have a ring of 0.01 m"]),
+    ],
+)
+def test_parts_of_wheels_are_compared_with_theirs(repository, tmp_path, tag, printed):
+    (tmp_path / "tags.yaml").write_text(f"{{track: all, IK: [CONSTRAINTS, BASE, STEERING], {tag}}}")
+    record = read(tmp_path / "tags.yaml", WheeledMotionTags)
+    assert warned(load(repository / "config/centauro.yaml", "wheeled_motion"), None, record) == printed

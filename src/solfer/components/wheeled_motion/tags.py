@@ -78,10 +78,10 @@ class DrivingTags(OriginalTaskTags):
     base: Literal["link", "center_of_mass"] = Field(
         default="link", description="what x and y of the task `BASE` are those of: the base's link, or the whole robot"
     )
-    minor_axis: Annotated[float | None, ComparedWith("wheel")] = Field(
+    minor_axis: Annotated[float | None, ComparedWith("tube")] = Field(
         default=None, **LENGTH, description="radius of a wheel's tube [m]; left out: as of its contact"
     )
-    major_axis: Annotated[float | None, ComparedWith("wheel")] = Field(
+    major_axis: Annotated[float | None, ComparedWith("ring")] = Field(
         default=None, ge=0.0, le=LENGTH["le"], description="radius of a wheel's ring [m]; left out: as of its contact"
     )
     reference_axis: dict[str, AxisRecord] = Field(

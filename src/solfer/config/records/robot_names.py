@@ -31,11 +31,11 @@ class ComparedWith:
     its joints, gains and times with the control cycle.
 
     Attributes:
-        size: `wheel`: the robot's wheels, of which it may be a part; `radius`: their whole radius; `world`: distances
-            that robots cover; `nothing`: any number can be meant.
+        size: `wheel`: the robot's wheels, of which it may be a part; `radius`: their whole radius; `tube`, `ring`: the
+            radius of that part; `world`: distances that robots cover; `nothing`: any number can be meant.
     """
 
-    size: Literal["wheel", "radius", "world", "nothing"]
+    size: Literal["wheel", "radius", "tube", "ring", "world", "nothing"]
 
 
 def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:

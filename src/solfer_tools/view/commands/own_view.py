@@ -118,10 +118,8 @@ class _OwnView:
         turn = np.array(((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0)))
         camera, target = (np.array(each) for each in VIEWS[name])
         width, height = self._client.camera.image_width, self._client.camera.image_height
-        if 0 < width < 0.65 * height:  # a phone: farther away, and above the panel, which covers its lower half
-            away = 0.65 * height / width * (camera - target)
-            target = target - (0.0, 0.0, 0.18 * np.linalg.norm(away))
-            camera = target + away
+        if 0 < width < 0.65 * height:  # a narrow picture: farther away, so that the robot is in it
+            camera = target + 0.65 * height / width * (camera - target)
         place, aim = (tuple((turn @ each + (*self._base.position[:2], 0.0)).tolist()) for each in (camera, target))
         self._send(SetCameraPositionMessage(place))
         self._send(SetCameraLookAtMessage(aim))
