@@ -80,7 +80,7 @@ class RosControlTest(unittest.TestCase):
         return request
 
     def moves(self, goal: float, reached: Callable[[float], bool]) -> None:
-        """Move the joint of the page until its position is `reached`; asks again where a pause of the machine ends it."""
+        """Move the joint of the page until its position is `reached`; asks again after a pause that ended it."""
         (joint,) = self.ask(self.requests[0], positions=[goal], speed=1.0)["joints"]
         begin = len(self.logged)
 
