@@ -17,7 +17,7 @@ from pathlib import Path
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
-from system import CENTAURO, SOAKS, START, end, program, started, wait_for
+from system import CENTAURO, SOAKS, START, program, started, wait_for
 
 FIGURE = CENTAURO.parent / "figures" / "figure_5.yaml"
 NAMESPACE = f"orders-{os.getpid()}"
@@ -63,7 +63,7 @@ class OrdersTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("orders_test")
+        rospy.init_node("tests")
 
     def tearDown(self):
         shutil.rmtree(Path("/dev/shm") / f"solfer-{NAMESPACE}", ignore_errors=True)
@@ -111,18 +111,6 @@ class OrdersTest(unittest.TestCase):
         for programs in (ROS, LAYER) if SOAKS else (drawing().choice((ROS, LAYER)),):
             for order in drawn(programs, 12 if SOAKS else 1):
                 self.drives(programs, order)
-
-    def test_a_killed_simulators_parameters_are_not_taken(self):
-        with started(*ROS["simulator"]):
-            wait_for(lambda: rospy.has_param("/robot_description"), START, "a robot")
-        self.assertTrue(rospy.has_param("/robot_description"))
-        with started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO))) as process:
-            line = ""
-            while "waits for the robot: no parameter '/robot_description'" not in line:
-                line = process.stdout.readline()
-                self.assertTrue(line, "the plugin has ended")
-            code, output = end(process, signal.SIGINT)
-        self.assertEqual(code, 0, output)
 
 
 if __name__ == "__main__":

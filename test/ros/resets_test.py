@@ -11,7 +11,7 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PointStamped
-from system import START, Robot, end, insist, numbers, program, soak, started, wait_for, wait_for_plugin
+from system import CENTAURO, START, Robot, end, insist, numbers, program, soak, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 from solfer.srv import ResetSimulation
@@ -41,7 +41,7 @@ class ResetsTest(unittest.TestCase):
         cls.addClassCleanup(rospy.set_param, "/use_sim_time", False)
         stack = contextlib.ExitStack()
         cls.addClassCleanup(stack.close)
-        rospy.init_node("resets_test")
+        rospy.init_node("tests")
         cls.simulator = stack.enter_context(started(*SIMULATOR))
         cls.started = stack.enter_context
         cls.events, cls.commands = [], []
@@ -126,7 +126,7 @@ class ResetsTest(unittest.TestCase):
         published, resets = self.begin()
         self.simulator.kill()
         self.simulator.wait(START)
-        self.started(started(*SIMULATOR))
+        successor = self.started(started(*SIMULATOR))
         before, after = self.listen(resets + 1)
         self.check(before, after)
         self.assertLess(after[0, 0], before[-1, 0])
@@ -139,6 +139,21 @@ class ResetsTest(unittest.TestCase):
         code, output = end(self.plugin, signal.SIGTERM)
         self.assertEqual(code, 0, output)
         self.assertNotIn("Traceback", output)
+        successor.kill()
+        successor.wait(START)
+        self.check_that_a_killed_simulators_parameters_are_not_taken()
+
+    def check_that_a_killed_simulators_parameters_are_not_taken(self) -> None:
+        """Start a plugin where they are left: it waits for a robot, and ends when it is asked to."""
+        rospy.set_param("/use_sim_time", False)  # it would wait for the time first
+        self.assertTrue(rospy.has_param("/robot_description"))
+        with started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO))) as process:
+            line = ""
+            while "waits for the robot: no parameter '/robot_description'" not in line:
+                line = process.stdout.readline()
+                self.assertTrue(line, "the plugin has ended")
+            code, output = end(process, signal.SIGINT)
+        self.assertEqual(code, 0, output)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ class StopsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("stops_test")
+        rospy.init_node("tests")
 
     def check(self, make: Callable[[Path], System], faults: Iterable[Fault]) -> None:
         """Break processes of a system, one after the other."""

@@ -37,7 +37,7 @@ class TwoRobotsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("two_robots_test")
+        rospy.init_node("tests")
         cls.places, cls.frames = {}, {}
         for topic in ("/tf", "/tf_static"):
             rospy.Subscriber(topic, TFMessage, cls.keep_frames, queue_size=100)

@@ -13,7 +13,7 @@ from solfer.plugins import PluginSet, PluginState, Registry, generate_shared
 from solfer.transport.messages import FieldsMessage
 
 LISTED = ["upper_body_ik", "odometry", "ground_forces", "gravity_compensation", "wheeled_motion"]
-DURATION, SPEED, LIFT = 10.0, 0.1, 0.1
+DURATION, SPEED, LIFT = 5.0, 0.1, 0.1
 """Time of driving [s], its speed [m/s], and the way of a hand upwards [m]."""
 
 
@@ -63,7 +63,7 @@ def test_listing_17_drives_and_moves_a_hand(kind, tmp_path):
             state.write(FieldsMessage({"x": SPEED, "y": 0.0, "z": 0.0, "rz": 0.0, "cs": (), "cm": ()}))
             world.run(0.02)
         way = world.simulation.state.now.position("pelvis") - begin
-        assert way[0] == pytest.approx(SPEED * DURATION, abs=0.05) and abs(way[1]) < 0.02
+        assert way[0] == pytest.approx(SPEED * DURATION, rel=0.05) and abs(way[1]) < 0.01
         np.testing.assert_allclose(world.footprint(), footprint, atol=0.02)
         np.testing.assert_allclose(world.hands()["left"] - hand, [0.0, 0.0, LIFT], atol=0.02)
         assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}

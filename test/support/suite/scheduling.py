@@ -2,7 +2,9 @@
 
 from xdist.scheduler import LoadFileScheduling
 
-UNHURRIED = frozenset(("figure_4", "figure_5", "inverse_kinematics", "lockstep", "nodes", "robot", "wheeled_motion"))
+UNHURRIED = frozenset(
+    ("figure_4", "figure_5", "inverse_kinematics", "lockstep", "nodes", "robot", "table_1", "wheeled_motion")
+)
 """Rostests that may run beside others: their simulation waits for its plugins, all go by its time, or there is none."""
 
 

@@ -29,6 +29,20 @@ for command in sys.argv[1:]:
 """
 """A program that prints the help of all commands."""
 
+WITHOUT_DOCSTRINGS = """
+from importlib.machinery import SourceFileLoader
+
+usual = SourceFileLoader.get_code
+
+def get_code(self, name):
+    if name.partition(".")[0] not in ("solfer", "solfer_tools"):
+        return usual(self, name)
+    return compile(self.get_data(self.path), self.path, "exec", dont_inherit=True, optimize=2)
+
+SourceFileLoader.get_code = get_code
+"""
+"""A `sitecustomize` with which our modules are those of `python -OO`; that flag compiles all that they import anew."""
+
 
 def run(words, redirection="", **environment):
     """Run the command in a shell; returns its exit code and what it wrote to stderr."""
@@ -59,8 +73,16 @@ def test_streams_that_cannot_be_written_to(words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("environment", [ASCII, {"PYTHONOPTIMIZE": "2"}], ids=["ascii", "optimized"])
+@pytest.mark.parametrize(
+    "environment",
+    [ASCII, {}, pytest.param({"PYTHONOPTIMIZE": "2"}, marks=pytest.mark.soak)],
+    ids=["ascii", "without docstrings", "optimized"],
+)
 def test_a_terminal_of_ascii_and_a_python_without_docstrings(tmp_path, environment):
+    """With docstrings of others in a test of every day; `PYTHONOPTIMIZE` itself first compiles numba for 20 s."""
+    if not environment:
+        (tmp_path / "sitecustomize.py").write_text(WITHOUT_DOCSTRINGS)
+        environment = {"PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}
     helped = subprocess.run(
         [sys.executable, "-c", HELPS, *ALL_COMMANDS],
         capture_output=True,
