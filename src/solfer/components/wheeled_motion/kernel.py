@@ -468,6 +468,10 @@ def _find_rates(start, is_paced, feeds_forward):
     rates = block.rates
     for k in range(block.rows):
         rates[k] = block.gain[k] * block.error[k]
+    if block.of_base >= 0 and block.lifted.any():
+        # on three wheels and springs the robot rocks, which faster corrections of its place would amplify
+        for k in range(block.of_base + 3, block.of_base + 6):
+            rates[k] *= 0.25
     if is_paced:
         away = block.away
         period = block.law[0].period

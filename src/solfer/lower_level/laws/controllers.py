@@ -254,7 +254,7 @@ class ImpedanceController(LowerLevelController):
             ramp.begin(self.default_gains[field], 0.0)
 
     def resume(self, joint: int, position: float) -> None:
-        """See `LowerLevelController.resume`: `CatchUp` leads its target to the command, in the revolution of the joint."""
+        """See `LowerLevelController.resume`; `CatchUp` leads its target to the command, in the joint's revolution."""
         ahead = self.position[joint] - position
         ahead -= whole_revolutions(ahead, self._revolutions[joint])
         self.position[joint] = position + ahead

@@ -17,7 +17,6 @@ from solfer.interfaces.support import LiftContacts, LiftReply, StepContact
 from solfer.numerics.planar_move import PlanarMove
 from solfer.points.contact.contacts import Contact
 
-
 SWAY = 0.03
 """What a robot on three wheels sways while a wheel swings [m]."""
 
@@ -313,7 +312,9 @@ class Lifting:
                 speed = speed_limit if height > 0.02 else near_speed
                 if self._stepping.step is not None:
                     speed = self._stepping.step.descend(speed, self._period)
-                references.vertex_velocity[index, 2] = -speed if feels else -min(speed, (height - lowest) / self._period)
+                references.vertex_velocity[index, 2] = (
+                    -speed if feels else -min(speed, (height - lowest) / self._period)
+                )
                 continue
             else:
                 lost = f"no ground below '{self._wheels.contacts[index].name}'"

@@ -164,11 +164,13 @@ class LegReach:
         """Yield what is on the way, and how far from the begin it is in the world, shape (3,) [m]."""
         heading = self._wheels.offsets.heading
         x, y, z = step.displacement.tolist()
-        across = np.array((
-            math.cos(heading) * x - math.sin(heading) * y,
-            math.sin(heading) * x + math.cos(heading) * y,
-            0.0,
-        ))
+        across = np.array(
+            (
+                math.cos(heading) * x - math.sin(heading) * y,
+                math.sin(heading) * x + math.cos(heading) * y,
+                0.0,
+            )
+        )
         up = np.array((0.0, 0.0, 1.0))
         top = (max(z, 0.0) + step.clearance) * up
         yield "the height of its way", top
