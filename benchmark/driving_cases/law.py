@@ -255,6 +255,8 @@ class WheeledLaw:
         """Return the rates of all tasks: K e, bounded with a pace, and at the pace the desired ones."""
         tags, rows, rates = self._tags, self._rows, self._gain * error
         is_paced, steer = tags.is_paced, rows["STEERING"]
+        if references.lifted.any():
+            rates[rows["BASE"]][3:] *= 0.25
         if is_paced:
             base = np.repeat((tags.turn_correction, tags.correction), 3)
             for name, most in (("BASE", base), ("CONTACT_POINTS", tags.vertex_speed)):

@@ -86,6 +86,8 @@ ELSEWHERE = {
         "rosrun solfer navigation reference",
     ),
     r"rosrun solfer navigation reference .*": ("test/ros/inverse_kinematics_test.py", "navigation reference"),
+    r"roslaunch solfer wheeled_motion.launch name:=stepping": ("test/ros/stepping.test", "stepping"),
+    r"rosservice call /stepping/step .*": ("test/ros/stepping_test.py", "wheeled_motion.md"),
     r"roslaunch solfer wheeled_motion.launch": ("test/ros/wheeled_motion.test", "wheeled_motion.launch"),
     r"rostopic pub -r 10 /wheeled_motion/cmd_vel .*": ("test/ros/wheeled_motion_test.py", "wheeled_motion.md"),
     r"roslaunch solfer ground_forces.launch": ("test/ros/ground_forces.test", "ground_forces.launch"),

@@ -14,7 +14,7 @@ MODULES = (
     "compliance_compensation", "odometry", "ground_forces", "gravity_forces",
     "inverse_kinematics", "desired_tasks", "inverse_dynamics", "squat", "squat_estimated", "squat_offline",
     "manipulation", "drawing", "upper_body_ik", "wheeled_motion",
-    "driving", "support_shaping", "hands", "locomotion", "full_compensation",
+    "driving", "stepping", "support_shaping", "hands", "locomotion", "full_compensation",
 )  # fmt: skip
 ROBOTS = {"default", "base_velocity", "force_test", "reference", "odometry", "joint_space", "simulated", "empty"}
 """The robot configurations of the original program."""
