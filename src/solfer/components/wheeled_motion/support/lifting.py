@@ -294,24 +294,22 @@ class Lifting:
         lost = ""
         speed_limit = 0.06  # [m/s]
         near_speed = 0.02  # [m/s] within 2 cm of the ground
-        felt = 0.15
-        lowest = 0.0 if self._stepping.step is None else -0.04  # [m] of the ground, where nothing feels it
+        step = self._stepping.step
+        lowest = 0.0 if step is None else -0.04  # [m] of the ground, where nothing feels it
         for index in list(self._requested):
             height = float(references.vertices[index, 2]) - self._plane(index) - self._ground[index]
-            force = float(forces[index]) * len(forces)
-            pushed = force > felt * float(forces.sum()) if feels else height < 1e-4
-            if self._stepping.step is None:
-                stands = pushed
-            elif feels:
-                stands = self._stepping.step.holds(pushed, self._period)
-            else:
-                stands = self._stepping.step.feels(-float(self._wheels.offsets.errors[index, 2]), height, self._period)
+            # the ground is felt by 15 % of the mean force of the wheels
+            stands = forces[index] > 0.15 * float(forces.mean()) if feels else height < 1e-4
+            if step is not None and feels:
+                stands = step.holds(stands, self._period)
+            elif step is not None:
+                stands = step.feels(-float(self._wheels.offsets.errors[index, 2]), height, self._period)
             if stands:
                 self._release(index, False)
             elif height > -0.03:  # [m] below where the ground was
                 speed = speed_limit if height > 0.02 else near_speed
-                if self._stepping.step is not None:
-                    speed = self._stepping.step.descend(speed, self._period)
+                if step is not None:
+                    speed = step.descend(speed, self._period)
                 references.vertex_velocity[index, 2] = (
                     -speed if feels else -min(speed, (height - lowest) / self._period)
                 )
@@ -319,16 +317,16 @@ class Lifting:
             else:
                 lost = f"no ground below '{self._wheels.contacts[index].name}'"
             self._requested.remove(index)
-        if lost and self._stepping.step is not None and not self._stepping.step.failure:
-            self._turn_back(self._stepping.step, lost)
-        elif lost or not self._requested:
-            has_stepped = self._stepping.step is not None
-            if references.lifted.any():
-                self._end(lost)
-            else:
-                self._go_back()
-            return has_stepped
-        return False
+        if lost and step is not None and not step.failure:
+            self._turn_back(step, lost)
+            return False
+        if self._requested and not lost:
+            return False
+        if references.lifted.any():
+            self._end(lost)
+        else:
+            self._go_back()
+        return step is not None
 
     def _plane(self, index: int) -> float:
         """Return the height of the plane of the carrying wheels at another one [m]: the robot yields, and tilts."""
