@@ -1,6 +1,7 @@
 """The component `wheeled_motion` whose wheels step."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -92,6 +93,20 @@ def test_a_wheel_stands_where_it_has_stepped(stepping, wheel, place):
     rest = places(component)
     floor.run(200)
     assert_allclose(places(component), rest, atol=2e-3)
+
+
+@pytest.mark.parametrize(("height", "text"), [(0.04, "stands 0.03. m higher"), (-0.025, "stands 0.02. m lower")])
+def test_the_answer_says_where_a_wheel_stands_that_meets_other_ground(stepping, height, text):
+    component, floor, step = stepping
+    before = places(component)
+    ground = floor.heights[2]
+    answer = step(StepContact(LEGS[2], 0.1, 0.0, 0.0, 0.05))
+    while not answer.done():
+        is_there = math.hypot(*(places(component)[2] - before[2])[:2]) > 0.09
+        floor.heights[2] = ground + height if is_there else ground
+        floor.run()
+    assert answer.result().success and re.search(text, answer.result().message)
+    assert places(component)[2, 2] - before[2, 2] == pytest.approx(height, abs=0.01)
 
 
 @pytest.mark.parametrize(("height", "text"), [(-0.1, "no ground below 'rear_left_leg'"), (0.06, "in its way")])

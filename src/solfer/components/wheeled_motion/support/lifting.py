@@ -306,6 +306,8 @@ class Lifting:
                 stands = step.feels(-float(self._wheels.offsets.errors[index, 2]), height, self._period)
             if stands:
                 self._release(index, False)
+                if step is not None:
+                    step.higher = height
             elif height > -0.03:  # [m] below where the ground was
                 speed = speed_limit if height > 0.02 else near_speed
                 if step is not None:
@@ -376,8 +378,6 @@ class Lifting:
         self._stepping.step = None
         self._answers = []
         if step is not None:
-            name = self._wheels.contacts[step.index].name
-            back = f"'{name}' stands where it stood: {step.failure}" if step.failure else ""
-            step.answer.set_result(LiftReply(not (failure or back), failure or back))
+            step.answer.set_result(step.reply(self._wheels.contacts[step.index].name, failure))
         for answer in answers:
             answer.set_result(LiftReply(not failure, failure))

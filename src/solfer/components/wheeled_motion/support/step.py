@@ -32,6 +32,7 @@ class Step:
         failure: Why it goes back; empty: it does not.
         velocity: Velocity with which it swings, shape (3,) [m/s].
         held: For how long it has not come nearer, or stays above its reference [s].
+        higher: How much higher the ground was than expected [m].
     """
 
     index: int
@@ -43,11 +44,20 @@ class Step:
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     failure: str = ""
     held: float = 0.0
+    higher: float = 0.0
 
     @property
     def top(self) -> float:
         """Height on the way [m]."""
         return float(max(self.start[2], self.goal[2])) + self.clearance
+
+    def reply(self, name: str, failure: str) -> LiftReply:
+        """Make the answer for a wheel of this name: why it failed or went back, or where it stands."""
+        if failure or self.failure:
+            return LiftReply(False, failure or f"'{name}' stands where it stood: {self.failure}")
+        if abs(self.higher) < 0.02:  # [m]
+            return LiftReply()
+        return LiftReply(True, f"'{name}' stands {abs(self.higher):.3f} m {'higher' if self.higher > 0 else 'lower'}")
 
     def begin(self, vertex: np.ndarray) -> None:
         """Leave the ground at a vertex, shape (3,) [m]."""
