@@ -41,7 +41,7 @@ class SteppingTest(unittest.TestCase):
         self.assertLess(max(abs(y), abs(z)), 0.01)
         refused = rospy.ServiceProxy("/stepping/step", StepContact)(contact="rear_left_leg", up=0.6)
         self.assertFalse(refused.success)
-        self.assertIn("does not reach the height of its way", refused.message)
+        self.assertIn("does not reach the height of its path", refused.message)
         for there, here in zip(self.reference(task="vertices").values, after, strict=True):
             self.assertAlmostEqual(there, here, delta=0.002)
 

@@ -9,6 +9,7 @@ PACKAGES = Path(__file__).resolve().parents[2] / "src"
 CHANGED = {
     "solfer_tools/cli/allocations/meter.py": {"LineCost"},
     "solfer/components/trajectories/follower.py": {"_Course"},
+    "solfer/components/wheeled_motion/support/step.py": {"Step"},
     "solfer/components/wheeled_motion/targets.py": {"Stream"},
     "solfer/config/loading/check.py": {"CheckReport"},
     "solfer_tools/demo/record.py": {"Trace"},

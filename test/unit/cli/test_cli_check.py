@@ -119,7 +119,7 @@ def test_warnings_leave_the_exit_code_at_zero(copy, capsys):
 
 
 MAGNITUDES = [
-    ("minor_axis: 0.068 ", "minor_axis: 68 ", "wheeled_motion", "wheels have a radius of 0.078 m; 68 mm are 0.068 m"),
+    ("minor_axis: 0.068 ", "minor_axis: 68 ", "wheeled_motion", "wheels have a tube of 0.068 m; 68 mm are 0.068 m"),
     ("slip: 0.03 ", "slip: 30 ", "odometry", "30 cm/s are 0.3 m/s"),
     ("stall: 0.5 ", "stall: 500 ", "odometry", "500 ms are 0.5 s"),
     ("delay: 0.01}", "delay: 10}", "ground_forces", "10 s is 1000 times the default, 0.01 s"),

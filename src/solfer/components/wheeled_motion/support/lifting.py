@@ -255,7 +255,7 @@ class Lifting:
             self._fail(f"without {names} the centre of mass stays {math.hypot(x, y):.3f} m too near to an edge")
 
     def _swing(self) -> None:
-        """Let a wheel go to above its new place; something in its way turns it back."""
+        """Let a wheel go to above its new place; an obstacle turns it back."""
         step = self._stepping.step
         assert step is not None
         index = step.index

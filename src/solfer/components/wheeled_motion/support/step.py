@@ -25,7 +25,7 @@ class Step:
     Attributes:
         index: The wheel.
         displacement: To its new place, in the heading frame of the base, shape (3,) [m].
-        clearance: How far it is above both places on its way [m].
+        clearance: How far it is above both places on its path [m].
         answer: Gets the answer at the end.
         start: Where the wheel left the ground, in the frame of the vertices, shape (3,) [m].
         goal: Where it is to stand, likewise.
@@ -48,7 +48,7 @@ class Step:
 
     @property
     def top(self) -> float:
-        """Height on the way [m]."""
+        """Height of the path [m]."""
         return float(max(self.start[2], self.goal[2])) + self.clearance
 
     def reply(self, name: str, failure: str) -> LiftReply:
@@ -71,7 +71,7 @@ class Step:
         self.rest()
 
     def rest(self) -> None:
-        """Begin another part of the way at rest."""
+        """Begin another part of the path at rest."""
         self.velocity[:] = 0.0
         self.held = 0.0
 
@@ -125,7 +125,7 @@ def _braking(distance: float, speed: float, period: float) -> float:
 class LegReach:
     """Finds out whether legs reach where their wheels are to step, by joints alone, the base at rest.
 
-    Newton's method moves the joints of a leg within their bounds, so that its wheel comes to each place of the way and
+    Newton's method moves the joints of a leg within their bounds, so that its wheel comes to each place of the path and
     tilts as little as possible.
 
     Args:
@@ -139,7 +139,7 @@ class LegReach:
         self._legs = np.array(list(wheels.find_legs(moved).values()))
 
     def check(self, step: Step, position: np.ndarray, shift: tuple[float, float]) -> None:
-        """Check all of its way.
+        """Check all of its path.
 
         Args:
             step: The step.
@@ -171,7 +171,7 @@ class LegReach:
                 )
 
     def _places(self, step: Step) -> Iterator[tuple[str, np.ndarray]]:
-        """Yield what is on the way, and how far from the begin it is in the world, shape (3,) [m]."""
+        """Yield the places of the path, and how far from the begin it is in the world, shape (3,) [m]."""
         heading = self._wheels.offsets.heading
         x, y, z = step.displacement.tolist()
         across = np.array(
@@ -183,9 +183,9 @@ class LegReach:
         )
         up = np.array((0.0, 0.0, 1.0))
         top = (max(z, 0.0) + step.clearance) * up
-        yield "the height of its way", top
-        yield "half of its way", top + 0.5 * across
-        yield "the end of its way", top + across
+        yield "the height of its path", top
+        yield "half of its path", top + 0.5 * across
+        yield "the end of its path", top + across
         yield "its new place", z * up + across
 
     def _go(
@@ -284,7 +284,7 @@ def step_of(request: StepContact, index: int) -> Step:
 
     Raises:
         NotFinite: A number is not finite.
-        ComponentError: It is too long, or too low on its way.
+        ComponentError: It is too long, or too low on its path.
     """
     place = request.ahead, request.left, request.up
     if not all(map(math.isfinite, (*place, request.clearance))):
