@@ -86,9 +86,9 @@ class Lifting:
 
     def start(self) -> None:
         """Begin with what is lifted."""
-        self._stepping.start()
         self.shift.start()
         self.stop()
+        self._stepping.balance.rest()
 
     def stop(self) -> None:
         """Leave all as it is: what is in progress is not carried out."""

@@ -263,7 +263,7 @@ class Stepping:
     Attributes:
         reach, balance: As above.
         step: The step in progress; None: there is none.
-        is_uneven: Whether a wheel has stepped since the start.
+        is_uneven: Whether a wheel has stepped; also after a new start, which may be on a block.
     """
 
     def __init__(self, reach: LegReach, balance: LoadBalance):
@@ -271,12 +271,6 @@ class Stepping:
         self.balance = balance
         self.step: Step | None = None
         self.is_uneven = False
-
-    def start(self) -> None:
-        """Begin on level ground, without a step."""
-        self.step = None
-        self.is_uneven = False
-        self.balance.rest()
 
 
 def step_of(request: StepContact, index: int) -> Step:
