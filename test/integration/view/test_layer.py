@@ -40,6 +40,7 @@ executor: {{rate: 100, start: [joint_states], blend: 0.2}}
             latch = EmergencyStopLatch(layer.namespace.folder)
             page.until(lambda: latch.reason.startswith("by the page"), "the emergency stop")
             page.until(lambda: "emergency stop: by the page" in page.content, "the reason")
+            page.until(lambda: page.gui[page.find("clear the stop")]["visible"], "a way to clear it")
             page.click("clear the stop")
             page.until(lambda: "clear the stop now" in page.labels, "the question")
             page.click("clear the stop now")
