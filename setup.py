@@ -18,7 +18,10 @@ BY_CATKIN = __name__ != "__main__" or "CATKIN_BINARY_DIR" in os.environ
 
 manifest = ElementTree.parse("package.xml").getroot()
 packages, package_dir = find_packages("src"), {"": "src"}
-package_data = {"solfer_tools.cli": ["templates/*/*.in"]}
+package_data = {
+    "solfer_tools.cli": ["templates/*/*.in"],
+    "solfer.components.native": ["include/solfer/component.h*"],
+}
 options = {}
 if BY_CATKIN:
     options["install_scripts"] = {"no_ep": True}

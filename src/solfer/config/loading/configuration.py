@@ -1,5 +1,6 @@
 """The configuration of one plugin, in frozen records."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 from solfer.config.loading.effective import EffectiveValue, as_yaml, entries, pruned
 from solfer.config.records.calibration import CalibrationRecord
 from solfer.config.records.middlewares import MIDDLEWARES
-from solfer.config.records.modules import ContactsChoice, ModuleRecord, ReadRecord, RobotRecord
+from solfer.config.records.modules import ContactsChoice, ModuleRecord, ReadRecord, RobotRecord, placed_class
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord
 from solfer.config.records.record import Record, RecordType, field_names, parse
 from solfer.config.records.sources import MappingRecord, SourceRecord
@@ -135,7 +136,9 @@ class Part:
     def class_name(self) -> str | None:
         """The component that the module's `class` names."""
         node = self.module.get("class")
-        return node.value if node is not None and isinstance(node.value, str) else None
+        if node is None or not isinstance(node.value, str):
+            return None
+        return placed_class(node.value, os.path.dirname(node.mark.file))
 
     def assumed(self, rate: float) -> Configuration:
         """Return a configuration with stand-ins for what has mistakes; only `sources` may still be None.

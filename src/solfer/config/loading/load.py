@@ -8,7 +8,15 @@ from solfer.config.loading.configuration import Configuration, Part, common_tags
 from solfer.config.loading.layers import AS_CONFIGURED, Layers, ModulePlacement, location_of
 from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records, read_calibrations
 from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE, MIDDLEWARES
-from solfer.config.records.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotHead, RobotRecord, is_shared
+from solfer.config.records.modules import (
+    FeedbackChoice,
+    MainRecord,
+    ModuleRecord,
+    RobotHead,
+    RobotRecord,
+    is_shared,
+    placed_class,
+)
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import parse
 from solfer.config.records.sources import MappingRecord, SourceRecord, TextRecord
@@ -141,9 +149,10 @@ class Reading:
             self._problems.add(node.head, f"'{name}' lists plugins and is not one itself", "one of those that it lists")
             return None
         record = parse(common_tags(node), ModuleRecord, self._problems, beside=own_tags(node), name=name)
-        if record is None or class_name is None:
-            return record
-        return record.model_copy(update={"class_": class_name})
+        if record is None:
+            return None
+        target = class_name or record.class_
+        return record.model_copy(update={"class_": placed_class(target, record.folder("class"))})
 
     def _robot_head(self) -> RobotHead | None:
         node = self._tree.get("robot")

@@ -1,5 +1,6 @@
 """Records of a main configuration: its skeleton, robot configurations and modules."""
 
+import os
 from typing import Any, Literal
 
 from pydantic import Field, create_model
@@ -8,6 +9,7 @@ from solfer.config.records.bounds import COUNT, DURATION, RATE, TIMEOUT, Name
 from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareName
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord
+from solfer.config.yaml.files import located
 from solfer.config.yaml.nodes import YamlNode
 
 
@@ -88,7 +90,8 @@ class ModuleRecord(Record):
     class_: str | None = Field(
         default=None,
         alias="class",
-        description="component or generator, as `package.module:Class`; without it the plugin of `-p` counts",
+        description="component or generator, as `package.module:Class`, or `library.so::Class` of a compiled one; "
+        "without it the plugin of `-p` counts",
     )
     requires: tuple[Name, ...] = Field(
         default=(),
@@ -165,3 +168,11 @@ class RobotRecord(Record):
     feedback: FeedbackChoice = Field(default_factory=FeedbackChoice, description="feedback pipes: a set or a list")
     actuators: ReadRecord = Field(description="whether actuators are read")
     contacts: ContactsChoice = Field(description="whether contacts are read, and received")
+
+
+def placed_class(target: str | None, folder: str) -> str | None:
+    """Return the `class` of a module; a path to its library counts from `folder`, that of the configuration."""
+    library, separator, name = (target or "").partition("::")
+    if not separator or os.sep not in library:
+        return target
+    return f"{located(library, folder)}{separator}{name}"

@@ -1,4 +1,4 @@
-"""Finds components by name, or by `class: package.module:Class` in any package on the path."""
+"""Finds components by name, by `class: package.module:Class` in any package on the path, or by `library.so::Class`."""
 
 import importlib
 import inspect
@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from solfer.components import Component
+from solfer.components.native.library import SEPARATOR
 from solfer.config import Record
 from solfer.errors import ComponentError, UnknownName, located
 from solfer.plugins.generation.generator import Generator
@@ -118,7 +119,7 @@ class Registry:
 
         Args:
             name: Name of the plugin.
-            target: `package.module:Class` of the configuration; it takes precedence over the name.
+            target: `class` of the configuration; it takes precedence over the name.
             where: Place of the name or the class, for errors.
 
         Raises:
@@ -140,14 +141,21 @@ class Registry:
 
 
 def load_class(target: str, where: str = "") -> type:
-    """Import `package.module:Class`, a Component or a Generator.
+    """Import `package.module:Class`, a Component or a Generator, or load `library.so::Class`.
 
     Raises:
-        ComponentError: It cannot be imported, or is something else.
+        ComponentError: It cannot be imported or loaded, or is something else.
+        UnknownName: There is no such library, or no such class in it.
     """
+    if SEPARATOR in target:
+        from solfer.components.native.component import load_native  # ctypes, for those who have libraries
+
+        return load_native(target, where)
     module_name, colon, class_name = target.partition(":")
     if not (colon and module_name and class_name.isidentifier()):
-        raise ComponentError(f"'{target}' is not the name of a class", where=where, expected="package.module:Class")
+        raise ComponentError(
+            f"'{target}' is not the name of a class", where=where, expected="package.module:Class or library.so::Class"
+        )
     try:
         module = importlib.import_module(module_name)
     except BaseException as error:  # a script may exit when it is imported

@@ -1,7 +1,8 @@
 """Make the first files of a component or of a robot of your own.
 
 `solfer new component NAME` makes a catkin package: a component that swings a joint of CENTAURO, a configuration, a
-launch file, and a test that passes at once and needs no ROS master. Change the component from there.
+launch file, and a test that passes at once and needs no ROS master. Change the component from there. With `--cpp` it is
+in C++, in a library of its own, and the test compares it with its twin in Python.
 
 `solfer new robot NAME --urdf FILE` makes one for a robot: the file that describes it, a configuration with one plugin
 that moves its joints, a launch file, and a test that simulates it. `--from COLLECTION:NAME` takes a robot of
@@ -24,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     summary = "a catkin package with a component, its configuration, a launch file and a test"
     component = kinds.add_parser("component", help=summary, description=f"Make {summary}.")
     component.add_argument("name", metavar="NAME", help="name of the component, such as `swing_joint`")
+    component.add_argument(
+        "--cpp", action="store_true", help="in C++, with a twin in Python that the test compares it with"
+    )
     component.set_defaults(write=_write_component)
     summary = "a catkin package with a robot, a configuration with one plugin, a launch file and a test"
     robot = kinds.add_parser("robot", help=summary, description=f"Make {summary}.")
@@ -55,10 +59,11 @@ def run(options: argparse.Namespace) -> int:
 def _write_component(name: str, folder: Path, options: argparse.Namespace) -> None:
     from solfer_tools.cli.skeletons.component import ComponentSkeleton
 
-    skeleton = ComponentSkeleton(name, folder)
+    skeleton = ComponentSkeleton(name, folder, options.cpp)
     skeleton.write()
     print(f"{folder} is a catkin package now, with the component {skeleton.target}.\n")
-    _print_steps(name, folder, skeleton.package, test="tries it on a simulated CENTAURO in one process")
+    test = "tries it on a simulated CENTAURO in one process"
+    _print_steps(name, folder, skeleton.package, test=f"builds it, and {test}" if options.cpp else test)
     print("      with layer:=RT in real time")
 
 

@@ -20,6 +20,13 @@ TEMPLATES = {
     "test/test_@NAME@.py": "test_component.py",
 }
 
+CPP_TEMPLATES = TEMPLATES | {
+    "CMakeLists.txt": "CMakeLists_cpp.txt",
+    "src/@NAME@.cpp": "component.cpp",
+    "test/test_@NAME@.py": "test_component_cpp.py",
+}
+"""Those of a component in C++, which has a twin in Python."""
+
 
 class ComponentSkeleton(Skeleton):
     """The package of a new component.
@@ -27,6 +34,7 @@ class ComponentSkeleton(Skeleton):
     Args:
         name: Name of the component; of its module, its configuration and its class, too.
         folder: The package's folder; its last part is the package's name.
+        is_cpp: Whether it is in C++, beside its twin in Python.
 
     Attributes:
         target: The component's `class:` in a configuration.
@@ -35,14 +43,15 @@ class ComponentSkeleton(Skeleton):
         ConfigError: A name cannot be used, or the folder exists.
     """
 
-    def __init__(self, name: str, folder: Path):
+    def __init__(self, name: str, folder: Path, is_cpp: bool = False):
         super().__init__("component", name, folder)
         if self.package in sys.stdlib_module_names or importlib.util.find_spec(self.package) is not None:
             raise ConfigError(f"there is a Python module '{self.package}' already", expected=ANOTHER)
         class_name = "".join(part.capitalize() for part in name.split("_"))
-        self.target = f"{self.package}.{name}:{class_name}"
-        self._words = {"@NAME@": name, "@CLASS@": class_name, "@PACKAGE@": self.package}
+        self.target = f"lib{self.package}.so::{class_name}" if is_cpp else f"{self.package}.{name}:{class_name}"
+        self._files = CPP_TEMPLATES if is_cpp else TEMPLATES
+        self._words = {"@NAME@": name, "@CLASS@": class_name, "@PACKAGE@": self.package, "@TARGET@": self.target}
 
     def write(self) -> None:
         """Make the folder and all files; see `Skeleton.fill`."""
-        self.fill(TEMPLATES, self._words)
+        self.fill(self._files, self._words)
