@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support.unit.golden import golden, lower_body, rolling_legs
+from support.robots import lower_body
+from support.unit.golden import golden, rolling_legs
 
 from solfer.components.odometry import Odometry
 from solfer.components.odometry.kalman_kernel import TILT
