@@ -87,16 +87,11 @@ def test_a_check_says_what_a_node_refuses(write):
 
 
 @pytest.mark.slow
-def test_a_check_names_a_shared_plugin_in_rt(write):
-    report = check_file(write(SHARED_IN_RT))
+def test_a_check_names_a_shared_plugin_in_rt_and_requires_without_a_list(write):
+    required = ("chain: all             #", "requires: [odometry]\n      chain: all             #")
+    report = check_file(write(SHARED_IN_RT, required))
     (notice,) = (each for each in report.information if "rosrun plugins plugin" in each.what)
     assert "refuses shared, for the layer RT" in notice.what
-
-
-@pytest.mark.slow
-def test_a_check_tells_of_requires_without_a_list(write):
-    required = ("chain: all             #", "requires: [odometry]\n      chain: all             #")
-    report = check_file(write(required))
     (notice,) = (each for each in report.information if "requires nothing" in each.what)
     assert notice.mark.path[-2:] == ("joint_states", "requires")
 
