@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import rosnode
 import rospy
 import rostest
 from std_srvs.srv import SetBool
@@ -89,13 +90,19 @@ class ClaimsTest(unittest.TestCase):
                 return
             self.assertTrue(left, self.robot.speeds())
 
-    def check_a_refusal(self) -> None:
-        """Start a second plugin: it is refused, and the refusal names the owner."""
-        code, output = run(*PLUGIN, "-n", "joint_lower")
-        self.assertEqual(code, 2, output)
-        for text in ("error: plugin 'joint_lower'", "'/joint_lower' cannot", "'/joint_states'", "hip_yaw_1"):
-            self.assertIn(text, output)
-        self.assertNotIn("Traceback", output)
+    def check_refusals(self) -> None:
+        """Start a second plugin: it is refused for its joints, its node or its service, with the owner's name."""
+        joints = ("error: plugin 'joint_lower'", "'/joint_lower' cannot", "'/joint_states'", "hip_yaw_1")
+        for arguments, texts in (
+            (("-n", "joint_lower"), joints),
+            ((), ("/joint_states is running already",)),
+            (("__name:=other",), ("/joint_states/trajectory is offered by another node",)),
+        ):
+            code, output = run(*PLUGIN, *arguments)
+            self.assertEqual(code, 2, output)
+            for text in texts:
+                self.assertIn(text, output)
+            self.assertNotIn("Traceback", output)
 
     def check_a_publisher(self) -> None:
         """Publish commands of joints that are taken: nothing moves."""
@@ -107,15 +114,18 @@ class ClaimsTest(unittest.TestCase):
         self.assertNotIn(rospy.get_name(), self.owners()["position_controller"])
 
     def test_others_are_refused_where_joints_are_taken(self):
-        """A second plugin, and a publisher, beside a plugin that goes on, and ends at rest."""
+        """A second plugin, and a publisher, beside a plugin that goes on; `rosnode kill` ends it at rest."""
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
-            self.goes_on_beside(self.check_a_refusal)
+            self.goes_on_beside(self.check_refusals)
             self.assertIsNone(process.poll())
             wait_for_plugin(process)
             self.check_a_publisher()
             self.robot.turn_wheels(1.0)
-            self.assertEqual(end(process, signal.SIGTERM)[0], 0)
+            code, output = run("rosnode", "kill", "/joint_states")
+            self.assertEqual(code, 0, output)
+            self.assertEqual(process.wait(START), 0)
+        self.assertNotIn("/joint_states", rosnode.get_node_names())
         wait_for(lambda: not any(self.owners().values()), START, "joints that were given back")
         wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
         self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""However a plugin ends, the robot comes to rest; and a second plugin of the same name does not end the first."""
+"""However a plugin ends, the robot comes to rest; claims_test.py and resets_test.py have `rosnode kill` and SIGTERM."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from pathlib import Path
 import rosnode
 import rospy
 import rostest
-from system import LOADED, START, Robot, end, program, run, soak, started, wait_for, wait_for_plugin
+from system import LOADED, START, Robot, end, program, soak, started, wait_for, wait_for_plugin
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
 PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
@@ -71,7 +71,7 @@ class EndingTest(unittest.TestCase):
         self.assertLess(self.robot.moved(before), LOADED)
 
     def ends_at_rest(self, process: subprocess.Popen, number: signal.Signals) -> None:
-        """Check that a signal ends a plugin that turns wheels; claims_test.py has SIGTERM."""
+        """Check that a signal ends a plugin that turns wheels."""
         self.robot.turn_wheels(1.0)
         before = self.robot.positions()
         code, output = end(process, number)
@@ -98,25 +98,6 @@ class EndingTest(unittest.TestCase):
         self.assertIn("ValueError: sabotage", output)
         self.assertNotIn("Traceback", output)
         self.rests(before)
-
-    def test_a_second_plugin_of_one_name(self):
-        """It is refused, by node and by service; `rosnode kill` ends the first at rest."""
-        with plugin() as process:
-            code, output = run(*PLUGIN)
-            self.assertEqual(code, 2, output)
-            self.assertIn("/joint_states is running already", output)
-            self.assertNotIn("Traceback", output)
-            code, output = run(*PLUGIN, "__name:=other")
-            self.assertEqual(code, 2, output)
-            self.assertIn("/joint_states/trajectory is offered by another node", output)
-            self.assertIsNone(process.poll())
-            self.robot.turn_wheels(1.0)
-            before = self.robot.positions()
-            code, output = run("rosnode", "kill", "/joint_states")
-            self.assertEqual(code, 0, output)
-            self.assertEqual(process.wait(START), 0)
-            self.rests(before)
-            self.assertNotIn("/joint_states", rosnode.get_node_names())
 
     @soak
     def test_a_terminal_that_is_closed_ends_it(self):

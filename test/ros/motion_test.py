@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """The plugin joint_states moves the simulated robot on request, and nothing wrong gets through."""
 
+import contextlib
 import functools
 import re
 import shlex
 import subprocess
 import tempfile
 import unittest
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 from xml.etree import ElementTree
@@ -34,10 +36,18 @@ class MotionTest(unittest.TestCase):
         cls.robot = Robot()
         wait_for_plugin()
 
-    def refused(self, *parts: str, **request: object) -> None:
-        """Check that a request is refused with a message that holds all `parts`, and no joint moves."""
+    @contextlib.contextmanager
+    def no_motion(self) -> Iterator[None]:
+        """Check that no joint moves because of what is asked for meanwhile."""
         self.robot.settle()
-        before, replies = self.robot.positions(), []
+        before = self.robot.positions()
+        yield
+        self.robot.passes(0.2)
+        self.assertLess(self.robot.moved(before), STANDS_STILL)  # of 0.1 rad that were asked for
+
+    def refused(self, *parts: str, **request: object) -> None:
+        """Check that a request is refused with a message that holds all `parts`."""
+        replies = []
 
         def explained() -> bool:
             replies.append(ask(**request))
@@ -46,8 +56,6 @@ class MotionTest(unittest.TestCase):
         # a plugin that the machine has just stalled refuses for another reason
         wait_for(explained, START, lambda: f"{parts} in '{replies[-1].message}'")
         self.assertEqual({(reply.success, reply.duration) for reply in replies}, {(False, 0.0)})
-        self.robot.passes(0.2)
-        self.assertLess(self.robot.moved(before), STANDS_STILL)  # of 0.1 rad that were asked for
 
     def test_a_named_state_is_reached(self):
         semantics = ElementTree.fromstring(rospy.get_param("/robot_semantic_description"))
@@ -76,10 +84,6 @@ class MotionTest(unittest.TestCase):
         insist(state="mammal_wide_straight", speed=1.0)
         self.robot.settle()
 
-    def test_wheels_turn_and_stop(self):
-        self.robot.turn_wheels(1.0)
-        self.robot.turn_wheels(0.0)
-
     @soak
     def test_what_happens_can_be_recorded_beside(self):
         port = urlsplit(rosgraph.get_master_uri()).port
@@ -93,46 +97,31 @@ class MotionTest(unittest.TestCase):
         self.assertIn("torso_yaw", measured.columns)
         self.assertEqual(found.missing, ())
 
-    @soak
-    def test_an_unknown_state_is_refused(self):
-        self.refused("mammal_wide_hihg", "mammal_wide_high", state="mammal_wide_hihg")
-
-    def test_an_unknown_joint_is_refused(self):
-        self.refused("torso_jaw", "torso_yaw", joints=["torso_jaw"], positions=[0.1])
-
-    def test_what_is_no_number_is_refused(self):
-        self.refused("torso_yaw", "finite", joints=["neck_yaw", "torso_yaw"], positions=[0.1, NAN])
-        self.refused("speed", joints=["torso_yaw"], positions=[0.1], speed=NAN)
-
-    @soak
-    def test_a_wrong_size_is_refused(self):
-        self.refused("1 positions for 2 joints", joints=["torso_yaw", "neck_yaw"], positions=[0.1])
-
-    @soak
-    def test_a_position_beyond_the_limits_is_refused(self):
-        self.refused("neck_yaw", "limits", joints=["torso_yaw", "neck_yaw"], positions=[0.1, 3.0])
-
-    @soak
-    def test_an_empty_request_is_refused(self):
-        self.refused("neither")
+    def test_wrong_requests_are_refused(self):
+        with self.no_motion():
+            self.refused("mammal_wide_hihg", "mammal_wide_high", state="mammal_wide_hihg")
+            self.refused("torso_jaw", "torso_yaw", joints=["torso_jaw"], positions=[0.1])
+            self.refused("torso_yaw", "finite", joints=["neck_yaw", "torso_yaw"], positions=[0.1, NAN])
+            self.refused("speed", joints=["torso_yaw"], positions=[0.1], speed=NAN)
+            self.refused("1 positions for 2 joints", joints=["torso_yaw", "neck_yaw"], positions=[0.1])
+            self.refused("neck_yaw", "limits", joints=["torso_yaw", "neck_yaw"], positions=[0.1, 3.0])
+            self.refused("neither")
 
     def test_bad_commands_past_the_plugin_move_nothing(self):
         """The lower level is the last guard against NaN, unknown or doubled joints, and positions far away."""
         publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10)
         wait_for(lambda: publisher.get_num_connections() > 0, START, "a subscriber of the command")
-        self.robot.settle()
-        before = self.robot.positions()
-        for bad in (
-            JointCommand(name=["torso_yaw"], position=[NAN]),
-            JointCommand(name=["torso_jaw"], position=[0.5]),
-            JointCommand(name=["torso_yaw", "neck_yaw"], position=[0.5]),
-            JointCommand(name=["torso_yaw"], position=[0.5, 0.5]),
-            JointCommand(name=["torso_yaw", "torso_yaw"], position=[0.5, 0.5]),
-            JointCommand(name=["torso_yaw"], position=[50.0]),
-        ):
-            publisher.publish(bad)
-            self.robot.passes(0.05)
-        self.assertLess(self.robot.moved(before), STANDS_STILL)
+        with self.no_motion():
+            for names, position in (
+                (["torso_yaw"], [NAN]),
+                (["torso_jaw"], [0.5]),
+                (["torso_yaw", "neck_yaw"], [0.5]),
+                (["torso_yaw"], [0.5, 0.5]),
+                (["torso_yaw", "torso_yaw"], [0.5, 0.5]),
+                (["torso_yaw"], [50.0]),
+            ):
+                publisher.publish(JointCommand(name=names, position=position))
+                self.robot.passes(0.05)
         publisher.unregister()
 
 

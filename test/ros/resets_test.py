@@ -11,7 +11,20 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PointStamped
-from system import CENTAURO, START, Robot, end, insist, numbers, program, soak, started, wait_for, wait_for_plugin
+from system import (
+    CENTAURO,
+    LOADED,
+    START,
+    Robot,
+    end,
+    insist,
+    numbers,
+    program,
+    soak,
+    started,
+    wait_for,
+    wait_for_plugin,
+)
 
 from solfer.msg import JointCommand
 from solfer.srv import ResetSimulation
@@ -135,10 +148,14 @@ class ResetsTest(unittest.TestCase):
         back = np.flatnonzero(np.diff(commands[:, 0]) < 0.0)
         self.assertEqual(len(back), 1)
         self.check_commands(commands[: back[0] + 1], commands[back[0] + 1 :])
-        wait_for_plugin(self.plugin)
+        self.robot.turn_wheels(1.0)
+        joints = self.robot.positions()
         code, output = end(self.plugin, signal.SIGTERM)
         self.assertEqual(code, 0, output)
         self.assertNotIn("Traceback", output)
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
+        self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})
+        self.assertLess(self.robot.moved(joints), LOADED)
         successor.kill()
         successor.wait(START)
         self.check_that_a_killed_simulators_parameters_are_not_taken()

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Log
 from system import NODES, START, Robot, program, soak, started, wait_for
 
 from solfer.msg import WheelsSupport
-from solfer.srv import LiftContacts
+from solfer.srv import LiftContacts, StepContact
 
 PAGE = NODES.parent / "docs/reference/wheeled_motion.md"
 SPEED, ACCELERATION, PATIENCE = 0.2, 0.3, 0.55  # [m/s], [m/s2], [s], as the page has them
@@ -74,7 +74,7 @@ class WheeledMotionTest(unittest.TestCase):
         self.stand()
         self.assertLess(math.dist(self.base(), (x + 0.15, y)), 0.015)
 
-    def test_the_legs_alone_lift_no_wheel(self):
+    def test_the_legs_alone_neither_lift_a_wheel_nor_step(self):
         lift = rospy.ServiceProxy("/wheeled_motion/lift", LiftContacts)
         rospy.wait_for_service("/wheeled_motion/lift", START)
         for contact, reason in (("front_left_leg", "where its weight is"), ("left_arm", "tracked contact")):
@@ -82,6 +82,9 @@ class WheeledMotionTest(unittest.TestCase):
             self.assertFalse(answer.success)
             self.assertIn(reason, answer.message)
         self.assertTrue(lift(contacts=[], lifted=False).success)
+        refused = rospy.ServiceProxy("/wheeled_motion/step", StepContact)(contact="rear_left_leg", ahead=0.1)
+        self.assertFalse(refused.success)
+        self.assertIn("where its weight is", refused.message)
 
     @soak
     def test_vertices_of_a_wrong_number_are_refused(self):

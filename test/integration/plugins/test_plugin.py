@@ -6,7 +6,7 @@ from support.integration.xbot_world import ON_BOTH
 from support.plugins.plugin import WHEELS, Saboteur, configuration
 
 from solfer.config import load
-from solfer.errors import ComponentError, MiddlewareError, NotFinite, SolferError
+from solfer.errors import ComponentError, MiddlewareError, NotFinite
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate, run
 
@@ -115,28 +115,3 @@ def test_a_partial_model_moves_its_part_only(world):
     assert np.abs(plugin.robot.state.position[indices] - goal).max() < 0.04
     reply = world.ask("joint_lower/trajectory", joints=("torso_yaw",), positions=(0.1,))
     assert not reply.success and "unknown joint 'torso_yaw'" in reply.message
-
-
-@pytest.mark.daily(2)
-@pytest.mark.parametrize(
-    ("tags", "text"),
-    [
-        ({"class": "solfer.components.joint_states:JointState"}, "did you mean: JointStates"),
-        ({"class": "no_such_package.module:Class"}, "module 'no_such_package.module' cannot be imported"),
-        ({"class": "solfer.errors:SolferError"}, "is not a component"),
-        ({"class": "JointStates"}, "is not the name of a class"),
-    ],
-)
-def test_a_wrong_class_has_its_place(world, tmp_path, tags, text):
-    file = configuration(tmp_path, **tags)
-    with pytest.raises(SolferError) as caught:
-        world.plugin("test", file)
-    assert text in str(caught.value)
-
-
-def test_a_wrong_component_tag_has_its_place(world, tmp_path):
-    file = configuration(tmp_path, **{"class": "solfer.components.joint_states:JointStates", "chain": "left_amr"})
-    with pytest.raises(SolferError) as caught:
-        world.plugin("test", file)
-    line = next(number for number, text in enumerate(file.read_text().splitlines(), 1) if "left_amr" in text)
-    assert f"configuration.yaml:{line}:" in str(caught.value) and "left_arm" in str(caught.value)

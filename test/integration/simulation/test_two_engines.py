@@ -39,13 +39,6 @@ def test_the_robot_stands_alike(standing):
         assert sum(force[2] for force in each.values()) == pytest.approx(WEIGHT, rel=2e-3)
 
 
-def test_a_simulation_of_mujoco_repeats_to_the_bit(standing):
-    again, forces = stand("mujoco")
-    before, forces_before = standing["mujoco"]
-    assert np.array_equal(again, before)
-    assert all(np.array_equal(forces[wheel], forces_before[wheel]) for wheel in forces)
-
-
 def test_a_reset_returns_to_the_begin_to_the_bit():
     with closing(Simulation.from_file(perfect(), engine="mujoco")) as simulation:
         ends = []

@@ -7,26 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.model import Description
-from solfer.model.urdf.cut import cut
-from solfer.robot import Robot
-
 ROOT = Path(__file__).parents[3]
-CENTAURO = ROOT / "config" / "robots" / "centauro"
 
 
 def golden(name):
     """Return golden data, and the number of each of its columns by name."""
     data = json.loads(gzip.decompress((ROOT / "test" / "data" / f"{name}.json.gz").read_bytes()))
     return data, {column: index for index, column in enumerate(data["columns"])}
-
-
-def lower_body():
-    """Return CENTAURO's lower body with the contacts of its wheels."""
-    whole = CENTAURO / "centauro.urdf"
-    urdf = cut(Description.from_text(whole.read_text()), "torso_2", "lower")
-    files = {"contacts": CENTAURO / "contacts.yaml", "others": [whole], "name": "centauro"}
-    return Robot.load(urdf, CENTAURO / "centauro.srdf", **files)
 
 
 def rolling_legs(posture, t):

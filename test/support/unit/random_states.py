@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from support import robots
 from support.needs import pybullet_robot
 
 from solfer import Robot
@@ -25,7 +26,7 @@ OFFSET, TURN = (0.1, -0.2, 0.05), np.array((0.1, -0.5, 0.3, 0.8))
 def load(name: str) -> tuple[Robot, tuple[str, str]]:
     """Load a robot and two of its links."""
     find, floating_base, links = ROBOTS[name]
-    return Robot.load(find(), floating_base=floating_base), links
+    return robots.load(find(), floating_base=floating_base), links
 
 
 def states(robot: Robot) -> Iterator[tuple[np.ndarray, np.ndarray]]:

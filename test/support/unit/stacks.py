@@ -1,13 +1,9 @@
 """Stacks of tasks on CENTAURO, and points with given Jacobians."""
 
-from pathlib import Path
-
 import numpy as np
 
 from solfer.points import CenterOfMass, FrameOrientation, LinearPoint, Point
 from solfer.tasks import Task
-
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf"
 
 
 def at_random(robot, seed=3):

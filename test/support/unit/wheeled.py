@@ -3,9 +3,9 @@
 import json
 
 import pytest
+from support.robots import centauro
 from support.unit.declarations import named
 
-from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
@@ -21,9 +21,8 @@ def recorded(repository):
 
 
 @pytest.fixture
-def robot(repository, recorded):
-    folder = repository / "config/robots/centauro"
-    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
+def robot(recorded):
+    robot = centauro()
     robot.state.position[:] = recorded["q0"]
     robot.update()
     return robot

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from support.unit.golden import lower_body, rolling_legs
+from support.robots import lower_body
+from support.unit.golden import rolling_legs
 from support.walk.digest import Digest
 
 from solfer.components.ground_forces import GroundForces

@@ -5,7 +5,7 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 import yaml
-from support.unit.golden import CENTAURO
+from support.robots import CENTAURO
 
 from solfer_tools.cli.main import main
 from solfer_tools.cli.skeletons.robot import RobotSkeleton

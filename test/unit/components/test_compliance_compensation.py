@@ -1,21 +1,13 @@
 """The component `compliance_compensation` on CENTAURO: where the motors have to be for the links to be in place."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.robots import centauro
 
 from solfer.components.compliance_compensation import ComplianceCompensation, ComplianceTags
 from solfer.errors import ComponentError
-from solfer.robot import Robot
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 CYCLES = 120_000
-
-
-def centauro(actuators=CENTAURO / "actuators.yaml"):
-    files = [CENTAURO / f"centauro.{kind}" for kind in ("urdf", "srdf")]
-    return Robot.load(*files, actuators=actuators, name="centauro")
 
 
 def started(robot, **tags):
@@ -34,7 +26,7 @@ def cycle(component, count=1):
 
 @pytest.fixture
 def robot():
-    robot = centauro()
+    robot = centauro(actuators=True)
     random = np.random.default_rng(3)
     robot.state.position[:] = random.uniform(-0.5, 0.5, robot.size)
     robot.command.torque[:] = random.uniform(-50.0, 50.0, robot.size)
@@ -85,11 +77,11 @@ def test_a_start_is_where_the_links_are(robot):
 
 def test_a_chain_without_springs_is_refused():
     with pytest.raises(ComponentError, match=r"actuators: \{read: true\}"):
-        ComplianceCompensation(centauro(actuators=None), ComplianceTags(chain="arms"))
+        ComplianceCompensation(centauro(), ComplianceTags(chain="arms"))
 
 
 def test_without_springs_nothing_is_compensated(caplog):
-    component = ComplianceCompensation(centauro(actuators=None))
+    component = ComplianceCompensation(centauro())
     component.init()
     component.model.command.torque[:] = 20.0
     assert np.array_equal(cycle(component), component.model.state.position)

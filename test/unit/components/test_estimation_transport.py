@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import yaml
 from support.estimation import part
+from support.robots import centauro
 
 from solfer.middleware.memory import FaultsRecord
 from solfer.model.kinematics import Kinematics
-from solfer.robot import Robot
 from solfer.simulation.bundle import load_bundle
 
 log_module, replay, transport = (
@@ -37,10 +37,8 @@ def ahead(kinematics, spacing, duration=1.6):
     speed = SPEED * (up - down)
     way = np.concatenate(([0.0], np.cumsum(0.5 * spacing * (speed[1:] + speed[:-1]))))
     position, velocity = np.zeros((2, len(time), kinematics.size))
-    robot = Robot.load(ROBOT / "centauro.urdf", ROBOT / "centauro.srdf")
+    robot = centauro("mammal_wide_straight")
     names, dofs = list(kinematics.dofs), np.array([list(kinematics.dofs).index(name) for name in robot.dofs[6:]])
-    indices, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[indices] = values
     position[:, dofs] = robot.state.position[6:]
     for column, sign in zip((names.index(f"j_{wheel}") for wheel in log_module.WHEELS), (1, -1, 1, -1), strict=True):
         position[:, column], velocity[:, column] = sign * way / RADIUS, sign * speed / RADIUS

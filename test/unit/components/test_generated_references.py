@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.upper_body import upper_body
+from support.robots import upper_body
 
 from solfer import Robot
 from solfer.components.inverse_kinematics import InverseKinematics
@@ -41,7 +41,7 @@ arm:
 
 @pytest.fixture
 def upper(repository):
-    return upper_body(repository)
+    return upper_body()
 
 
 @pytest.fixture

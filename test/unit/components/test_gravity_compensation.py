@@ -1,28 +1,20 @@
 """The component `gravity_compensation` on CENTAURO, without any transport: torques, what others command, contacts."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support import robots
 from support.allocations import check_that_it_keeps_no_memory
 
 from solfer.components.gravity_compensation import GainsOfGroup, GravityCompensation, GravityTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.support import LiftContacts
 from solfer.model import State
-from solfer.robot import Robot
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 RATE = 200.0  # [Hz]
 
 
-def centauro(contacts=CENTAURO / "contacts.yaml"):
-    files = [CENTAURO / f"centauro.{kind}" for kind in ("urdf", "srdf")]
-    robot = Robot.load(*files, actuators=CENTAURO / "actuators.yaml", contacts=contacts, name="centauro")
-    indices, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[indices] = values
-    robot.update()
-    return robot
+def centauro(**files):
+    return robots.centauro("mammal_wide_straight", actuators=True, **files)
 
 
 def started(**tags):
@@ -146,13 +138,13 @@ def test_a_contact_that_is_not_tracked_is_refused():
 
 
 def test_a_group_without_contacts_is_refused():
-    for robot, group in ((centauro(contacts=None), "wheels"), (centauro(), "torso")):
+    for robot, group in ((centauro(contacts=False), "wheels"), (centauro(), "torso")):
         with pytest.raises(ComponentError, match=rf"no contact of '{group}' [^$]*contacts: {{read: true}}"):
             GravityCompensation(robot, GravityTags(track=group))
 
 
 def test_nothing_carries_a_robot_without_contacts(caplog):
-    component = GravityCompensation(centauro(contacts=None))
+    component = GravityCompensation(centauro(contacts=False))
     component.init()
     torque, robot = cycle(component).torque, component.model
     assert "nothing carries its base" in caplog.text

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from support.allocations import check_that_it_keeps_no_memory
-from support.unit.golden import CENTAURO, golden
+from support.robots import centauro
+from support.unit.golden import golden
 
 from solfer.components.ground_forces import GroundForces
 from solfer.components.ground_forces.offsets import TorqueOffsets
 from solfer.components.ground_forces.tags import GroundForcesTags, OffsetTags
 from solfer.components.ground_forces.touch import Touch
 from solfer.errors import ComponentError
-from solfer.robot import Robot
 from solfer.transport.declared.fields import plain
 
 FILTER = {"cut_off_frequency": 20.0}
@@ -19,10 +19,7 @@ WHEELS, STAMPED = slice(0, 4), "geometry_msgs/WrenchStamped"
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
-    indices, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[indices] = values
-    return robot
+    return centauro("mammal_wide_straight")
 
 
 def component(robot, **tags):

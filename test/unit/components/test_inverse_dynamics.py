@@ -3,14 +3,15 @@
 import math
 import re
 from ctypes import c_int
-from pathlib import Path
 
 import daqp
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
+from support import robots
 from support.allocations import check_that_it_keeps_no_memory
+from support.robots import CENTAURO, CONTACTS, SRDF, URDF
 
 from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.components.inverse_dynamics.component import SECOND_LEVEL_WEIGHT
@@ -25,7 +26,6 @@ from solfer.plugins import check_file
 from solfer.recording.log import Logger
 from solfer.robot import Robot
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 RATE = 200.0  # [Hz]
 FRICTION, SETTLE = 0.8, 10.0
 TASKS = {
@@ -36,13 +36,8 @@ TASKS = {
 LEVELS = (("com", "base"), ("posture",))
 
 
-def centauro(contacts=CENTAURO / "contacts.yaml"):
-    files = [CENTAURO / f"centauro.{kind}" for kind in ("urdf", "srdf")]
-    robot = Robot.load(*files, actuators=CENTAURO / "actuators.yaml", contacts=contacts, name="centauro")
-    indices, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[indices] = values
-    robot.update()
-    return robot
+def centauro(**files):
+    return robots.centauro("mammal_wide_straight", actuators=True, **files)
 
 
 def made(robot=None, tasks=TASKS, levels=LEVELS, limits=None, **tags):
@@ -411,13 +406,13 @@ def test_mistakes_are_refused(tags, error, text):
 
 def test_a_robot_without_contacts_is_refused():
     with pytest.raises(ComponentError, match=r"no contact of 'wheels' [^$]*contacts: {read: true}"):
-        made(centauro(contacts=None))
+        made(centauro(contacts=False))
 
 
 def test_a_robot_without_mass_is_refused(tmp_path):
-    text = (CENTAURO / "centauro.urdf").read_text()
+    text = URDF.read_text()
     (tmp_path / "ghost.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", text, flags=re.DOTALL))
-    robot = Robot.load(tmp_path / "ghost.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
+    robot = Robot.load(tmp_path / "ghost.urdf", SRDF, contacts=CONTACTS)
     with pytest.raises(ModelError, match=r"has no mass"):
         made(robot)
 

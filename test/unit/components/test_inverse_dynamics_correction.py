@@ -2,12 +2,12 @@
 
 import math
 import sys
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from support.allocations import check_that_it_keeps_no_memory
+from support.robots import CONTACTS, SRDF, URDF, centauro
 
 from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.components.inverse_dynamics.correction_kernel import LARGEST, LARGEST_SHARE
@@ -15,7 +15,6 @@ from solfer.errors import ComponentError, ModelError
 from solfer.points import AngularMomentum
 from solfer.robot import Robot
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 STEP = 0.005  # [s]
 PELVIS = 6  # Pinocchio's joint
 WHEELS = 4
@@ -32,10 +31,7 @@ class Carried:
     """
 
     def __init__(self, aside=(0.0, 0.0, 0.0), share=0.0, turn=(0.0, 0.0, 0.0)):
-        files = [CENTAURO / f"centauro.{kind}" for kind in ("urdf", "srdf")]
-        self.robot = Robot.load(*files, contacts=CENTAURO / "contacts.yaml", name="centauro")
-        indices, values = self.robot.named_state("mammal_wide_straight")
-        self.robot.state.position[indices] = values
+        self.robot = centauro("mammal_wide_straight")
         self.robot.state.position[3:6] = turn
         self.robot.update()
         tags = {"track": "wheels", "correct_model": True, "stack": STACK}
@@ -290,11 +286,10 @@ def test_a_robot_on_a_fixed_base_is_refused():
 
 
 def test_a_base_without_a_mass_is_refused():
-    text = (CENTAURO / "centauro.urdf").read_text()
+    text = URDF.read_text()
     begin = text.index("<inertial>", text.index('<link name="pelvis">'))
     end = text.index("</inertial>", begin) + len("</inertial>")
-    files = {"srdf": CENTAURO / "centauro.srdf", "contacts": CENTAURO / "contacts.yaml", "name": "centauro"}
-    robot = Robot.load(text[:begin] + text[end:], **files)
+    robot = Robot.load(text[:begin] + text[end:], SRDF, contacts=CONTACTS)
     tags = InverseDynamics.Tags.model_validate({"correct_model": True, "track": "wheels", "stack": STACK})
     with pytest.raises(ModelError, match="link 'pelvis' has no mass"):
         InverseDynamics(robot, tags)

@@ -6,6 +6,7 @@ import logging
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro, upper_body
 from support.unit.declarations import named
 
 from solfer import Robot
@@ -14,8 +15,6 @@ from solfer.config import load, read
 from solfer.errors import NotFinite, SizeMismatch, UnknownName
 from solfer.interfaces.geometry import Pose, Turn, Vector
 from solfer.interfaces.task_references import GetReference, MovePoint, ReachGoal, SetReference
-from solfer.model import Description
-from solfer.model.urdf.cut import cut
 from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins.generation.registry import Registry
 
@@ -34,28 +33,13 @@ poses:
 
 
 @pytest.fixture
-def centauro(repository):
-    return repository / "config/robots/centauro"
+def robot():
+    return centauro("mammal_wide_straight")
 
 
 @pytest.fixture
-def robot(centauro):
-    files = (centauro / f"centauro.{kind}" for kind in ("urdf", "srdf"))
-    return standing(Robot.load(*files, contacts=centauro / "contacts.yaml"))
-
-
-@pytest.fixture
-def upper(centauro):
-    urdf = centauro / "centauro.urdf"
-    text = cut(Description.from_file(urdf), "torso_2", "upper")
-    return standing(Robot.load(text, centauro / "centauro.srdf", others=[urdf]))
-
-
-def standing(robot):
-    dofs, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[dofs] = values
-    robot.update()
-    return robot
+def upper():
+    return upper_body()
 
 
 @pytest.fixture
@@ -373,14 +357,13 @@ def test_joints_outside_of_the_chain_stay(arm, robot):
 
 
 @pytest.mark.parametrize("asked", ["left", "held"])
-def test_a_jump_of_the_base_moves_no_joint(centauro, tmp_path, asked):
+def test_a_jump_of_the_base_moves_no_joint(tmp_path, asked):
     """References in the world move with the base, in the middle of a motion, and where a hand stays away from one."""
     file, rows = tmp_path / "poses.yaml", []
     file.write_text(POSES.replace(", relative: torso_2", ""))
     way = (0.05, 0.02, 0.1) if asked == "left" else (1.5, 1.0, 0.0)
     for jumps in (False, True):
-        files = (centauro / f"centauro.{kind}" for kind in ("urdf", "srdf"))
-        robot = standing(Robot.load(*files, contacts=centauro / "contacts.yaml"))
+        robot = centauro("mammal_wide_straight")
         hand = started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "arm"))
         hand.references.interface.set_reference(SetReference("pose", (*way, 0.0, 0.0, 0.3, 0.95393920), relative=True))
         run(hand, 0.2 if asked == "left" else 6.0)

@@ -1,26 +1,20 @@
 """The component `joint_states` on CENTAURO, without any transport: requests, refusals and motions."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.robots import centauro
 
 from solfer.components.joint_states import JointStates, MoveJoints
 from solfer.components.move_joints import JointStateCmnd
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, SolferError, UnknownName
-from solfer.robot import Robot
 
-CENTAURO = Path(__file__).parents[3] / "config" / "robots" / "centauro"
 RATE = 200.0  # [Hz]
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
-    indices, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[indices] = values
-    return robot
+    return centauro("mammal_wide_straight")
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import lower_body
 from support.unit.declarations import named
-from support.unit.golden import lower_body
 from support.unit.wheeled import LOWER, RATE, cycle, recorded, robot  # noqa: F401, fixtures
 from support.unit.wheeled import make as make_any  # noqa: F401
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
 
@@ -18,8 +18,7 @@ LOWER = 30  # DoFs of the lower body and the base
 @pytest.fixture
 def make(repository):
     """Make the component of the shipped configuration with other tags, on a robot of its own, at its start."""
-    folder = repository / "config/robots/centauro"
-    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
+    robot = centauro()
     robot.state.position[:] = json.loads((repository / "test/data/original_wheels.json").read_text())["q0"]
     robot.update()
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.unit.golden import lower_body
+from support.robots import lower_body
 
 from solfer.components.odometry.sensing.samples import SortedSamples
 from solfer.components.odometry.sensing.samples_kernel import LONGEST_LAG

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.estimation import part
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.kernel import steer
 from solfer.config import load
@@ -51,10 +51,8 @@ FASTEST = ("turning velocity, 0.5 m/s", "jumps, 0.5 m/s")
 @pytest.fixture
 def robots(repository):
     """Return two Robots in the same posture."""
-    folder = repository / "config/robots/centauro"
     position = json.loads((repository / "test/data/original_wheels.json").read_text())["q0"]
-    files = {"contacts": folder / "contacts.yaml"}
-    made = [Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", **files) for _ in range(2)]
+    made = [centauro() for _ in range(2)]
     for robot in made:
         robot.state.position[:] = position
         robot.update()

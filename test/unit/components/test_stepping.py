@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 from support.unit.declarations import named
 from support.unit.wheeled import LOWER, RATE, cycle, recorded, robot  # noqa: F401, fixtures
@@ -93,6 +94,17 @@ def test_a_wheel_stands_where_it_has_stepped(stepping, wheel, place):
     rest = places(component)
     floor.run(200)
     assert_allclose(places(component), rest, atol=2e-3)
+
+
+def test_the_request_of_the_page_is_a_step(stepping, repository):
+    """With the names and numbers of the command, which the soak calls."""
+    page = (repository / "docs/reference/wheeled_motion.md").read_text()
+    (text,) = re.findall(r'^rosservice call /stepping/step "(.*)"$', page, re.MULTILINE)
+    request = StepContact(**yaml.safe_load(text))
+    component, floor, step = stepping
+    before, wheel = places(component), LEGS.index(request.contact)
+    assert floor.finish(step(request)).success
+    assert_allclose((places(component) - before)[wheel], (request.ahead, request.left, request.up), atol=0.012)
 
 
 @pytest.mark.parametrize(

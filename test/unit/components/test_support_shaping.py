@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import nnls
+from support.robots import centauro
 from support.unit.declarations import named
 
-from solfer import Robot
 from solfer.components.support_shaping import SupportShaping
 from solfer.components.support_shaping.governor import Reaction
 from solfer.components.support_shaping.polygon import FootprintGeometry
@@ -49,13 +49,8 @@ def player(repository):
 
 
 @pytest.fixture
-def robot(repository):
-    folder = repository / "config/robots/centauro"
-    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
-    dofs, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[dofs] = values
-    robot.update()
-    return robot
+def robot():
+    return centauro("mammal_wide_straight")
 
 
 @pytest.fixture

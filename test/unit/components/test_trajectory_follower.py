@@ -1,9 +1,8 @@
 """Trajectories of `joint_states`, by its topic and its action, over the memory middleware."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.robots import centauro
 
 from solfer.components.joint_states import JointStates, MoveJoints
 from solfer.interfaces.trajectories import (
@@ -23,13 +22,11 @@ from solfer.interfaces.trajectories import (
     TrajectoryPoint,
 )
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.robot import Robot
 from solfer.transport import Inbox
 from solfer.transport.declared import ActionClient, GoalStatus
 from solfer.transport.declared.binding import bind
 from solfer.transport.declared.fields import message_of
 
-CENTAURO = Path(__file__).parents[3] / "config" / "robots" / "centauro"
 RATE = 200.0  # [Hz]
 NECK = ("neck_yaw", "neck_pitch")
 
@@ -38,10 +35,8 @@ class FollowingClient:
     """The component in a loop, a robot that is where it is commanded, and a client."""
 
     def __init__(self):
-        robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
-        indices, values = robot.named_state("mammal_wide_straight")
-        robot.state.position[indices] = values
-        self.robot, self.component, self.bus = robot, JointStates(robot), Bus()
+        self.robot, self.bus = centauro("mammal_wide_straight"), Bus()
+        self.component = JointStates(self.robot)
         self.component.set_rate(RATE)
         self.component.init()
         self.inbox, node = Inbox(), MemoryMiddleware(self.bus, "node")

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets
 from solfer.points import CenterOfMass, SpatialPoint, SupportVertex
 from solfer.tasks.task import updated_in_order
@@ -17,8 +17,7 @@ LOWER = 30  # DoFs of the lower body and the base
 
 @pytest.fixture
 def robot(repository):
-    folder = repository / "config/robots/centauro"
-    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
+    robot = centauro()
     robot.state.position[:] = json.loads((repository / "test/data/original_wheels.json").read_text())["q0"]
     robot.update()
     return robot

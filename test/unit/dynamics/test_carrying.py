@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro
 
 from solfer import Robot
 from solfer.dynamics import CarryingTorques
@@ -20,12 +21,8 @@ BASE = np.arange(6)
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(
-        CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml", name="centauro"
-    )
+    robot = centauro("mammal_wide_straight")
     random = np.random.default_rng(5)
-    indices, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[indices] = values
     robot.state.position += random.uniform(-0.2, 0.2, robot.size)
     robot.state.velocity = random.uniform(-0.2, 0.2, robot.size)
     robot.update()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.needs import pybullet_robot
+from support.robots import centauro, load
 from support.unit.chains import chain
 
 from solfer import Robot
@@ -22,16 +23,12 @@ def original():
     return {key: np.array(value) for key, value in content.items()}
 
 
-def centauro():
-    return Robot.load(ROOT / "config/robots/centauro/centauro.urdf")
-
-
 def quadruped():
-    return Robot.load(pybullet_robot("a1/a1.urdf"), floating_base=True)
+    return load(pybullet_robot("a1/a1.urdf"), floating_base=True)
 
 
 def arm():
-    return Robot.load(pybullet_robot("kuka_iiwa/model.urdf"))
+    return load(pybullet_robot("kuka_iiwa/model.urdf"))
 
 
 ROBOTS = [centauro, quadruped, arm]

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.upper_body import upper_body
+from support.robots import upper_body
 
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.components.joint_states import JointStates
@@ -55,7 +55,7 @@ def bus():
 
 @pytest.fixture
 def upper(repository):
-    return upper_body(repository)
+    return upper_body()
 
 
 @pytest.fixture

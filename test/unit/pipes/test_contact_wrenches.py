@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.config.kinds.contact import ContactControllerRecord, ContactFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
@@ -29,8 +29,7 @@ def middleware():
 
 def standing(seed=5, contacts=True):
     """Load a CENTAURO at a random posture, with its base turned."""
-    file = CENTAURO / "contacts.yaml" if contacts else None
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=file)
+    robot = centauro(contacts=contacts)
     robot.state.position[:] = np.random.default_rng(seed).uniform(-0.3, 0.3, robot.size)
     robot.update()
     return robot

@@ -78,25 +78,20 @@ def test_the_layer_that_lists_it_is_named(write):
 
 @pytest.mark.slow
 def test_a_check_says_what_a_node_refuses(write):
-    report = check_file(write(IN_RT))
+    report = check_file(write(IN_RT), ["joint_states", "joint_online"])
     (notice,) = (each for each in report.information if "rosrun plugins plugin" in each.what)
     assert "refuses joint_states, for the layer RT" in notice.what and notice.mark.line == LINE and not report.errors
-    report = check_file(write(ON_XBOT))
+    report = check_file(write(ON_XBOT), ["joint_states", "joint_online"])
     (notice,) = (each for each in report.information if "rosrun plugins plugin" in each.what)
     assert "refuses joint_states, joint_online," in notice.what and notice.mark.line == 12
 
 
 @pytest.mark.slow
-def test_a_check_names_a_shared_plugin_in_rt(write):
-    report = check_file(write(SHARED_IN_RT))
+def test_a_check_names_a_shared_plugin_in_rt_and_requires_without_a_list(write):
+    required = ("chain: all             #", "requires: [odometry]\n      chain: all             #")
+    report = check_file(write(SHARED_IN_RT, required))
     (notice,) = (each for each in report.information if "rosrun plugins plugin" in each.what)
     assert "refuses shared, for the layer RT" in notice.what
-
-
-@pytest.mark.slow
-def test_a_check_tells_of_requires_without_a_list(write):
-    required = ("chain: all             #", "requires: [odometry]\n      chain: all             #")
-    report = check_file(write(required))
     (notice,) = (each for each in report.information if "requires nothing" in each.what)
     assert notice.mark.path[-2:] == ("joint_states", "requires")
 

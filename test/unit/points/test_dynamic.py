@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.random_states import OFFSET, ROBOTS, ROOT, SLOPE, WHEEL, load, put, states
+from support.robots import centauro
+from support.unit.random_states import OFFSET, ROBOTS, SLOPE, WHEEL, load, put, states
 
 import solfer.points
-from solfer import Robot
 from solfer.points import (
     Acceleration,
     AngularAcceleration,
@@ -331,8 +331,7 @@ def test_a_contact_that_is_lifted_after_an_update_carries_nothing(robot):
 
 
 def test_the_ground_carries_a_resting_robot():
-    centauro = ROOT / "config/robots/centauro"
-    robot = Robot.load(centauro / "centauro.urdf", centauro / "centauro.srdf", contacts=centauro / "contacts.yaml")
+    robot = centauro()
     wheels = [contact for contact in robot.contacts if isinstance(contact, RollingContact)]
     forces, bias = ContactForces(wheels), robot.dynamics.bias
     jacobian = np.vstack([contact.jacobian for contact in wheels])

@@ -2,19 +2,16 @@
 
 import copy
 import gc
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.allocations import check_that_it_keeps_no_memory
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.errors import NotFinite, PointError, SizeMismatch
 from solfer.numerics.solvers.damped_inverse import DampedInverse
 from solfer.points import CenterOfMass, Constant, FrameOrientation, Handler, LinearPoint, Minus, Norm, Point
-
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 
 
 class Countdown(Point):
@@ -32,7 +29,7 @@ class Countdown(Point):
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
+    robot = centauro()
     robot.state.position[:] = np.random.default_rng(3).uniform(-0.5, 0.5, robot.size)
     robot.update()
     return robot
@@ -221,7 +218,7 @@ def test_an_empty_handler_and_one_of_constants_work():
 def test_what_does_not_belong_here_is_refused(robot):
     """Points of another Robot, doubled points and wrong widths are refused, and the Handler stays as it was."""
     handler = Handler([LinearPoint("arm1_7", robot)])
-    other = Robot.load(CENTAURO / "centauro.urdf")
+    other = centauro()
     with pytest.raises(PointError, match="another Robot"):
         handler.add(LinearPoint("arm1_7", other))
     with pytest.raises(PointError, match="holds points, got str"):

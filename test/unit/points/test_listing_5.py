@@ -1,24 +1,22 @@
 """Listing 5 of the paper, line by line: the interface that all Robot Points share."""
 
 import inspect
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from support.robots import centauro
 
 import solfer.points
-from solfer import Robot
 from solfer.points import LinearPoint, Point
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf"
 EXPORTED = [getattr(solfer.points, name) for name in solfer.points.__all__]
 KINDS = [kind for kind in EXPORTED if inspect.isclass(kind) and issubclass(kind, Point)]
 
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO)
+    robot = centauro()
     robot.state.position[:] = np.random.default_rng(2).uniform(-0.5, 0.5, robot.size)
     robot.update()
     return robot

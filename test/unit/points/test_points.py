@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.errors import NotFinite, SizeMismatch, UnknownName
 from solfer.model.contacts import read_contacts
 from solfer.points import (
@@ -47,7 +47,7 @@ def original():
 
 @pytest.fixture
 def robot(original):
-    robot = Robot.load(CENTAURO / "centauro.urdf")
+    robot = centauro(contacts=False)
     robot.state.position[:], robot.state.velocity[:] = original["q"], original["qd"]
     robot.update()
     return robot
@@ -284,7 +284,7 @@ def test_a_dynamic_point_adds_an_offset():
         def compute_offset(self):
             self.offset[:] = 19.62
 
-    robot = Robot.load(CENTAURO / "centauro.urdf")
+    robot = centauro(contacts=False)
     robot.state.acceleration[0] = 0.5
     assert updated(Weight(1, robot)).value[0] == pytest.approx(20.62)
 

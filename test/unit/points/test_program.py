@@ -1,12 +1,10 @@
 """Programs of Handlers: which are made anew, which grow, and what they read of others."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from support.robots import centauro
 
-from solfer import Robot
 from solfer.errors import PointError
 from solfer.points import (
     CenterOfPressure,
@@ -23,7 +21,6 @@ from solfer.points import (
 )
 from solfer.points.compiled.registry import KERNELS, kernel
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 LINKS = ("arm1_7", "arm2_7", "pelvis", "torso_2", "wheel_1")
 
 
@@ -39,7 +36,7 @@ class CountedPoint(LinearPoint):
 
 @pytest.fixture(scope="module")
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf")
+    robot = centauro(contacts=False)
     robot.state.position[:] = np.random.default_rng(3).uniform(-0.5, 0.5, robot.size)
     robot.update()
     return robot

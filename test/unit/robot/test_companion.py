@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.robots import centauro
 
 from solfer import Robot
 from solfer.errors import ModelError, SizeMismatch
@@ -11,15 +12,6 @@ from solfer.model import Description
 from solfer.model.urdf.cut import cut
 
 CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
-
-
-def centauro():
-    return Robot.load(
-        CENTAURO / "centauro.urdf",
-        CENTAURO / "centauro.srdf",
-        actuators=CENTAURO / "actuators.yaml",
-        contacts=CENTAURO / "contacts.yaml",
-    )
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from support.allocations import check_that_it_keeps_no_memory
+from support.robots import centauro
 
 from solfer import Robot
 from solfer.dynamics import ProjectedDynamics
@@ -19,7 +20,7 @@ NAMES = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg",
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
+    robot = centauro()
     robot.state.position[:] = np.random.default_rng(5).uniform(-0.3, 0.3, robot.size)
     robot.update()
     return robot
@@ -203,7 +204,7 @@ def test_contacts_of_a_group_fit_a_handler(robot):
         ),
         (lambda robot: robot.contacts.add(LinearPoint("pelvis", robot)), PointError, "is not a contact"),
         (
-            lambda robot: robot.contacts.add(PointContact("pelvis", Robot.load(CENTAURO / "centauro.urdf"))),
+            lambda robot: robot.contacts.add(PointContact("pelvis", centauro())),
             PointError,
             "another Robot",
         ),

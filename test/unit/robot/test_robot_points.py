@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro
 
 from solfer import Robot
 from solfer.errors import PointError, SolferErrors
@@ -20,7 +21,7 @@ CONTACTS = CENTAURO / "contacts.yaml"
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", contacts=CONTACTS)
+    robot = centauro()
     robot.update()
     return robot
 
@@ -67,7 +68,7 @@ def test_the_centre_of_pressure_follows_the_forces(robot):
 
 
 def test_no_contacts_means_no_centre_of_pressure():
-    robot = Robot.load(CENTAURO / "centauro.urdf")
+    robot = centauro(contacts=False)
     assert len(robot.contacts) == 0
     with pytest.raises(PointError, match="of no contact"):
         robot.center_of_pressure.update()

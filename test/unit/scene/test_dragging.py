@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.upper_body import upper_body
+from support.robots import upper_body
 
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.config import read
@@ -30,7 +30,7 @@ class Hands:
 
     def __init__(self, repository, tmp_path):
         (file := tmp_path / "hands.yaml").write_text(HANDS)
-        self.bus, self.robot = Bus(), upper_body(repository)
+        self.bus, self.robot = Bus(), upper_body()
         self.component = InverseKinematics(self.robot, read(file, InverseKinematics.Tags, ("hands",)), "hands")
         self.component.set_rate(1.0 / PERIOD)
         self.component.init()

@@ -1,14 +1,13 @@
 """Stacks of tasks in YAML: what they build, and what is said of mistakes in them."""
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro
 from support.unit.refusals import place_of
 
-from solfer import Robot
 from solfer.config import read
 from solfer.config.tasks.stack import StackRecord
 from solfer.errors import SolferError, SolferErrors
@@ -31,20 +30,9 @@ stack:
 """
 
 
-@cache
-def _robot() -> Robot:
-    return Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
-
-
 @pytest.fixture
 def robot():
-    robot = _robot()
-    dofs, values = robot.named_state("home")
-    robot.state.position[:] = 0.0
-    robot.state.position[dofs] = values
-    robot.state.velocity[:] = 0.0
-    robot.update()
-    return robot
+    return centauro("home")
 
 
 @pytest.fixture

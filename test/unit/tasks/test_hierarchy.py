@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 from support.allocations import check_that_it_keeps_no_memory
 from support.needs import pybullet_robot
-from support.unit.stacks import CENTAURO, Rows, at_random, largest_change, repeating, stack_of
+from support.robots import centauro, load
+from support.unit.stacks import Rows, at_random, largest_change, repeating, stack_of
 
-from solfer import Robot
 from solfer.points import CenterOfMass, LinearPoint
 from solfer.tasks import Hierarchy, Task
 
@@ -18,12 +18,12 @@ TIGHT = 1e-7
 
 @pytest.fixture
 def robot():
-    return at_random(Robot.load(CENTAURO))
+    return at_random(centauro())
 
 
 @pytest.fixture
 def arm():
-    return at_random(Robot.load(pybullet_robot("kuka_iiwa/model.urdf")))
+    return at_random(load(pybullet_robot("kuka_iiwa/model.urdf")))
 
 
 def dense(levels):

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.robots import centauro
 from support.unit.refusals import place_of
 
-from solfer import Robot
 from solfer.config import read
 from solfer.config.tasks.original import OriginalStackTags, hands, translated
 from solfer.config.tasks.stack import TaskRecord
@@ -34,11 +34,7 @@ hands:
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
-    dofs, values = robot.named_state("home")
-    robot.state.position[dofs] = values
-    robot.update()
-    return robot
+    return centauro("home")
 
 
 def tags_of(tmp_path, text) -> OriginalStackTags:

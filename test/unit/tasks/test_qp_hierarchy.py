@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import linprog
 from support.allocations import check_that_it_keeps_no_memory
 from support.needs import pybullet_robot
+from support.robots import centauro, load
 from support.unit.optimality import imbalance
-from support.unit.stacks import CENTAURO, Rows, at_random, largest_change, repeating, stack_of
+from support.unit.stacks import Rows, at_random, largest_change, repeating, stack_of
 
-from solfer import Robot
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.solvers.qp import QpSolver, QpStatus
 from solfer.points import LinearPoint
@@ -33,12 +33,12 @@ PERIOD = 0.002  # [s]
 
 @pytest.fixture
 def robot():
-    return at_random(Robot.load(CENTAURO))
+    return at_random(centauro())
 
 
 @pytest.fixture
 def arm():
-    return at_random(Robot.load(pybullet_robot("kuka_iiwa/model.urdf")))
+    return at_random(load(pybullet_robot("kuka_iiwa/model.urdf")))
 
 
 @pytest.mark.parametrize("damping", [1e-1, 1e-2, 1e-3])

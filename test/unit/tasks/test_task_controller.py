@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.stacks import CENTAURO, at_random, stack_of
+from support.robots import centauro
+from support.unit.stacks import at_random, stack_of
 
-from solfer import Robot
 from solfer.errors import TaskError
 from solfer.points import Handler, LinearPoint
 from solfer.tasks import Hierarchy, QpHierarchy, Task, TaskController, joint_bounds
@@ -20,7 +20,7 @@ STEEPEST = 1.875
 
 @pytest.fixture
 def robot():
-    return at_random(Robot.load(CENTAURO))
+    return at_random(centauro())
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(robot, tasks):
     """A robot that moves must keep its stack when a change is wrong, whatever kind of mistake it is."""
     controller = TaskController(robot, PERIOD)
     controller.change([tasks["com"]], DURATION)
-    other = Task("other", LinearPoint("arm1_7", Robot.load(CENTAURO)))
+    other = Task("other", LinearPoint("arm1_7", centauro()))
     for change, text in (
         (lambda: controller.remove(tasks["left"]), "task 'left': it is not among the tasks\n  expected: one of com"),
         (lambda: controller.exchange(tasks["left"], tasks["right"]), "task 'left': it is not among"),

@@ -1,26 +1,20 @@
 """Tasks and stacks: errors, gains, selections, and refusals."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
+from support.robots import centauro
+from support.unit.stacks import at_random
 
-from solfer import Robot
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.points import CenterOfMass, FrameOrientation, LinearPoint, Norm, Point
 from solfer.tasks import Stack, Task
 
-CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
-
 
 @pytest.fixture
 def robot():
-    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
-    robot.state.position[:] = np.random.default_rng(3).uniform(-0.4, 0.4, robot.size)
-    robot.update()
-    return robot
+    return at_random(centauro())
 
 
 def rows_of(*levels):

@@ -12,7 +12,7 @@ pytest.importorskip("foxglove", reason="needs pip install -r requirements-view.t
 
 from support.page import opened_page  # noqa: E402
 from support.page_bench import PageBench  # noqa: E402
-from support.unit.upper_body import upper_body  # noqa: E402
+from support.robots import upper_body  # noqa: E402
 from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 
@@ -61,7 +61,7 @@ class Client:
 
 @contextmanager
 def served(repository, control):
-    bench = PageBench(upper_body(repository), control, foxglove=True)
+    bench = PageBench(upper_body(), control, foxglove=True)
     server = bench.page.foxglove
     with closing(bench.server), closing(server), connect(server.address, subprotocols=[PROTOCOL]) as connection:
         client = Client(connection)

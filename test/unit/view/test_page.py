@@ -16,7 +16,7 @@ viser = pytest.importorskip("viser", reason="needs pip install -r requirements-v
 
 from support.page import opened_page  # noqa: E402
 from support.page_bench import PageBench  # noqa: E402
-from support.unit.upper_body import upper_body  # noqa: E402
+from support.robots import upper_body  # noqa: E402
 from viser import _messages  # noqa: E402
 
 from solfer import Robot  # noqa: E402
@@ -36,7 +36,7 @@ DRAG = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0
 
 @pytest.fixture
 def bench(repository, request):
-    made = PageBench(upper_body(repository), getattr(request, "param", True))
+    made = PageBench(upper_body(), getattr(request, "param", True))
     made.run(3)
     with opened_page(made.server.address) as client, opened_page(made.server.address) as other:
         made.clients = [client, other]
@@ -387,7 +387,7 @@ class Pace:
 def test_a_simulation_is_paused_pushed_reset_and_slowed_down(repository):
     """By the page with control alone, within the bounds of its sliders; its pace is in the status."""
     pace = Pace()
-    bench = PageBench(upper_body(repository), control=True, simulation=pace)
+    bench = PageBench(upper_body(), control=True, simulation=pace)
     pace.call = bench.bus.call
     requests = {"pause": Flag, "reset": ResetRequest, "push": PushRequest}
     for name, kind in requests.items():
@@ -559,7 +559,7 @@ ODD_REPLIES = {
 
 def test_plugins_with_odd_parameters_end_nothing(repository, caplog):
     """First, and in place of good ones: others have their tabs, it moves on, and the stop works."""
-    bench = PageBench(upper_body(repository), control=True, foxglove=True)
+    bench = PageBench(upper_body(), control=True, foxglove=True)
     good = bench.parameters
     for kind, fields in ODD_REPLIES.items():
         odd = replace(good, **fields)

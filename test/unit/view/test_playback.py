@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
 
 from support.page import opened_page  # noqa: E402
-from support.unit.upper_body import upper_body  # noqa: E402
+from support.robots import upper_body  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.errors import RecordingError  # noqa: E402
@@ -29,7 +29,7 @@ TIMES = 100.0 + np.arange(0.0, 4.0, 0.01)
 
 @pytest.fixture(scope="module")
 def robot(repository):
-    return upper_body(repository)
+    return upper_body()
 
 
 @pytest.fixture
