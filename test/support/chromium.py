@@ -162,4 +162,3 @@ def _port(file):
         assert time.monotonic() < end, "Chromium does not start"
         time.sleep(0.1)
     return int(file.read_text().split()[0])
-

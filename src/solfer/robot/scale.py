@@ -265,7 +265,7 @@ def _stiffness(scale: RobotScale, value: float) -> str:
     stiffest = 100.0 * scale.torque
     if value <= stiffest:
         return ""
-    return f"{value:g} gives more than any joint of the robot, {scale.torque:g} Nm, at 0.01 rad; expected {stiffest:g} at most"
+    return f"{value:g} gives {scale.torque:g} Nm, as the strongest joint, below 0.01 rad; expected {stiffest:g} at most"
 
 
 def _damping(scale: RobotScale, value: float) -> str:
@@ -274,8 +274,8 @@ def _damping(scale: RobotScale, value: float) -> str:
     if value <= largest:
         return ""
     return (
-        f"{value:g} takes more than any joint of the robot gives, {scale.torque:g} Nm, at {scale.speed / 30.0:.2g} rad/s; "
-        f"expected {largest:.3g} at most"
+        f"{value:g} takes {scale.torque:g} Nm, as the strongest joint gives, below {scale.speed / 30.0:.2g} rad/s; "
+        f"expected {largest:.0f} at most"
     )
 
 

@@ -23,6 +23,9 @@ class NameOf:
     kind: Literal["group", "joint", "link", "state"]
 
 
+Size = Literal["wheel", "radius", "tube", "ring", "world", "nothing", ""]
+
+
 @dataclass(frozen=True)
 class ComparedWith:
     """Marks what a number is compared with: `Annotated[float, ComparedWith("wheel")]`.
@@ -38,7 +41,7 @@ class ComparedWith:
         factor: How many times the default, or the usual number, it hardly is; zero: its unit says it.
     """
 
-    size: Literal["wheel", "radius", "tube", "ring", "world", "nothing", ""] = ""
+    size: Size = ""
     usual: float = 0.0
     factor: float = 0.0
 
@@ -86,7 +89,7 @@ def numbers_in(record: Record) -> Iterator[WrittenNumber]:
         if field in record.model_fields_set:
             unit, compared = record.unit_of(field)
             units = (unit,) if unit else tuple(re.findall(r"\[([^\]]+)\]", info.description or ""))
-            mark = ComparedWith(compared) if compared else _compared_with(info)
+            mark = ComparedWith(typing.cast(Size, compared)) if compared else _compared_with(info)
             default = info.default if isinstance(info.default, float) else mark.usual
             yield from _numbers(
                 record, (info.alias or field,), record.__dict__[field], units=units, compared=mark, default=default
