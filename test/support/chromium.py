@@ -14,6 +14,45 @@ from websockets.sync.client import connect
 CHROMIUM = shutil.which("chromium")
 FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
+SEEN = """
+(() => {
+  const find = fiber => {
+    for (; fiber; fiber = fiber.sibling) {
+      const viewer = fiber.memoizedProps?.value?.mutable?.current;
+      if (viewer?.nodeRefFromName) return viewer;
+      const below = find(fiber.child);
+      if (below) return below;
+    }
+    return null;
+  };
+  const root = document.getElementById("root");
+  const {camera, nodeRefFromName} = window.solferViewer ??=
+    find(root[Object.keys(root).find(each => each.startsWith("__reactContainer"))]);
+  const places = [];
+  for (const [name, node] of Object.entries(nodeRefFromName)) {
+    if (name.startsWith("/measured/")) node?.traverse(each => {
+      if (!each.geometry) return;
+      if (!each.geometry.boundingBox) each.geometry.computeBoundingBox();
+      const ends = [each.geometry.boundingBox.min, each.geometry.boundingBox.max];
+      for (let corner = 0; corner < 8; corner++) {
+        const [x, y, z] = [0, 1, 2].map(axis => ends[corner >> axis & 1].getComponent(axis));
+        const point = ends[0].clone().set(x, y, z).applyMatrix4(each.matrixWorld);
+        point.applyMatrix4(camera.matrixWorldInverse).applyMatrix4(camera.projectionMatrix);
+        places.push([0.5 + 0.5 * point.x, 0.5 - 0.5 * point.y]);
+      }
+    });
+  }
+  const ends = end => [0, 1].map(axis => end(...places.map(each => each[axis])));
+  const picture = document.querySelector("canvas").getBoundingClientRect();
+  const bar = document.getElementById("solfer-banner").getBoundingClientRect();
+  return [...ends(Math.min), ...ends(Math.max), bar.bottom / picture.height];
+})()
+"""
+"""Script: box around the boxes of the robot's surfaces as drawn last: left, top, right, bottom; end of the status bar.
+
+All in shares of the picture that the panel leaves free; of three.js, whose objects are found by React's.
+"""
+
 
 def element(text):
     """Return the script of the innermost element with a text."""
@@ -80,6 +119,16 @@ class Browser:
         self.evaluate(f"{script}.scrollIntoView({{block: 'center'}})")
         return self.evaluate(f"(r => [r.x + r.width / 2, r.y + r.height / 2])({script}.getBoundingClientRect())")
 
+    def resize(self, width, height):
+        """Give the browser a size [px]; windows are not narrower than 500 px."""
+        size = {"width": width, "height": height}
+        self.ask("Emulation.setDeviceMetricsOverride", **size, deviceScaleFactor=1, mobile=False)
+
+    def check_view(self, what):
+        """Check that the robot is in the picture, below the status bar."""
+        left, top, right, bottom, bar = self.evaluate(SEEN)
+        assert 0.0 <= left < right <= 1.0 and bar <= top < bottom <= 1.0, f"{what}: {left, top, right, bottom, bar}"
+
     def picture(self, path):
         """Write what is seen as PNG."""
         path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"]))
@@ -101,8 +150,7 @@ def browser(folder, address, width=1280, height=800):
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=20.0) as answer:
                 pages = [each for each in json.load(answer) if each["type"] == "page"]
             seen = Browser(pages[0]["webSocketDebuggerUrl"])
-            size = {"width": width, "height": height}  # windows are not narrower than 500 px
-            seen.ask("Emulation.setDeviceMetricsOverride", **size, deviceScaleFactor=1, mobile=False)
+            seen.resize(width, height)
             yield seen
         finally:
             process.terminate()

@@ -109,7 +109,8 @@ def _of_states(files: RobotFiles, description: Description) -> Iterator[tuple[Ma
 def _odd_numbers(record: Record, scale: RobotScale) -> Iterator[tuple[Mark, str]]:
     """Yield the places of numbers that a file gives to a record and that can hardly be meant, and why."""
     for number in numbers_in(record):
-        what = _angle(number) if {"rad", "rad, m"}.intersection(number.units) else oddity(number, scale)
+        what = _angle(number) if {"rad", "rad, m"}.intersection(number.units) else ""
+        what = what or oddity(number, scale)
         if what:
             yield number.mark, what
 

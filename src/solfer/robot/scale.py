@@ -62,26 +62,30 @@ class RobotScale:
 def oddity(number: WrittenNumber, scale: RobotScale) -> str:
     """Return what is odd about a number beside a robot; empty: nothing, or it has several units or none."""
     unit = number.units[0] if len(number.units) == 1 else ""
-    rule = _RULES.get((unit, number.compared))
+    rule = _RULES.get((unit, number.compared.size))
     what = "" if rule is None else rule(scale, number.value)
     return what or _beside_default(number, unit)
 
 
 def _beside_default(number: WrittenNumber, unit: str) -> str:
     """Return that a number is far from the default of its field; empty: it is not, or there is none."""
-    if number.default <= 0.0 or number.value <= 0.0 or (number.units and not unit) or number.compared == "nothing":
+    if number.default <= 0.0 or number.value <= 0.0 or (number.units and not unit) or number.compared.size == "nothing":
         return ""
     ratio = number.value / number.default
     # what has no unit, as weights and damping, may be as small as it likes
     much, little = _SLIPS.get(unit, (_THOUSAND, _THOUSANDTH if unit else 0.0))
-    if little < ratio < much:
+    if number.compared.factor:
+        much = number.compared.factor
+        little = 0.0 if unit == "1/s" else 1.001 / much  # a gain may be as small as it likes, too
+    if little < ratio < 0.999 * much:
         return ""
     other = _OTHER_UNITS.get(unit)
     is_nearer = other is not None and (other[1] > 1.0) == (ratio < 1.0)
     meant = f"; {number.value:g} {other[0]} are {other[1] * number.value:.4g} {unit}" if other and is_nearer else ""
     written = f"{number.value:g} {unit}".rstrip()
     usual = f"{number.default:g} {unit}".rstrip()
-    return f"{written} is {ratio:.4g} times the default, {usual}{meant}"
+    what = "the usual" if number.compared.usual else "the default,"
+    return f"{written} is {ratio:.4g} times {what} {usual}{meant}"
 
 
 @lru_cache(maxsize=8)
@@ -256,6 +260,25 @@ def _effort(scale: RobotScale, value: float) -> str:
     return f"{value:g} is more than the robot can give or weighs, {strongest:.3g} N or Nm"
 
 
+def _stiffness(scale: RobotScale, value: float) -> str:
+    """Compare a spring with one that gives all torque of the strongest joint for a hundredth of its unit."""
+    stiffest = 100.0 * scale.torque
+    if value <= stiffest:
+        return ""
+    return f"{value:g} gives {scale.torque:g} Nm, as the strongest joint, below 0.01 rad; expected {stiffest:g} at most"
+
+
+def _damping(scale: RobotScale, value: float) -> str:
+    """Compare a damper with one that takes all torque of the strongest joint at a thirtieth of the largest speed."""
+    largest = 30.0 * scale.torque / scale.speed if math.isfinite(scale.speed) else math.inf
+    if value <= largest:
+        return ""
+    return (
+        f"{value:g} takes {scale.torque:g} Nm, as the strongest joint gives, below {scale.speed / 30.0:.2g} rad/s; "
+        f"expected {largest:.0f} at most"
+    )
+
+
 def _slope(_: RobotScale, value: float) -> str:
     return f"{value:g} deg is more than a turn" if value > 360.0 else ""
 
@@ -264,6 +287,7 @@ _THOUSAND = 1000.0  # of who writes thousandths of a unit
 _THOUSANDTH = 1.001 / _THOUSAND  # rounded up
 _SLIPS: dict[str, tuple[float, float]] = {
     "deg": (_THOUSAND, 1.0 / 30.0),  # of who writes radians
+    "rad": (30.0, _THOUSANDTH),
     "rad/s": (30.0, _THOUSANDTH),  # of who writes degrees
     "rad/s2": (30.0, _THOUSANDTH),
     "s": (100.0, 0.0),
@@ -272,6 +296,7 @@ _SLIPS: dict[str, tuple[float, float]] = {
 
 _OTHER_UNITS: dict[str, tuple[str, float]] = {
     "deg": ("rad", math.degrees(1.0)),
+    "rad": ("deg", math.radians(1.0)),
     "rad/s": ("deg/s", math.radians(1.0)),
     "rad/s2": ("deg/s2", math.radians(1.0)),
     "s": ("ms", 1e-3),
@@ -300,5 +325,7 @@ _RULES: dict[tuple[str, str], Rule] = {
     ("N, Nm", ""): _effort,
     ("Nm, N", ""): _effort,
     ("deg", ""): _slope,
+    ("Nm/rad, N/m", ""): _stiffness,
+    ("Nms/rad, Ns/m", ""): _damping,
 }
 """Rules by the unit of a number and what it is compared with."""

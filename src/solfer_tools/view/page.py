@@ -123,6 +123,10 @@ class Page:
 
     def update(self, state: SceneState | None) -> None:
         """Show a scene; None: nothing new is known."""
+        with self._viser.atomic():  # at once: each message beside would wake the thread of the pages
+            self._update(state)
+
+    def _update(self, state: SceneState | None) -> None:
         self._requests.update()
         carry_out = self._requests.carry_out
         if self._playback is not None:
@@ -153,6 +157,5 @@ class Page:
         self._status.show(status, state, reports)
 
     def _draw(self, state: SceneState) -> None:
-        with self._viser.atomic():
-            self._drawing.update(state)
+        self._drawing.update(state)
         self._status.beat()

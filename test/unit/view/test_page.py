@@ -103,6 +103,10 @@ def test_each_page_has_its_own_view(bench):
     assert_allclose(client.positions[""], before)
     assert_allclose(client.cameras[-1], (1.0, 5.6, 0.9))
     assert len(other.cameras) == 1 and client.visible["/names"] is False and other.visible["/names"]
+    for height, ground in ((3.1, 2.0), (2.5, 2.0), (1.0, 1.0)):  # up a hill, a squat there, down
+        bench.page._views.update(ScenePose(np.array((1.0, 2.0, height)), turned.rotation))
+        other.receive(0.3)
+        assert_allclose(other.positions[""], (-1.0, -ground, 2.0))
 
 
 def test_a_desired_link_is_drawn_where_it_differs(bench):

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from solfer.components.following.tags import FollowingTags
 from solfer.components.gains import GainsOfGroup
-from solfer.config import LIVE, NameOf, Record
+from solfer.config import LIVE, ComparedWith, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.config.tasks.stack import Gain, Positive, TaskLevelsRecord, TaskRecord
 
@@ -16,7 +16,7 @@ HalfSize = Annotated[float, Field(gt=0.0, le=10.0)]
 class DynamicTaskRecord(TaskRecord):
     """A task whose acceleration is D (K e + v - J dq) + dv/dt, with the error e and the velocity v of its reference."""
 
-    velocity_gain: Gain | tuple[Gain, ...] | None = Field(
+    velocity_gain: Annotated[Gain | tuple[Gain, ...] | None, ComparedWith(usual=10.0, factor=10.0)] = Field(
         default=None,
         **LIVE,
         description="gain D of the velocity [1/s], one number or one a row; left out: four times `gain`, which is "

@@ -39,13 +39,15 @@ class OdometryTags(Record):
     )
     filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU measures")
     velocity: FilterTags | None = Field(None, description="low-pass filter of the base's velocity and of its turn")
-    slip: float = Field(
+    slip: Annotated[float, ComparedWith(factor=10.0)] = Field(
         0.03, **SPEED, **LIVE, description="filter: a wheel slips that moves this much against the others [m/s]"
     )
-    slip_share: float = Field(
+    slip_share: Annotated[float, ComparedWith(factor=10.0)] = Field(
         0.1, ge=0.0, le=10.0, **LIVE, description="filter: the same as a share of the robot's speed, which is added"
     )
-    slip_time: float = Field(0.02, **DURATION, description="filter: time over which ways are compared for that [s]")
+    slip_time: Annotated[float, ComparedWith(factor=10.0)] = Field(
+        0.02, **DURATION, description="filter: time over which ways are compared for that [s]"
+    )
     clearance: float = Field(
         0.01, **LENGTH, **LIVE, description="filter: a wheel is lifted that has risen this much above the ground [m]"
     )

@@ -23,6 +23,9 @@ class NameOf:
     kind: Literal["group", "joint", "link", "state"]
 
 
+Size = Literal["wheel", "radius", "tube", "ring", "world", "nothing", ""]
+
+
 @dataclass(frozen=True)
 class ComparedWith:
     """Marks what a number is compared with: `Annotated[float, ComparedWith("wheel")]`.
@@ -32,10 +35,15 @@ class ComparedWith:
 
     Attributes:
         size: `wheel`: the robot's wheels, of which it may be a part; `radius`: their whole radius; `tube`, `ring`: the
-            radius of that part; `world`: distances that robots cover; `nothing`: any number can be meant.
+            radius of that part; `world`: distances that robots cover; `nothing`: any number can be meant; empty: as
+            without a mark.
+        usual: A usual number, where the field has no default.
+        factor: How many times the default, or the usual number, it hardly is; zero: its unit says it.
     """
 
-    size: Literal["wheel", "radius", "tube", "ring", "world", "nothing"]
+    size: Size = ""
+    usual: float = 0.0
+    factor: float = 0.0
 
 
 def names_in(record: Record) -> Iterator[tuple[Record, str, str, str]]:
@@ -64,14 +72,14 @@ class WrittenNumber:
         mark: Its place.
         value: The number.
         units: The units that it may have, as in `[rad, m]`; empty: none is known.
-        compared: See `ComparedWith`; empty: its unit says it.
-        default: The default of its field; zero: it has none.
+        compared: What it is compared with.
+        default: The default of its field, else a usual number; zero: it has none.
     """
 
     mark: Mark
     value: float
     units: tuple[str, ...]
-    compared: str
+    compared: ComparedWith
     default: float
 
 
@@ -81,15 +89,15 @@ def numbers_in(record: Record) -> Iterator[WrittenNumber]:
         if field in record.model_fields_set:
             unit, compared = record.unit_of(field)
             units = (unit,) if unit else tuple(re.findall(r"\[([^\]]+)\]", info.description or ""))
-            mark = compared or _compared_with(info)
-            default = info.default if isinstance(info.default, float) else 0.0
+            mark = ComparedWith(typing.cast(Size, compared)) if compared else _compared_with(info)
+            default = info.default if isinstance(info.default, float) else mark.usual
             yield from _numbers(
                 record, (info.alias or field,), record.__dict__[field], units=units, compared=mark, default=default
             )
 
 
 def _numbers(
-    record: Record, path: tuple[Key, ...], value: Any, *, units: tuple[str, ...], compared: str, default: float
+    record: Record, path: tuple[Key, ...], value: Any, *, units: tuple[str, ...], compared: ComparedWith, default: float
 ) -> Iterator[WrittenNumber]:
     if isinstance(value, Record):
         yield from numbers_in(value)
@@ -102,10 +110,10 @@ def _numbers(
             yield WrittenNumber(mark, value, units, compared=compared, default=default)
 
 
-def _compared_with(field: FieldInfo) -> str:
-    """Return the size in the mark of a field, or of one of its types; empty: there is no mark."""
+def _compared_with(field: FieldInfo) -> ComparedWith:
+    """Return the mark of a field, or of one of its types; an empty one if there is none."""
     marks = (*field.metadata, *_marks(field.annotation))
-    return next((mark.size for mark in marks if isinstance(mark, ComparedWith)), "")
+    return next((mark for mark in marks if isinstance(mark, ComparedWith)), ComparedWith())
 
 
 def _marks(annotation: Any) -> Iterator[Any]:

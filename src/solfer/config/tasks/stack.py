@@ -82,7 +82,7 @@ class TaskRecord(Record):
         "a named state; for what moves by itself a map, which `inverse_kinematics` follows; "
         "left out: where it is at the start",
     )
-    gain: Gain | tuple[Gain, ...] | None = Field(
+    gain: Annotated[Gain | tuple[Gain, ...] | None, ComparedWith(usual=1.0, factor=100.0)] = Field(
         default=None,
         **LIVE,
         description="gain K of the error [1/s], one number or one a row; 1, for `rolling` and momentum 0",

@@ -46,6 +46,9 @@ SHOWN = {  # group of the drawing: label, colour and meaning
 }
 """What a page may hide, with its legend."""
 
+HIGHEST_BASE = 1.1
+"""Height of a base above what the camera takes for the ground from which on this rises with it [m]."""
+
 UPRIGHT = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
 """Quaternion (w, x, y, z) that turns the axes of the world, z up, to those of the browser, y up."""
 
@@ -84,6 +87,7 @@ class _OwnView:
         self._client = client
         self._base: ScenePose | None = None
         self._center = np.full(3, np.nan)
+        self._ground = 0.0
         gui = client.gui
         with gui.add_folder("view", expand_by_default=False, order=0.0):
             looks = gui.add_button_group("look at", tuple(VIEWS))
@@ -101,10 +105,12 @@ class _OwnView:
         """Follow the base, if that is chosen."""
         is_first = self._base is None
         self._base = base
-        center = np.array((*base.position[:2], 0.0))
+        x, y, height = base.position
+        self._ground = min(max(self._ground, height - HIGHEST_BASE), height)  # a squat is seen, a hill is climbed
+        center = np.array((x, y, self._ground))
         if self._follows.value and not np.allclose(center, self._center, rtol=0.0, atol=5e-4):
             self._center = center
-            self._send(SetPositionMessage("", (-center[0], 0.0, center[1])))
+            self._send(SetPositionMessage("", (-center[0], -center[2], center[1])))
         if is_first:
             self._look("robot")
 
@@ -120,7 +126,8 @@ class _OwnView:
         width, height = self._client.camera.image_width, self._client.camera.image_height
         if 0 < width < 0.65 * height:  # a narrow picture: farther away, so that the robot is in it
             camera = target + 0.65 * height / width * (camera - target)
-        place, aim = (tuple((turn @ each + (*self._base.position[:2], 0.0)).tolist()) for each in (camera, target))
+        center = (*self._base.position[:2], self._ground)
+        place, aim = (tuple((turn @ each + center).tolist()) for each in (camera, target))
         self._send(SetCameraPositionMessage(place))
         self._send(SetCameraLookAtMessage(aim))
 
