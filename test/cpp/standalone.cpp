@@ -49,28 +49,24 @@ const solfer_array *array(void *context, const char *source, const char *name) {
   world(context).arrays[key] = {numbers.data(), SIZE, 1};
   return &world(context).arrays[key];
 }
-const solfer_point *point(void *, const char *, const char *, const int *, std::size_t, const double *, std::size_t) {
-  return nullptr;
-}
+const solfer_point *point(void *, const solfer_point_request *) { return nullptr; }
 const solfer_array *port(void *, int, const char *, const char *) { return nullptr; }
 int log_numbers(void *context, const char *, const double *, std::size_t size, const char *) {
   world(context).logged = size;
   return 0;
 }
-int receive(void *context, const char *, const char *, const char *const *, std::size_t, solfer_handler handler,
-            void *user) {
-  world(context).handlers[0] = handler;
-  world(context).users[0] = user;
+int receive(void *context, const solfer_endpoint *topic) {
+  world(context).handlers[0] = topic->handler;
+  world(context).users[0] = topic->user;
   return 0;
 }
-int publish(void *context, const char *, const char *, const char *const *, std::size_t count, const double *, double) {
-  world(context).published = count;
+int publish(void *context, const solfer_endpoint *topic) {
+  world(context).published = topic->field_count;
   return 0;
 }
-int serve(void *context, const char *, const char *, const char *const *, std::size_t, const char *const *, std::size_t,
-          solfer_handler handler, void *user) {
-  world(context).handlers[1] = handler;
-  world(context).users[1] = user;
+int serve(void *context, const solfer_endpoint *service) {
+  world(context).handlers[1] = service->handler;
+  world(context).users[1] = service->user;
   return 0;
 }
 

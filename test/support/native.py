@@ -1,6 +1,7 @@
 """Libraries of components that tests compile, and twins of these components in Python."""
 
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import numpy as np
 from solfer.components import Component
 from solfer.components.native import INCLUDE
 from solfer.config import Record
+from solfer.errors import ComponentError
+from solfer.interfaces.declaration import Accepted, Service, TopicIn
 from solfer.points import CenterOfMass, Handler, LinearPoint
 from solfer.robot import Robot
 
@@ -20,6 +23,20 @@ def build(library: Path, *words: str, source: Path = SOURCES / "components.cpp")
     """Compile a library, and return it."""
     subprocess.run(["g++", *FLAGS, "-shared", "-fPIC", *words, source, "-o", library], check=True)
     return library
+
+
+@dataclass(frozen=True)
+class Offset:
+    """std_msgs/Float64MultiArray."""
+
+    data: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Request of std_srvs/SetBool."""
+
+    data: bool
 
 
 class JointSpaceTwin(Component):
@@ -38,6 +55,26 @@ class JointSpaceTwin(Component):
         robot.dynamics.subscribe("bias")
         self.joints = robot.selectors[tags.joints].indices
         self.held = self.torque = np.zeros(robot.size)
+        self.offset = np.zeros(robot.size)
+
+    def topics(self):
+        """Receive the offset of the first two joints."""
+        return (TopicIn("offset", "std_msgs/Float64MultiArray", Offset, self.take),)
+
+    def services(self):
+        """Offer to forget the offset."""
+        return (Service("zero", "std_srvs/SetBool", Switch, reply=Accepted, handler=self.zero),)
+
+    def take(self, message):
+        """Take an offset."""
+        self.offset[self.joints[:2]] = message.data
+
+    def zero(self, request):
+        """Forget the offset."""
+        if not request.data:
+            raise ComponentError("there is nothing to do without `data`")
+        self.offset[:] = 0.0
+        return Accepted()
 
     def init(self):
         """Hold where the joints are."""
@@ -47,7 +84,7 @@ class JointSpaceTwin(Component):
     def update(self):
         """Compute torques."""
         state, tags = self.model.state, self.tags
-        spring = tags.stiffness * (self.held - state.position)
+        spring = tags.stiffness * (self.held + self.offset - state.position)
         self.torque = spring - tags.damping * state.velocity + self.model.dynamics.bias
 
     def send(self):

@@ -1,8 +1,11 @@
 """Supervises the heartbeat of the RT process from outside."""
 
 import logging
+import os
+import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.heartbeat import Heartbeat
@@ -17,7 +20,8 @@ class Watchdog:
 
     A process that waits for a processor, or is stopped, cannot cycle and does not hang: its robot holds already, for
     its commands are missing, and it goes on from the measured state. Where that takes `AGE_RATIO` times as long, it may
-    no longer go on by itself. The end of the process is only logged: its successor begins from the measured state.
+    no longer go on by itself. A process that hangs on is killed: in a call of compiled code it obeys no other signal.
+    The end of the process is only logged: its successor begins from the measured state.
 
     Args:
         heartbeat: The heartbeat of the process.
@@ -32,6 +36,9 @@ class Watchdog:
 
     LIMIT = 0.1
     """Default of `limit` [s]."""
+
+    END = 5.0
+    """Time that a process may hang, counted as for the limit, until it is killed [s]."""
 
     PERIOD = 0.01
     """Time between two checks [s]."""
@@ -50,6 +57,7 @@ class Watchdog:
         self._processor_time: ProcessorTime | None = None
         self._age = self._idle = 0.0
         self._over = True
+        self._is_hanging = False
         self.hangs = 0
 
     def look(self) -> None:
@@ -58,9 +66,10 @@ class Watchdog:
         if newest != self._newest:
             self._newest = newest
             self._over = newest is None
+            self._is_hanging = False
             self._processor_time = None
             self._age = self._idle = 0.0
-        elif not self._over:
+        elif self._is_hanging or not self._over:
             self._measure(self._heartbeat.age())
 
     def run(self, running: Callable[[], bool]) -> None:
@@ -89,7 +98,11 @@ class Watchdog:
         self._age = age
         # at least three checks: a stall of the whole machine, with the watchdog, is no hang
         self._idle += min(able, self._limit / 3)
-        if self._idle > self._limit or age > self.AGE_RATIO * self._limit:
+        if self._is_hanging:
+            if self._idle > self.END:
+                self._is_hanging = False
+                self._kill()
+        elif self._idle > self._limit or age > self.AGE_RATIO * self._limit:
             self._over = True
             self._handle_loss()
 
@@ -98,8 +111,15 @@ class Watchdog:
         heartbeat = self._heartbeat
         if heartbeat.alive():
             self.hangs += 1
+            self._is_hanging = True
             reason = f"process {heartbeat.pid} hangs: no cycle for {1e3 * heartbeat.age():.0f} ms"
             self._stop.trip(reason)
             logger.error("emergency stop: %s", reason)
         else:
             logger.error("process %d has ended unexpectedly", heartbeat.pid)
+
+    def _kill(self) -> None:
+        pid = self._heartbeat.pid
+        with suppress(ProcessLookupError, PermissionError):
+            os.kill(pid, signal.SIGKILL)
+            logger.error("process %d hangs for %g s and is killed", pid, self.END)

@@ -52,6 +52,14 @@ def test_its_test_passes_unchanged(package, environment):
     assert "2 passed" in done.stdout
 
 
+def test_one_in_cpp_is_built_and_equals_its_twin(repository, environment, tmp_path):
+    words = ["new", "component", "swing_joint", "--cpp"]
+    made = run([sys.executable, str(repository / "nodes" / "solfer"), *words], tmp_path, environment)
+    assert (made.returncode, made.stderr) == (0, "") and "libswing_joint.so::SwingJoint" in made.stdout
+    done = run([sys.executable, "-m", "pytest", "-q", "swing_joint"], tmp_path, environment)
+    assert done.returncode == 0 and "2 passed" in done.stdout, done.stdout + done.stderr
+
+
 def test_it_is_drawn_before_it_is_built(package, capsys, caplog):
     assert main(["graph", str(package / "config/swing_joint.yaml"), "-n", "swing_joint"]) == 0
     assert "SwingJoint" in capsys.readouterr().out and not caplog.records

@@ -41,6 +41,7 @@ ELSEWHERE = {
         "test/integration/package/test_install_space.py",
         "new component swing_joint",
     ),
+    r"solfer new component swing_joint --cpp": ("test/integration/package/test_new_component.py", '"--cpp"'),
     r"roslaunch solfer joint_states.launch": ("test/integration/package/test_install_space.py", "joint_states.launch"),
     r"python3 -m pytest swing_joint": ("test/integration/package/test_new_component.py", '"-m", "pytest"'),
     r"roslaunch swing_joint .*": ("test/integration/package/test_new_component.py", "launch/swing_joint.launch"),

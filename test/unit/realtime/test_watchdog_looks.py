@@ -118,10 +118,16 @@ def test_only_a_process_that_is_stopped_cannot_go_on(heartbeat, process):
 
 
 @pytest.mark.parametrize("process", [SPINS, "import time; time.sleep(60)"], indirect=True, ids=["spins", "blocks"])
-def test_a_process_that_could_go_on_hangs(watchdog, heartbeat, stop, process):
+def test_a_process_that_could_go_on_hangs_and_is_killed(watchdog, heartbeat, stop, process, monkeypatch):
+    monkeypatch.setattr(Watchdog, "END", 0.5)
     heartbeat.newest = 1
-    trips_within(watchdog, heartbeat, stop, 30.0)
-    assert stop
+    begin = time.monotonic() - trips_within(watchdog, heartbeat, stop, 30.0)
+    assert stop and process.poll() is None
+    while process.poll() is None and heartbeat.old < 30.0:
+        watchdog.look()
+        time.sleep(Watchdog.PERIOD)
+        heartbeat.old = time.monotonic() - begin
+    assert process.wait() == -signal.SIGKILL and heartbeat.old > 0.5
 
 
 @pytest.mark.parametrize("process", [SPINS], indirect=True)

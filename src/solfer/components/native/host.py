@@ -68,14 +68,12 @@ class Host:
         self._arrays: dict[tuple[str, str], records.Array] = {}
         self._placed: list[tuple[records.PointRecord, Point]] = []
         self._start = records.Array(None, self._robot.size, 1)
-        dofs = self._names(self._robot.dofs)
         self.record = records.HostRecord(
-            None,
-            component.name.encode(),
-            self._robot.size,
-            dofs,
-            ctypes.pointer(time),
-            cast(values, POINTER(records.Value)),
+            name=component.name.encode(),
+            size=self._robot.size,
+            dofs=self._names(self._robot.dofs),
+            time=ctypes.pointer(time),
+            tags=cast(values, POINTER(records.Value)),
         )
         for name, kind in records.HOST_FUNCTIONS.items():
             failed = -1 if kind._restype_ in (ctypes.c_int, ctypes.c_long) else None  # type: ignore[attr-defined]
@@ -160,21 +158,22 @@ class Host:
             return state.add(name)
         return state[name]
 
-    def _point(self, kind: bytes, link: bytes, operands: Any, count: int, numbers: Any, size: int) -> int:  # noqa: PLR0913, PLR0917
-        name = records.text(kind)
+    def _point(self, request: Any) -> int:
+        given = request[0]
+        name = records.text(given.kind)
         if name not in KINDS:
             raise UnknownName("kind of point", name, KINDS)
-        given = list(numbers[:size])
+        numbers = list(given.numbers[: given.number_count])
         make = getattr(points, name)
         if name in OF_LINKS:
-            offset = {"offset": given} if given else {}
-            point = make(records.text(link), self._robot, **offset)
+            offset = {"offset": numbers} if numbers else {}
+            point = make(records.text(given.link), self._robot, **offset)
         elif name in OF_ROBOT:
             point = make(self._robot)
         elif name in OF_POINTS:
-            point = make(*(self.points[index] for index in operands[:count]))
+            point = make(*(self.points[index] for index in given.operands[: given.operand_count]))
         else:
-            point = make(given)
+            point = make(numbers)
         record = self._keep(records.PointRecord(len(self.points)))
         self._placed.append((record, self.points.add(point)))
         return addressof(record)
@@ -190,53 +189,48 @@ class Host:
         self.logs.append((records.text(name), _array_at(numbers, size), records.text(unit)))
         return 0
 
-    def _receive(self, topic: bytes, interface: bytes, fields: Any, count: int, handler: int, user: int) -> int:  # noqa: PLR0913, PLR0917
-        name = records.text(topic)
-        message = NumbersOfFields(name, records.texts(fields, count))
-        receive = self._handler(handler, user, message)
-        self.topics.append(TopicIn(name, records.text(interface), message.message, handler=receive))
+    def _receive(self, endpoint: Any) -> int:
+        topic = endpoint[0]
+        name = records.text(topic.name)
+        message = NumbersOfFields(name, records.texts(topic.fields, topic.field_count))
+        receive = self._handler(topic, message)
+        self.topics.append(TopicIn(name, records.text(topic.interface), message.message, handler=receive))
         return 0
 
-    def _publish(self, topic: bytes, interface: bytes, fields: Any, count: int, numbers: Any, rate: float) -> int:  # noqa: PLR0913, PLR0917
-        name = records.text(topic)
-        message = NumbersOfFields(name, records.texts(fields, count))
-        array = _array_at(numbers, message.size)
+    def _publish(self, endpoint: Any) -> int:
+        topic = endpoint[0]
+        name = records.text(topic.name)
+        message = NumbersOfFields(name, records.texts(topic.fields, topic.field_count))
+        array = _array_at(topic.numbers, message.size)
         self.topics.append(
             TopicOut(
                 name,
-                records.text(interface),
+                records.text(topic.interface),
                 message.message,
                 collect=lambda: message.made(array.tolist()),
-                rate=rate if rate > 0.0 else None,
+                rate=topic.rate if topic.rate > 0.0 else None,
             )
         )
         return 0
 
-    def _serve(  # noqa: PLR0913, PLR0917
-        self,
-        name: bytes,
-        interface: bytes,
-        request: Any,
-        requests: int,
-        reply: Any,
-        replies: int,
-        handler: int,
-        user: int,
-    ) -> int:
-        called = records.text(name)
-        received = NumbersOfFields(f"{called} request", records.texts(request, requests))
+    def _serve(self, endpoint: Any) -> int:
+        service = endpoint[0]
+        name = records.text(service.name)
+        received = NumbersOfFields(f"{name} request", records.texts(service.fields, service.field_count))
         accepted = (("success", bool, True), ("message", str, ""))
-        sent = NumbersOfFields(f"{called} reply", records.texts(reply, replies), more=accepted)
-        call = self._handler(handler, user, received, sent)
+        replies = records.texts(service.reply_fields, service.reply_field_count)
+        sent = NumbersOfFields(f"{name} reply", replies, more=accepted)
+        call = self._handler(service, received, sent)
         self.services.append(
-            Service(called, records.text(interface), received.message, reply=sent.message, handler=call)
+            Service(name, records.text(service.interface), received.message, reply=sent.message, handler=call)
         )
         return 0
 
     def _handler(
-        self, address: int, user: int, received: NumbersOfFields, sent: NumbersOfFields | None = None
+        self, endpoint: records.Endpoint, received: NumbersOfFields, sent: NumbersOfFields | None = None
     ) -> Callable[[Any], Any]:
-        run = records.Handler(address)
+        run = records.Handler(endpoint.handler)
+        user = c_void_p(endpoint.user)
         numbers = np.zeros(max(received.size, 1))
         reply = np.zeros(0 if sent is None else max(sent.size, 1))
         first, second = (each.ctypes.data_as(records.Doubles) for each in (numbers, reply))
@@ -245,8 +239,9 @@ class Host:
 
         def handle(message: Any) -> Any:
             numbers[: received.size] = received.numbers(message)
-            if run(c_void_p(user), first, None if sent is None else second, room, len(room)):
-                raise ComponentError(f"{component.name}: {records.text(room.value)}")
+            if run(user, first, None if sent is None else second, room, len(room)):
+                what = f"{component.name} refuses: {records.text(room.value)}"
+                raise ComponentError(what, expected="what its handler accepts")
             return None if sent is None else sent.made(reply[: sent.size].tolist())
 
         return handle

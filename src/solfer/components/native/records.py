@@ -17,7 +17,7 @@ from ctypes import (
 )
 
 INTERFACE = 1
-"""`SOLFER_INTERFACE` of the headers."""
+"""Version of the headers."""
 
 ERROR_SIZE = 512
 """Bytes of room for the text of an error."""
@@ -68,23 +68,51 @@ class PointRecord(Structure):
     _fields_ = [("index", c_int), ("value", Array), ("jacobian", Array)]
 
 
-# The GIL stays with the caller: handlers take a few microseconds.
-Handler = PYFUNCTYPE(c_int, c_void_p, Doubles, Doubles, POINTER(c_char), c_size_t)
+class PointRequest(Structure):
+    """`solfer_point_request`."""
+
+    _fields_ = [
+        ("kind", c_char_p),
+        ("link", c_char_p),
+        ("operands", POINTER(c_int)),
+        ("operand_count", c_size_t),
+        ("numbers", Doubles),
+        ("number_count", c_size_t),
+    ]
+
+
+class Endpoint(Structure):
+    """`solfer_endpoint`; its handler is an address."""
+
+    _fields_ = [
+        ("name", c_char_p),
+        ("interface", c_char_p),
+        ("fields", Names),
+        ("field_count", c_size_t),
+        ("reply_fields", Names),
+        ("reply_field_count", c_size_t),
+        ("numbers", Doubles),
+        ("rate", c_double),
+        ("handler", c_void_p),
+        ("user", c_void_p),
+    ]
+
+
+# the interpreter's lock stays with the caller: handlers take a few microseconds
+Handler = PYFUNCTYPE(c_int, *(c_void_p, Doubles, Doubles, POINTER(c_char), c_size_t))
 
 HOST_FUNCTIONS = {
     "dof": CFUNCTYPE(c_long, c_void_p, c_char_p),
     "group": CFUNCTYPE(c_void_p, c_void_p, c_char_p, POINTER(c_size_t)),
     "links": CFUNCTYPE(c_void_p, c_void_p, c_char_p, POINTER(c_size_t)),
     "array": CFUNCTYPE(c_void_p, c_void_p, c_char_p, c_char_p),
-    "point": CFUNCTYPE(c_void_p, c_void_p, c_char_p, c_char_p, POINTER(c_int), c_size_t, Doubles, c_size_t),
+    "point": CFUNCTYPE(c_void_p, c_void_p, POINTER(PointRequest)),
     "port": CFUNCTYPE(c_void_p, c_void_p, c_int, c_char_p, c_char_p),
-    "log": CFUNCTYPE(c_int, c_void_p, c_char_p, Doubles, c_size_t, c_char_p),
-    "receive": CFUNCTYPE(c_int, c_void_p, c_char_p, c_char_p, Names, c_size_t, c_void_p, c_void_p),
-    "publish": CFUNCTYPE(c_int, c_void_p, c_char_p, c_char_p, Names, c_size_t, Doubles, c_double),
-    "serve": CFUNCTYPE(
-        c_int, c_void_p, c_char_p, c_char_p, Names, c_size_t, Names, c_size_t, c_void_p, c_void_p
-    ),
-}  # fmt: skip
+    "log": CFUNCTYPE(c_int, *(c_void_p, c_char_p, Doubles, c_size_t, c_char_p)),
+    "receive": CFUNCTYPE(c_int, c_void_p, POINTER(Endpoint)),
+    "publish": CFUNCTYPE(c_int, c_void_p, POINTER(Endpoint)),
+    "serve": CFUNCTYPE(c_int, c_void_p, POINTER(Endpoint)),
+}
 """The functions of `solfer_host`, in their order."""
 
 
@@ -128,7 +156,7 @@ Create = PYFUNCTYPE(c_void_p, POINTER(HostRecord), POINTER(c_char), c_size_t)
 Destroy = PYFUNCTYPE(None, c_void_p)
 ErrorText = PYFUNCTYPE(c_char_p, c_void_p)
 Step = PYFUNCTYPE(c_int, c_void_p)
-"""A step of a component that keeps the GIL."""
+"""A step of a component that keeps the interpreter's lock."""
 
 FreeStep = CFUNCTYPE(c_int, c_void_p)
 """One that releases it."""

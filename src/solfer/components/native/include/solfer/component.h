@@ -70,6 +70,31 @@ typedef struct {
   solfer_array jacobian;
 } solfer_point;
 
+/* What a Robot Point is made of; kinds are those of solfer.points. */
+typedef struct {
+  const char *kind;
+  const char *link; /* of a link; else empty */
+  const int *operands;
+  size_t operand_count;
+  const double *numbers; /* an offset on the link, or the value of a constant */
+  size_t number_count;
+} solfer_point_request;
+
+/* A topic or a service. Fields are paths to numbers: "twist.linear.x", "data[7]"; what is sent may end in ":int" or
+ * ":bool". What does not belong to a kind of endpoint stays zero. */
+typedef struct {
+  const char *name;
+  const char *interface;
+  const char *const *fields; /* of the message, or of the request */
+  size_t field_count;
+  const char *const *reply_fields; /* of a service; `success` and `message` come by themselves */
+  size_t reply_field_count;
+  const double *numbers; /* what a topic publishes */
+  double rate;           /* how often; 0: after each cycle [Hz] */
+  solfer_handler handler;
+  void *user; /* of the handler */
+} solfer_endpoint;
+
 /* What the host offers while a component is created. Functions return NULL, or -1, after an error; the host keeps its
  * text, and `create` has to return NULL then. What they return is valid until `destroy`. */
 typedef struct {
@@ -85,18 +110,13 @@ typedef struct {
   /* Sources: state, motor, command, lower_limits, upper_limits with an interface ("position"), an interface that
    * `command` lacks is added; dynamics with bias, inertia, inertia_inverse; start with "position". */
   const solfer_array *(*array)(void *context, const char *source, const char *name);
-  /* Kinds are those of solfer.points; points are computed in their order before each `update`. */
-  const solfer_point *(*point)(void *context, const char *kind, const char *link, const int *operands, size_t count,
-                               const double *numbers, size_t size);
+  /* Points are computed in their order before each `update`. */
+  const solfer_point *(*point)(void *context, const solfer_point_request *request);
   const solfer_array *(*port)(void *context, int is_output, const char *name, const char *quantity);
   int (*log)(void *context, const char *name, const double *numbers, size_t size, const char *unit);
-  /* Fields are paths to numbers: "twist.linear.x", "data[7]"; what is sent may end in ":int" or ":bool". */
-  int (*receive)(void *context, const char *topic, const char *interface, const char *const *fields, size_t count,
-                 solfer_handler handler, void *user);
-  int (*publish)(void *context, const char *topic, const char *interface, const char *const *fields, size_t count,
-                 const double *numbers, double rate);
-  int (*serve)(void *context, const char *name, const char *interface, const char *const *request, size_t requests,
-               const char *const *reply, size_t replies, solfer_handler handler, void *user);
+  int (*receive)(void *context, const solfer_endpoint *endpoint);
+  int (*publish)(void *context, const solfer_endpoint *endpoint);
+  int (*serve)(void *context, const solfer_endpoint *endpoint);
 } solfer_host;
 
 /* A class of components. `create` gets room for the text of an error. NULL: it has no such function. */

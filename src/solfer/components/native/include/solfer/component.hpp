@@ -255,20 +255,28 @@ class Setup {
   }
   void receive(const char *topic, const char *interface, const Fields &fields,
                std::function<void(const double *)> handler) {
-    auto *kept = keep([handler = std::move(handler)](const double *numbers, double *) { handler(numbers); });
-    checked(host_.receive(host_.context, topic, interface, fields.data(), fields.size(), &detail::Handler::run, kept));
+    solfer_endpoint endpoint = endpoint_of(topic, interface, fields);
+    endpoint.user = keep([handler = std::move(handler)](const double *numbers, double *) { handler(numbers); });
+    endpoint.handler = &detail::Handler::run;
+    checked(host_.receive(host_.context, &endpoint));
   }
   /// Publishes numbers, which stay where they are, after each cycle, or `rate` times a second.
   void publish(const char *topic, const char *interface, const Fields &fields, const double *numbers,
                double rate = 0.0) {
-    checked(host_.publish(host_.context, topic, interface, fields.data(), fields.size(), numbers, rate));
+    solfer_endpoint endpoint = endpoint_of(topic, interface, fields);
+    endpoint.numbers = numbers;
+    endpoint.rate = rate;
+    checked(host_.publish(host_.context, &endpoint));
   }
   /// Offers a service whose reply has `success` and `message`, which come by themselves; a throw is a refusal.
   void serve(const char *name, const char *interface, const Fields &request, const Fields &reply,
              std::function<void(const double *, double *)> handler) {
-    auto *kept = keep(std::move(handler));
-    checked(host_.serve(host_.context, name, interface, request.data(), request.size(), reply.data(), reply.size(),
-                        &detail::Handler::run, kept));
+    solfer_endpoint endpoint = endpoint_of(name, interface, request);
+    endpoint.reply_fields = reply.data();
+    endpoint.reply_field_count = reply.size();
+    endpoint.user = keep(std::move(handler));
+    endpoint.handler = &detail::Handler::run;
+    checked(host_.serve(host_.context, &endpoint));
   }
 
  private:
@@ -280,6 +288,14 @@ class Setup {
   static void checked(int result) {
     if (result != 0) throw detail::HostError();
   }
+  static solfer_endpoint endpoint_of(const char *name, const char *interface, const Fields &fields) {
+    solfer_endpoint endpoint = {};
+    endpoint.name = name;
+    endpoint.interface = interface;
+    endpoint.fields = fields.data();
+    endpoint.field_count = fields.size();
+    return endpoint;
+  }
   View array(const char *source, const char *name) const {
     return View(checked(host_.array(host_.context, source, name)));
   }
@@ -289,8 +305,8 @@ class Setup {
   Point made(const char *kind, const char *link, std::initializer_list<Point> operands, const Numbers &numbers) const {
     std::vector<int> indices;
     for (const Point &each : operands) indices.push_back(each.index);
-    return Point(checked(host_.point(host_.context, kind, link, indices.data(), indices.size(), numbers.data(),
-                                     numbers.size())));
+    const solfer_point_request request = {kind, link, indices.data(), indices.size(), numbers.data(), numbers.size()};
+    return Point(checked(host_.point(host_.context, &request)));
   }
   const solfer_value &tag(const char *name, solfer_kind kind) const {
     for (std::size_t i = 0; i < tags_.size(); ++i)

@@ -62,8 +62,7 @@ executor: {{rate: 200, start: [test], blend: 0.2}}
         process = layer.start(REPOSITORY / "nodes" / "xbot", str(file), "--namespace", layer.name)
         until(lambda: layer.state() is PluginState.RUNNING, "the plugin")
         if how == "hang":
-            layer.watch(2.0)
-            process.kill()
+            layer.watchdog()
         assert process.wait(60.0) == -(signal.SIGKILL if how == "hang" else signal.SIGSEGV)
         layer.look()
         before = layer.samples[-1][1]
