@@ -5,18 +5,25 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+import yaml
 from support.integration.world import World
 from support.integration.xbot_system import HELD, REPOSITORY, system, until
 from support.integration.xbot_world import XbotWorld
-from support.native import JointSpaceTwin, build
+from support.native import LISTINGS, JointSpaceTwin, TaskTrackingTwin, build
 from support.plugins.plugin import configuration
 
-from solfer.plugins import PluginState
+from solfer.config import load_shared
+from solfer.plugins import PluginState, Registry
 
 pytestmark = pytest.mark.slow
 
-TWIN = f"{JointSpaceTwin.__module__}:{JointSpaceTwin.__name__}"
-CARRIED = {"dynamics": True, "kinematics": True, "joints": "arms"}
+COMPUTES = {"dynamics": True, "kinematics": True}
+CARRIED = COMPUTES | {"joints": "arms"}
+TRACKED = COMPUTES | {
+    "way": [0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.02],
+    "hands": "manipulation",
+    "torso": "torso_2",
+}
 
 
 @pytest.fixture(scope="module")
@@ -24,27 +31,58 @@ def library(tmp_path_factory):
     return build(tmp_path_factory.mktemp("native") / "libcomponents.so")
 
 
-def commands(world, folder, target):
-    """Run the component for a second; return the torques that it has commanded in each period."""
-    plugin = world.plugin("test", configuration(folder, **{"class": target}, **CARRIED), target)
+@pytest.fixture(scope="module")
+def listings(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("native") / "liblistings.so", source=LISTINGS)
+
+
+def commands(world, folder, target, tags):
+    """Run the component for a second; return positions and torques that it has commanded in each period."""
+    plugin = world.plugin("test", configuration(folder, **{"class": target}, **tags), target)
     sent = []
     for _ in range(100):
         world.run(0.01)
-        sent.append(plugin.robot.command.torque.copy())
+        sent.append((plugin.robot.command.position.copy(), plugin.robot.command.torque.copy()))
     assert plugin.life is PluginState.RUNNING
     return np.array(sent)
 
 
 @pytest.mark.parametrize("made", (lambda _: World(), XbotWorld), ids=("memory", "shared memory"))
-def test_it_commands_what_its_twin_commands(library, tmp_path, made):
+@pytest.mark.parametrize(
+    ("file", "name", "twin", "tags"),
+    (
+        ("library", "JointSpace", JointSpaceTwin, CARRIED),
+        ("listings", "TaskTracking", TaskTrackingTwin, TRACKED),
+    ),
+)
+def test_it_commands_what_its_twin_commands(request, tmp_path, file, name, twin, tags, made):
+    native = f"{request.getfixturevalue(file)}::{name}"
     found = {}
-    for name, target in (("native", f"{library}::JointSpace"), ("twin", TWIN)):
+    for name, target in (("native", native), ("twin", f"{twin.__module__}:{twin.__name__}")):
         folder = tmp_path / name
         folder.mkdir()
         with closing(made(folder)) as world:
-            found[name] = commands(world, folder, target)
-    native, twin = found["native"], found["twin"]
-    assert np.abs(native - twin).max() < 1e-12 < np.ptp(native, axis=0).max()
+            found[name] = commands(world, folder, target, tags)
+    assert np.abs(found["native"] - found["twin"]).max() < 1e-12
+    assert np.ptp(found["native"], axis=0).max() > 0.01
+
+
+def test_two_of_one_library_share_a_plugin(library, tmp_path):
+    file = configuration(tmp_path, **{"class": f"{library}::JointSpace"}, **CARRIED)
+    tree = yaml.safe_load(file.read_text())
+    modules = tree["mwoibn"]["modules"]
+    modules["other"] = modules["test"] | {"class": f"{library}::Empty", "mode": "idle"}
+    del modules["other"]["joints"]
+    modules["both"] = {"layer": "NRT", "plugins": ["other", "test"]}
+    file.write_text(yaml.safe_dump(tree))
+    with closing(World()) as world:
+        shared = load_shared(file, "both", default=Registry().configuration, system="SM")
+        together = world.together(shared.plugins)
+        together.start()
+        world.bus.every(1.0 / together.rate, together.cycle, cycles=True)
+        world.run(0.5)
+        assert [each.plugin.life for each in together.plugins] == [PluginState.RUNNING] * 2
+        assert together.plugins[0].plugin.robot.shares_measurement(together.plugins[1].plugin.robot)
 
 
 @pytest.mark.parametrize("how", ("segfault", "hang"))

@@ -4,6 +4,7 @@ import ctypes
 from collections.abc import Callable
 from ctypes import POINTER, addressof, c_char, c_char_p, c_size_t, c_void_p, cast
 from functools import wraps
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,8 +106,10 @@ class Host:
         return guarded
 
     def _placed_error(self, error: Exception) -> Exception:
+        tags = self._component.tags
         if isinstance(error, SolferError):
-            error.at(self._component.tags.where())
+            named = (key for key, value in tags if isinstance(value, str) and value and repr(value) in str(error))
+            error.at(tags.where(*islice(named, 1)))
         return error
 
     def _keep(self, value: Any) -> Any:

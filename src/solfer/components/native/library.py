@@ -70,7 +70,7 @@ def _found(file: str, where: str) -> Path:
         if (folder / file).is_file():
             return (folder / file).resolve()
     near = sorted({each.name for folder in folders if folder.is_dir() for each in folder.glob("*.so")})
-    expected = "one in the lib folder of a sourced workspace, or of LD_LIBRARY_PATH, or a path to it"
+    expected = "one in the lib folder of a workspace that is built and sourced, or of LD_LIBRARY_PATH, or a path to it"
     raise UnknownName("library", file, near, where=where, expected=expected)
 
 
