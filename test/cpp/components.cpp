@@ -108,4 +108,18 @@ class Failing : public solfer::Component {
   double number_ = 0.0;
 };
 
-SOLFER_LIBRARY(SOLFER_COMPONENT(Empty), SOLFER_COMPONENT(JointSpace), SOLFER_COMPONENT(Failing))
+// Keeps a place of the world, in the desired positions of the first three DoFs.
+class Remembering : public solfer::Component {
+ public:
+  explicit Remembering(solfer::Setup &setup) : desired_(setup.command("position")) {}
+  void init() override {
+    for (std::size_t i = 0; i < 3; ++i) desired_[i] = 1.0 + i;
+  }
+  void move_world(const solfer::Move &move) override { move.place(desired_.data()); }
+
+ private:
+  solfer::View desired_;
+};
+
+SOLFER_LIBRARY(SOLFER_COMPONENT(Empty), SOLFER_COMPONENT(JointSpace), SOLFER_COMPONENT(Failing),
+               SOLFER_COMPONENT(Remembering))

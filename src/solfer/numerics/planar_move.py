@@ -38,15 +38,15 @@ class PlanarMove:
         yaw: Angle of Rz, by which the heading has changed [rad].
 
     Attributes:
-        yaw: See above.
+        before, after, yaw: See above.
         rise: How much higher the base is [m].
     """
 
     def __init__(self, before: np.ndarray, after: np.ndarray, yaw: float):
         self.yaw = yaw
         self.rise = float(after[2] - before[2])
-        self._before = np.array(before, dtype=float)
-        self._after = np.array(after, dtype=float)
+        self.before = np.array(before, dtype=float)
+        self.after = np.array(after, dtype=float)
         self._cos = math.cos(yaw)
         self._sin = math.sin(yaw)
         self._quaternion = about_z(yaw)
@@ -54,14 +54,14 @@ class PlanarMove:
     @property
     def distance(self) -> float:
         """How far the base has moved [m]."""
-        return float(np.linalg.norm(self._after - self._before))
+        return float(np.linalg.norm(self.after - self.before))
 
     def move(self, place: np.ndarray) -> None:
         """Move a place, shape (3,) or its x and y, shape (2,) [m]."""
         size = len(place)
-        place -= self._before[:size]
+        place -= self.before[:size]
         self.rotate(place)
-        place += self._after[:size]
+        place += self.after[:size]
 
     def rotate(self, vector: np.ndarray) -> None:
         """Rotate a vector in the world, of whose numbers the first two are x and y."""

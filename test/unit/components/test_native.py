@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from support.native import FLAGS, LISTINGS, SOURCES, JointSpaceTwin, TaskTrackingTwin, build
 
+from solfer.components import Component
 from solfer.components.native import records
 from solfer.components.native.library import library_folders
 from solfer.components.native.messages import NumbersOfFields
 from solfer.components.native.tags import record_of
 from solfer.errors import ComponentError, MiddlewareError, SolferError, UnknownName
 from solfer.interfaces.declaration import TopicIn, TopicOut
+from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins.generation.registry import load_class
 from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger
@@ -61,8 +63,10 @@ def cycle(component):
     return robot.command
 
 
-def test_joint_space_control_equals_its_twin_to_the_last_digits(library):
-    native, twin = started(f"{library}::JointSpace"), JointSpaceTwin(centauro(), JointSpaceTwin.Tags())
+@pytest.mark.parametrize("releases_gil", (False, True))
+def test_joint_space_control_equals_its_twin_to_the_last_digits(library, releases_gil):
+    native = started(f"{library}::JointSpace", {"releases_gil": releases_gil})
+    twin = JointSpaceTwin(centauro(), JointSpaceTwin.Tags())
     twin.model.update()
     twin.init()
     random = np.random.default_rng(70)
@@ -147,6 +151,16 @@ def test_live_numbers_move_in_place(library):
     first = cycle(component).torque.copy()
     component.live_parameters()[0].write(200.0)
     assert cycle(component).torque[6:] - first[6:] == pytest.approx(-10.0)
+
+
+def test_a_place_of_the_world_moves_with_it(library):
+    component = started(f"{library}::Remembering")
+    move = PlanarMove((0.5, 0.0, 0.1), (2.0, 3.0, 0.4), 0.7)
+    place = np.array((1.0, 2.0, 3.0))
+    move.move(place)
+    component.move_world(move)
+    assert component.model.command.position[:3] == pytest.approx(place, abs=1e-15)
+    assert load_class(f"{library}::Empty").move_world is Component.move_world
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from solfer.components.native.library import NativeClass, find_class
 from solfer.components.native.tags import RELEASES_GIL, fill, record_of
 from solfer.errors import ComponentError
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
+from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
 
 
@@ -48,8 +49,7 @@ class NativeComponent(Component):
         self._points = host.points if len(host.points) else None
         step = records.FreeStep if getattr(tags, RELEASES_GIL) else records.Step
         self._init, self._update, self._send, self._reset, self._stop = (
-            step(getattr(record, each)) if getattr(record, each) else _nothing
-            for each in ("init", "update", "send", "reset", "stop")
+            step(getattr(record, each)) if getattr(record, each) else _nothing for each in records.STEPS
         )
 
     def _created(self) -> ctypes.c_void_p:
@@ -153,6 +153,16 @@ class NativeComponent(Component):
         )
 
 
+class MovingNativeComponent(NativeComponent):
+    """One whose class moves its references with the world; base class of those."""
+
+    def move_world(self, move: PlanarMove) -> None:
+        """See `Component.move_world`."""
+        given = records.Move(tuple(move.before), tuple(move.after), move.yaw)
+        if records.MoveWorld(self.native.record.move_world)(self._instance, ctypes.byref(given)):
+            self._fail("move_world")
+
+
 def _nothing(_instance: Any) -> int:
     return 0
 
@@ -162,7 +172,8 @@ def _class_of(native: NativeClass) -> type[NativeComponent]:
     record = native.record
     tags = record_of(native.name, list(record.tags[: record.tag_count]))
     about = records.text(record.description) or f"The component {native.name} of {native.file.name}."
-    return type(native.name, (NativeComponent,), {"native": native, "Tags": tags, "__doc__": about})
+    base = MovingNativeComponent if record.move_world else NativeComponent
+    return type(native.name, (base,), {"native": native, "Tags": tags, "__doc__": about})
 
 
 def load_native(target: str, where: str = "") -> type[NativeComponent]:

@@ -98,6 +98,12 @@ class Endpoint(Structure):
     ]
 
 
+class Move(Structure):
+    """`solfer_move`."""
+
+    _fields_ = [("before", 3 * c_double), ("after", 3 * c_double), ("yaw", c_double)]
+
+
 # the interpreter's lock stays with the caller: handlers take a few microseconds
 Handler = PYFUNCTYPE(c_int, *(c_void_p, Doubles, Doubles, POINTER(c_char), c_size_t))
 
@@ -130,6 +136,10 @@ class HostRecord(Structure):
     ]
 
 
+STEPS = ("init", "update", "send", "reset", "stop")
+"""Steps of a component, which have no arguments."""
+
+
 class ClassRecord(Structure):
     """`solfer_class`; its functions are addresses."""
 
@@ -138,7 +148,7 @@ class ClassRecord(Structure):
         ("description", c_char_p),
         ("tags", POINTER(Tag)),
         ("tag_count", c_size_t),
-        *((name, c_void_p) for name in ("create", "destroy", "init", "update", "send", "reset", "stop", "error")),
+        *((name, c_void_p) for name in ("create", "destroy", *STEPS, "move_world", "error")),
     ]
 
 
@@ -157,6 +167,8 @@ Destroy = PYFUNCTYPE(None, c_void_p)
 ErrorText = PYFUNCTYPE(c_char_p, c_void_p)
 Step = PYFUNCTYPE(c_int, c_void_p)
 """A step of a component that keeps the interpreter's lock."""
+
+MoveWorld = PYFUNCTYPE(c_int, c_void_p, POINTER(Move))
 
 FreeStep = CFUNCTYPE(c_int, c_void_p)
 """One that releases it."""

@@ -60,6 +60,13 @@ typedef struct {
   double pace; /* share of their speed with which motions go on */
 } solfer_time;
 
+/* A jump of the estimate of the base: a place p of the world goes to after + Rz(yaw) (p - before) [m, rad]. */
+typedef struct {
+  double before[3];
+  double after[3];
+  double yaw;
+} solfer_move;
+
 /* Receives numbers; `reply` is NULL for a topic. On error it writes a text of at most `size` bytes, and returns 1. */
 typedef int (*solfer_handler)(void *user, const double *numbers, double *reply, char *error, size_t size);
 
@@ -132,6 +139,7 @@ typedef struct {
   int (*send)(void *instance);
   int (*reset)(void *instance);
   int (*stop)(void *instance);
+  int (*move_world)(void *instance, const solfer_move *move);
   const char *(*error)(void *instance);
 } solfer_class;
 

@@ -28,6 +28,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -96,6 +97,25 @@ class Point {
   int index;
   View value;
   View jacobian;
+};
+
+/// A jump of the estimate of the base.
+class Move {
+ public:
+  explicit Move(const solfer_move &move) : move_(move), cos_(std::cos(move.yaw)), sin_(std::sin(move.yaw)) {}
+
+  double yaw() const { return move_.yaw; }
+  /// Moves a place of the world along, 3 numbers [m].
+  void place(double *at) const {
+    const double x = at[0] - move_.before[0], y = at[1] - move_.before[1];
+    at[0] = move_.after[0] + cos_ * x - sin_ * y;
+    at[1] = move_.after[1] + sin_ * x + cos_ * y;
+    at[2] += move_.after[2] - move_.before[2];
+  }
+
+ private:
+  const solfer_move &move_;
+  double cos_, sin_;
 };
 
 /// The time of a cycle [s], as `Component` in Python has it.
@@ -335,6 +355,8 @@ class Component {
   virtual void send() {}    ///< writes the desired State; must not block
   virtual void reset() {}   ///< forgets past states and requests; `init` follows
   virtual void stop() {}    ///< brings the desired State to rest
+  /// Moves references that are given in the world; found out for a class that overrides it.
+  virtual void move_world(const Move &) {}
 };
 
 namespace detail {
@@ -379,6 +401,11 @@ struct Instance {
     auto *self = static_cast<Instance *>(instance);
     return guarded(self->error, sizeof self->error, [self] { (self->component.get()->*function)(); });
   }
+  static int move(void *instance, const solfer_move *move) {
+    auto *self = static_cast<Instance *>(instance);
+    return guarded(self->error, sizeof self->error, [self, move] { self->component->move_world(Move(*move)); });
+  }
+  static constexpr bool moves = !std::is_same_v<decltype(&T::move_world), void (Component::*)(const Move &)>;
   static const char *text(void *instance) { return static_cast<Instance *>(instance)->error; }
 };
 
@@ -396,6 +423,7 @@ __attribute__((visibility("hidden"))) const solfer_class *make_class(const char 
       &Instance<T>::template run<&Component::send>,
       &Instance<T>::template run<&Component::reset>,
       &Instance<T>::template run<&Component::stop>,
+      Instance<T>::moves ? &Instance<T>::move : nullptr,
       &Instance<T>::text,
   };
   return &made;
