@@ -1,0 +1,5 @@
+"""The component `policy`: a trained network that maps observations to the commands of joints."""
+
+from solfer.components.policy.component import Policy
+
+__all__ = ["Policy"]
