@@ -60,13 +60,27 @@ class Policy(Component):
         self._gains = [(robot.command.add(gain), numbers) for gain, numbers in self.contract.gains.items()]
         self._standing: list[np.ndarray] = []
         self._clocks = _Clocks(tags.rate)
-        self._target = np.zeros(len(self.contract.joints))
+        self._target, self._torque = np.zeros((2, len(self.contract.joints)))
         self._finite = np.zeros(len(self.contract.joints), dtype=bool)
         self._held = np.zeros(robot.size)
         self.fault = ""
         self.steps = 0
-        if tags.action.kind == "torque":
+        self._stiffness = self._own_springs()
+        if tags.action.kind == "torque" or self._stiffness is not None:
             self.efforts = self.contract.dofs.astype(np.int64)
+
+    def _own_springs(self) -> np.ndarray | None:
+        """Return the stiffness with which the plugin itself computes torques, those of the lower level's springs zero."""
+        action = self.tags.action
+        if action.kind != "position" or action.springs != "plugin":
+            return None
+        for index, gain in enumerate(self.contract.gains):
+            if gain == "stiffness":
+                values, numbers = self._gains[index]
+                self._gains[index] = (values, np.zeros(len(numbers)))
+                return numbers
+        what = "the plugin computes torques of springs, and there is no stiffness"
+        raise ComponentError(what, where=self.tags.where("action", "springs"), expected="`gains: {stiffness: ...}`")
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`; the network's rate is no higher."""
@@ -135,7 +149,14 @@ class Policy(Component):
                 np.copyto(values, standing)
             return
         dofs = self.contract.dofs
-        command[self.tags.action.kind][dofs] = self._target
+        if self._stiffness is None:
+            command[self.tags.action.kind][dofs] = self._target
+        else:
+            np.take(self.model.state.position, dofs, out=self._torque, mode="clip")
+            command.position[dofs] = self._torque
+            np.subtract(self._target, self._torque, out=self._torque)
+            self._torque *= self._stiffness
+            command.torque[dofs] = self._torque
         for values, numbers in self._gains:
             values[dofs] = numbers
 

@@ -57,6 +57,11 @@ class ActionRecord(Record):
     kind: ACTIONS = Field(
         "position", description="positions relative to `default` [rad, m], velocities [rad/s, m/s] or torques [Nm, N]"
     )
+    springs: Literal["lower_level", "plugin"] = Field(
+        "lower_level",
+        description="what pulls joints to positions: the lower level, which moves its springs smoothly to them, or torques "
+        "that the plugin computes in each of its cycles, beside the lower level's damping",
+    )
     scale: PerJoint | None = Field(None, description="factor of the actions; left out: the file's, or 1")
     clip: float = Field(
         100.0, gt=0.0, le=1e9, description="largest amount of an action before its scale; `last_action` is clipped, too"
