@@ -354,3 +354,23 @@ def test_torques_are_declared(tmp_path):
     assert np.array_equal(component.efforts, component.contract.dofs)
     assert not len(policy(file).efforts)
     assert component.topics() == () and policy(file).topics() == ()
+
+
+def test_springs_of_the_plugin_are_torques(tmp_path):
+    """Torques are those of the springs in each cycle, also between two steps; the lower level's have no stiffness."""
+    file, *_ = random_network(tmp_path, 9)
+    action = {"springs": "plugin", "scale": 0.1}
+    component = policy(file, action=action, gains={"stiffness": (10.0, 20.0, 30.0), "damping": 2.0})
+    robot = component.model
+    dofs = component.contract.dofs
+    assert np.array_equal(component.efforts, dofs)
+    for step in range(6):
+        moved(robot, step)
+        robot.state.position[3:5] = 0.0
+        command = cycle(component)
+        desired = component.contract.default + 0.1 * component.network.actions
+        torque = (10.0, 20.0, 30.0) * (desired - robot.state.position[dofs])
+        assert np.abs(command.torque[dofs] - torque).max() < 1e-6
+        assert not command["stiffness"][dofs].any() and (command["damping"][dofs] == 2.0).all()
+    with pytest.raises(SolferError, match="no stiffness"):
+        policy(file, action=action)

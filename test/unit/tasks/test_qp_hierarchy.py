@@ -18,9 +18,9 @@ from solfer.points import LinearPoint
 from solfer.tasks import (
     Constraint,
     Hierarchy,
-    QpPolicy,
     QpFailed,
     QpHierarchy,
+    QpPolicy,
     Stack,
     Task,
     TorqueLimits,

@@ -70,7 +70,7 @@ class Policy(Component):
             self.efforts = self.contract.dofs.astype(np.int64)
 
     def _own_springs(self) -> np.ndarray | None:
-        """Return the stiffness with which the plugin itself computes torques, those of the lower level's springs zero."""
+        """Return the stiffness of springs that the plugin computes, shape (m,); those of the lower level get none."""
         action = self.tags.action
         if action.kind != "position" or action.springs != "plugin":
             return None

@@ -59,8 +59,8 @@ class ActionRecord(Record):
     )
     springs: Literal["lower_level", "plugin"] = Field(
         "lower_level",
-        description="what pulls joints to positions: the lower level, which moves its springs smoothly to them, or torques "
-        "that the plugin computes in each of its cycles, beside the lower level's damping",
+        description="what pulls joints to positions: springs of the lower level, which moves their targets smoothly, or "
+        "torques of the plugin in each of its cycles, beside the lower level's damping",
     )
     scale: PerJoint | None = Field(None, description="factor of the actions; left out: the file's, or 1")
     clip: float = Field(
