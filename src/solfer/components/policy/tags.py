@@ -59,7 +59,7 @@ class ActionRecord(Record):
     )
     springs: Literal["lower_level", "plugin"] = Field(
         "lower_level",
-        description="what pulls joints to positions: springs of the lower level, which moves their targets smoothly, or "
+        description="what pulls joints to positions: the lower level, which moves its targets smoothly, or "
         "torques of the plugin in each of its cycles, beside the lower level's damping",
     )
     scale: PerJoint | None = Field(None, description="factor of the actions; left out: the file's, or 1")
