@@ -18,6 +18,7 @@ from solfer.plugins import PluginState, Registry, generate
 pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
 
 POLICY = "solfer.components.policy:Policy"
+SPRINGS = {"file": str(CONFIG / "support/springs.yaml")}
 TERMS = ("angular_velocity", "projected_gravity", "commands", "joint_position", "joint_velocity", "last_action")
 
 
@@ -50,9 +51,7 @@ def file_of(folder, weights=0.0, offset=0.0, **tags):
 
 def test_zero_actions_keep_the_robot_standing(tmp_path):
     """It runs 50 times a second in a loop of 200 Hz, with gains of its own, and the base stays where it is."""
-    springs = str(CONFIG / "support/springs.yaml")
-    stiffness = dict.fromkeys(legs(), 2000.0)
-    tags = {"gains": {"stiffness": stiffness, "damping": 50.0}, "secondary_file": {"file": springs}}
+    tags = {"gains": {"stiffness": dict.fromkeys(legs(), 2000.0), "damping": 50.0}, "secondary_file": SPRINGS}
     with closing(World()) as world:
         plugin = world.plugin("test", file_of(tmp_path, **tags), POLICY)
         world.run(0.5)
@@ -70,14 +69,16 @@ def test_zero_actions_keep_the_robot_standing(tmp_path):
 
 
 def test_a_posture_far_from_the_default_is_held(tmp_path, caplog):
-    default = legs() | {"torso_yaw": 1.0}
+    """With the gains that the lower level had before."""
+    tags = {"default": legs() | {"torso_yaw": 1.0}, "gains": {"stiffness": 5.0}, "secondary_file": SPRINGS}
     with closing(World()) as world:
-        plugin = world.plugin("test", file_of(tmp_path, default=default), POLICY)
+        plugin = world.plugin("test", file_of(tmp_path, **tags), POLICY)
         world.run(0.5)
         start = world.simulation.q.copy()
         world.run(1.0)
         assert "'torso_yaw' is -1.0" in caplog.text and caplog.text.count("holds until") == 1
         assert np.abs(world.simulation.q - start).max() < 2e-3 and not plugin.component.steps
+        assert plugin.robot.command["stiffness"][plugin.robot.dof("torso_yaw")] == 5000.0
 
 
 def test_no_number_of_the_network_holds(tmp_path, caplog):

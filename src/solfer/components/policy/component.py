@@ -240,5 +240,7 @@ class _Clocks:
         """Return whether the network runs now; then the next time is a step later. Steps that were missed are lost."""
         if self._left > tolerance:
             return False
-        self._left = max(self._left + self._step, 0.0)
+        self._left += self._step
+        if self._left < 0.5 * self._step:
+            self._left = self._step
         return True
