@@ -184,6 +184,24 @@ def test_reset_clears_history_and_state(tmp_path):
         assert np.array_equal(cycle(made).position, first)
 
 
+def test_numbers_of_a_term_are_picked(tmp_path):
+    """As holosoma orders them: the yaw rate before x and y, cosines before sines; two phases of two feet."""
+    file, *_ = random_network(tmp_path, 9)
+    feet = {"term": "phase", "period": 0.8, "offsets": (0.0, 0.5)}
+    listed = ({"term": "commands", "pick": (2,)}, {"term": "commands", "pick": (0, 1), "history": 1})
+    listed += ({**feet, "pick": (2, 3)}, {"term": "joint_position", "pick": (1, 0)}, {**feet, "pick": (0, 1)})
+    component = policy(file, observations=listed, rate=50.0)
+    component.receive(Twist(Vector(0.1, 0.2, 0.0), Vector(0.0, 0.0, 0.3)))
+    robot = component.model
+    for step in range(3):
+        cycle(component, 1)
+        angles = 2.0 * math.pi * (step * 0.02 / 0.8 + np.array((0.0, 0.5)))
+        away = [robot.state.position[robot.dof(JOINTS[each])] - DEFAULT[each] for each in (1, 0)]
+        expected = (0.3, 0.1, 0.2, *np.cos(angles), *away, *np.sin(angles))
+        assert component.network.observations == pytest.approx(expected, abs=1e-6)
+        component.let_pass(0.02)
+
+
 def test_a_command_counts_for_half_a_second(tmp_path):
     file = onnx_files.linear(tmp_path / "commands.onnx", np.eye(3), np.zeros(3))
     component = policy(file, observations=terms("commands"), action={"kind": "velocity"}, rate=50.0)
@@ -215,6 +233,19 @@ def test_metadata_count_where_tags_are_left_out(tmp_path):
         assert [term.term for term in contract.terms] == ["angular_velocity", "joint_position", "last_action"]
         assert np.array_equal(contract.scale, [0.5] * 3) and np.array_equal(contract.gains["stiffness"], [10, 20, 30])
         assert np.array_equal(contract.gains["damping"], [4.0] * 3)
+
+
+def test_metadata_of_holosoma_count(tmp_path):
+    metadata = {
+        "dof_names": '["j_arm1_1", "j_arm1_2", "j_arm1_3"]',
+        "kp": "[10.0, 20.0, 30.0]",
+        "kd": "[1.0, 2.0, 3.0]",
+    }
+    file, *_ = random_network(tmp_path, 9, metadata=metadata)
+    contract = policy(file, joints=None).contract
+    assert contract.joints == JOINTS
+    assert np.array_equal(contract.gains["stiffness"], [10.0, 20.0, 30.0])
+    assert np.array_equal(contract.gains["damping"], [1.0, 2.0, 3.0])
 
 
 def written(tmp_path, content="", **options):
@@ -263,6 +294,7 @@ REFUSALS = [
     ("observations: [{term: joint_position, history: 4}]", r":4:.*12 numbers.*observes 9", "joint_position 12"),
     ("observations: [{term: joint_positon}]", r":4:.*joint_positon", "joint_position"),
     ("observations: [{term: joint_position, scale: [1, 2]}]", r":4:.*3 numbers, and 2 scales", "one for each"),
+    ("observations: [{term: joint_position, pick: [3]}]", r":4:.*has no number 3", "from 0 to 2"),
     ("observations: -; file: named.onnx", r":1:.*unknown term 'height_scan'", ""),
     ("default: [0.0, 0.1]", r":3:.*2 numbers of 'default' for 3 joints", "one for each joint"),
     ("default: {j_arm1_1: 0, j_arm1_2: 0}", r":3:.*'default' lacks j_arm1_3", "one number for each joint"),

@@ -25,7 +25,10 @@ EXPORTED = {
     "joint_vel": "joint_velocity",
     "actions": "last_action",
 }
-"""Terms by their names in the metadata of files that mjlab and holosoma write."""
+"""Terms by their names in the metadata of files that mjlab writes."""
+
+KEYS = {"joint_names": "dof_names", "joint_stiffness": "kp", "joint_damping": "kd"}
+"""Keys of metadata as mjlab writes them, and as holosoma does."""
 
 
 @dataclass(frozen=True)
@@ -102,19 +105,24 @@ def widths(terms: Sequence[ObservationRecord], count: int) -> Iterator[tuple[str
 
 
 def width(term: ObservationRecord, count: int) -> int:
+    """Return how many numbers of one step are observed of a term, for `count` joints."""
+    return whole_width(term, count) if term.pick is None else len(term.pick)
+
+
+def whole_width(term: ObservationRecord, count: int) -> int:
     """Return how many numbers of one step a term has, for `count` joints."""
     if term.term == "phase":
         return 2 * len(term.offsets)
     return 3 if term.term in (*BASE_TERMS, "commands") else count
 
 
-def check_numbers(term: ObservationRecord, count: int, where: str) -> None:
-    """Check that a term has as many scales as numbers.
-
-    Raises:
-        SizeMismatch: It has not.
-    """
+def _check_numbers(term: ObservationRecord, count: int, where: str) -> None:
+    """Check that a term has the numbers that are picked, and as many scales."""
     needed = width(term, count)
+    largest = whole_width(term, count) - 1
+    if term.pick is not None and max(term.pick) > largest:
+        what = f"'{term.term}' has no number {max(term.pick)}"
+        raise SizeMismatch(what, where=term.where("pick") or where, expected=f"numbers from 0 to {largest}")
     if isinstance(term.scale, tuple) and len(term.scale) != needed:
         what = f"'{term.term}' has {needed} numbers, and {len(term.scale)} scales"
         raise SizeMismatch(what, where=term.where("scale") or where, expected="one for all, or one for each")
@@ -124,7 +132,7 @@ def _check_terms(
     terms: Sequence[ObservationRecord], count: int, network: PolicyNetwork, *, robot: Robot, where: str
 ) -> None:
     for term in terms:
-        check_numbers(term, count, where)
+        _check_numbers(term, count, where)
         if term.term in BASE_TERMS and robot.kinematics.base is None:
             what = f"the network observes '{term.term}', and '{robot.name}' has no floating base"
             raise ComponentError(what, where=term.where() or where, expected="terms of joints, or a floating base")
@@ -148,7 +156,8 @@ class _Source:
 
     def __init__(self, tags: PolicyTags, metadata: Mapping[str, str]):
         self._tags = tags
-        self._metadata = metadata
+        others = {key: metadata[other] for key, other in KEYS.items() if other in metadata}
+        self._metadata = others | dict(metadata)
 
     def place(self, *path: str | int) -> str:
         """Return the place of a tag, or of the file if it is left out."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.components.policy.contract import PolicyContract, width
+from solfer.components.policy.contract import PolicyContract, whole_width, width
 from solfer.components.policy.tags import TERMS
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.twist_transport import BaseKinematics
@@ -49,13 +49,12 @@ class StepNumbers:
         places = []
         before = 0  # phases of earlier terms
         for term in self._contract.terms:
-            start = starts[term.term]
+            found = starts[term.term] + np.arange(whole_width(term, len(self._contract.joints)))
             if term.term == "phase":
-                sines = start + before + np.arange(len(term.offsets))
-                places += [sines, sines + len(self._angles)]
+                found += before
+                found[len(term.offsets) :] += len(self._angles) - len(term.offsets)
                 before += len(term.offsets)
-            else:
-                places.append(start + np.arange(width(term, len(self._contract.joints))))
+            places.append(found if term.pick is None else found[list(term.pick)])
         return np.concatenate(places)
 
     def measure_base(self) -> None:

@@ -36,6 +36,9 @@ class ObservationRecord(Record):
     """A term of the observations: (number * scale), clipped, the oldest first where it has a history."""
 
     term: Term = Field(description="what is observed; joints in the order of `joints`")
+    pick: tuple[Annotated[int, Field(ge=0, le=1000)], ...] | None = Field(
+        None, min_length=1, description="which of its numbers, from zero on, in this order; left out: all"
+    )
     scale: Number | Annotated[tuple[Number, ...], Field(min_length=1)] = Field(
         1.0, description="factor of the numbers: one, or one for each of them"
     )
