@@ -11,9 +11,9 @@ from support.unit import onnx_files
 
 from solfer.config import load
 from solfer.errors import SolferError
-from solfer.interfaces.geometry import Twist, Vector
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
+from solfer.transport.messages import FieldsMessage
 
 pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
 
@@ -96,15 +96,30 @@ def test_gains_that_no_controller_carries_are_refused(tmp_path):
 
 
 def test_a_message_commands_the_base(tmp_path):
-    """The network adds the desired velocity of the base to the pose of the joints; half a second later it is zero."""
+    """What is published on `<name>/cmd_vel` is observed, and half a second after the last message it is zero."""
     with closing(World()) as world:
-        plugin = world.plugin("test", file_of(tmp_path), POLICY)
+        component = world.plugin("test", file_of(tmp_path), POLICY).component
+        writer = MemoryMiddleware(world.bus, "driver").writer("test/cmd_vel", "geometry_msgs/Twist")
         world.run(0.2)
-        component = plugin.component
-        (topic,) = component.topics()
-        topic.handler(Twist(Vector(0.2, 0.0, 0.0), Vector(0.0, 0.0, 0.1)))
+        writer.write(FieldsMessage({"linear": {"x": 0.2, "y": 0.05}, "angular": {"z": 0.1}}))
         world.run(0.1)
         observed = component.network.observations[6:9]
-        assert observed == pytest.approx((0.2, 0.0, 0.1))
-        world.run(0.6)
+        assert observed == pytest.approx((0.2, 0.05, 0.1))
+        world.run(0.35)
+        assert observed.any()
+        world.run(0.15)
         assert not observed.any()
+
+
+def test_lost_feedback_begins_again(tmp_path):
+    """The plugin holds without feedback; then the component begins with no history and no command."""
+    with closing(World()) as world:
+        plugin = world.plugin("test", file_of(tmp_path), POLICY)
+        world.run(1.0)
+        before = plugin.component.steps
+        world.received = False
+        world.run(1.0)
+        assert plugin.life is PluginState.STARTING and not plugin.component.steps
+        world.received = True
+        world.run(1.0)
+        assert plugin.life is PluginState.RUNNING and 40 < plugin.component.steps <= before + 1

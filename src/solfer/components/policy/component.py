@@ -57,7 +57,11 @@ class Policy(Component):
         self.network = PolicyNetwork(path, where)
         self.contract = agree(tags, self.network, robot)
         self._observations = Observations(robot, self.contract, self.network.observations)
-        self._gains = [(robot.command.add(gain), numbers) for gain, numbers in self.contract.gains.items()]
+        self._stiffness = self._own_springs()
+        sent = {gain: numbers.copy() for gain, numbers in self.contract.gains.items()}
+        if self._stiffness is not None:
+            sent["stiffness"][:] = 0.0
+        self._gains = [(robot.command.add(gain), numbers) for gain, numbers in sent.items()]
         self._standing: list[np.ndarray] = []
         self._clocks = _Clocks(tags.rate)
         self._target, self._torque = np.zeros((2, len(self.contract.joints)))
@@ -65,7 +69,6 @@ class Policy(Component):
         self._held = np.zeros(robot.size)
         self.fault = ""
         self.steps = 0
-        self._stiffness = self._own_springs()
         if tags.action.kind == "torque" or self._stiffness is not None:
             self.efforts = self.contract.dofs.astype(np.int64)
 
@@ -74,13 +77,11 @@ class Policy(Component):
         action = self.tags.action
         if action.kind != "position" or action.springs != "plugin":
             return None
-        for index, gain in enumerate(self.contract.gains):
-            if gain == "stiffness":
-                values, numbers = self._gains[index]
-                self._gains[index] = (values, np.zeros(len(numbers)))
-                return numbers
-        what = "the plugin computes torques of springs, and there is no stiffness"
-        raise ComponentError(what, where=self.tags.where("action", "springs"), expected="`gains: {stiffness: ...}`")
+        stiffness = self.contract.gains.get("stiffness")
+        if stiffness is None:
+            what = "the plugin computes torques of springs, and there is no stiffness"
+            raise ComponentError(what, where=self.tags.where("action", "springs"), expected="`gains: {stiffness: ...}`")
+        return stiffness
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`; the network's rate is no higher."""
