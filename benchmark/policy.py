@@ -8,13 +8,14 @@ which draws the factor of all masses of the simulated robot (0.9 or 1.1) and the
 to 1.2). A run succeeds if the base is 10 m ahead within 40 s, without a fall or a fault. A program beside the plugin
 sends `cmd_vel` 50 times a second: 0.5 m/s and the heading of the start, corrected by the `VelocityTracker` of the
 package: the policy alone turns by 5 degrees a second, also in the package's own world. `--springs lower_level` leaves
-springs to the lower level. The first row compares targets with those of the package's own runner on the same
+springs to the lower level, `--engine bullet` takes PyBullet. The first row compares targets with those of the package's own runner on the same
 observations, along a walk of 5 s [rad].
 """
 
 import importlib
 import importlib.util
 import logging
+import os
 import re
 import sys
 import tempfile
@@ -26,7 +27,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from form import Figures, parser_of
+from form import Figures, add_engine, parser_of
 
 from solfer.components.policy import Policy
 from solfer.config import load
@@ -35,6 +36,7 @@ from solfer.interfaces.geometry import Twist, Vector
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.engines import ENGINE_VARIABLE
 from solfer.simulation.server.publications import robot_parameters
 from solfer_tools.cli.main import main as solfer
 
@@ -116,7 +118,7 @@ class Walk:
         bundle = read_bundle(file.parent / "robots/go2/robot.yaml").with_perfect_sensors()
         self.bus = Bus(robot_parameters(bundle))
         urdf = scaled(bundle.urdf.location.read_text(), masses)
-        self.simulation = Simulation.from_file(bundle, description_text=urdf, engine="mujoco")
+        self.simulation = Simulation.from_file(bundle, description_text=urdf)
         for leg in ("FL", "FR", "RL", "RR"):
             self.simulation.set_friction(f"{leg}_calf", friction)
         self.simulation.set_friction("ground", 1.0)
@@ -204,8 +206,10 @@ def compare(walk: Walk) -> float:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark."""
     parser = parser_of(__doc__)
+    add_engine(parser)
     parser.add_argument("--seeds", type=int, default=10, help="number of runs")
     parser.add_argument("--springs", choices=("plugin", "lower_level"), default="plugin", help="what pulls the joints")
+    os.environ.setdefault(ENGINE_VARIABLE, "mujoco")
     options = parser.parse_args(arguments)
     logging.disable(logging.ERROR)
     figures = Figures(options.json)
