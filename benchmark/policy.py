@@ -8,8 +8,8 @@ which draws the factor of all masses of the simulated robot (0.9 or 1.1) and the
 to 1.2). A run succeeds if the base is 10 m ahead within 40 s, without a fall or a fault. A program beside the plugin
 sends `cmd_vel` 50 times a second: 0.5 m/s and the heading of the start, corrected by the `VelocityTracker` of the
 package: the policy alone turns by 5 degrees a second, also in the package's own world. `--springs lower_level` leaves
-springs to the lower level, `--engine bullet` takes PyBullet. The first row compares targets with those of the package's own runner on the same
-observations, along a walk of 5 s [rad].
+springs to the lower level, `--engine bullet` takes PyBullet. The first row compares targets with those of the package's
+own runner on the same observations, along a walk of 5 s [rad].
 """
 
 import importlib
