@@ -26,9 +26,9 @@ from form import Figures, parser_of
 from PIL import Image
 from robots import state_srdf
 
-from solfer.components.wheeled_motion.drive import Twist, Vector
 from solfer.config import load
 from solfer.errors import SolferError
+from solfer.interfaces.geometry import Twist, Vector
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.numerics.rotations import rotation_from_quaternion

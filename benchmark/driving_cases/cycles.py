@@ -11,9 +11,8 @@ from points import ROUNDS, URDF, unit
 
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist, Vector
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 

@@ -46,7 +46,14 @@ def imported(path: Path) -> set[str]:
 def test_what_is_imported_is_declared_and_nothing_else():
     files = [path for path in SOURCES.rglob("*.py") if not ROS & {path, *path.parents}]
     others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer", "solfer_tools"}
-    used = (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"], *EXTRAS["study"], *EXTRAS["view"])
+    used = (
+        *PROJECT["dependencies"],
+        *EXTRAS["simulation"],
+        *EXTRAS["logs"],
+        *EXTRAS["study"],
+        *EXTRAS["view"],
+        *EXTRAS["policy"],
+    )
     declared = {Requirement(text).name for text in used}
     assert {NAMES.get(name, name) for name in others} == declared - INDIRECT
 
@@ -54,7 +61,7 @@ def test_what_is_imported_is_declared_and_nothing_else():
 @pytest.mark.parametrize("text", [*PROJECT["dependencies"], *(text for extra in EXTRAS.values() for text in extra)])
 def test_the_pinned_versions_are_within_the_declared_ranges(text):
     """PyYAML is not pinned: ROS brings Debian's; solfer is one of the extras."""
-    files = [REPOSITORY / f"requirements{each}.txt" for each in ("", "-study", "-view")]
+    files = [REPOSITORY / f"requirements{each}.txt" for each in ("", "-policy", "-study", "-view")]
     lines = [line for file in files for line in file.read_text().splitlines()]
     pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
     declared = Requirement(text)

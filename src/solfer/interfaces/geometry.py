@@ -13,6 +13,14 @@ class Vector:
 
 
 @dataclass(frozen=True)
+class Twist:
+    """A velocity: linear [m/s] and angular [rad/s]."""
+
+    linear: Vector = field(default_factory=Vector)
+    angular: Vector = field(default_factory=Vector)
+
+
+@dataclass(frozen=True)
 class Turn:
     """A quaternion."""
 

@@ -11,7 +11,7 @@ _HOMES = {
     "Constraint": "constraints",
     "Hierarchy": "hierarchy",
     "Levels": "stack",
-    "Policy": "qp_hierarchy",
+    "QpPolicy": "qp_hierarchy",
     "QpFailed": "qp_hierarchy",
     "QpHierarchy": "qp_hierarchy",
     "ReferenceIntegrator": "integrator",

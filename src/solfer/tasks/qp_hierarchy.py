@@ -19,7 +19,7 @@ from solfer.throttle import Throttle
 log = logging.getLogger(__name__)
 
 
-class Policy(enum.Enum):
+class QpPolicy(enum.Enum):
     """Reaction to a level whose QP is infeasible or fails; what fails is logged where it begins."""
 
     HOLD = "hold"
@@ -74,7 +74,7 @@ class QpHierarchy:
         levels: Levels,
         bounds: VelocityBounds | None = None,
         constraints: Sequence[Constraint] = (),
-        policy: Policy | str = Policy.HOLD,
+        policy: QpPolicy | str = QpPolicy.HOLD,
         position: np.ndarray | None = None,
         *,
         relax: Sequence[str] | None = None,
@@ -105,7 +105,7 @@ class QpHierarchy:
             for index in range(len(self.stack.levels))
         ]
         self._relaxed_level: QpLevel | None = None
-        if self.policy is Policy.RELAX and self._inequalities.rows:
+        if self.policy is QpPolicy.RELAX and self._inequalities.rows:
             yields = np.isinf(weights) & _named(self._inequalities.names, relax)
             weights = np.where(yields, 1e4, weights)  # beside tasks of weight 1
             self._relaxed_level = QpLevel(
@@ -188,7 +188,7 @@ class QpHierarchy:
         """Apply the policy; return the relaxed solution, None if the level adds nothing."""
         where = f"level {index} ({' + '.join(task.name for task in self.stack.levels[index])})"
         what = f"the QP is {solution.status.value} after {solution.iterations} steps"
-        if self.policy is Policy.STOP:
+        if self.policy is QpPolicy.STOP:
             self.velocity[:] = 0.0
             raise QpFailed(what, solution, where)
         if index == 0 and self._relaxed_level is not None:
@@ -225,8 +225,8 @@ def _named(names: np.ndarray, selected: Sequence[str] | None) -> np.ndarray:
     return np.full(len(names), True) if selected is None else np.isin(names.astype(str), list(selected))
 
 
-def _policy(policy: Policy | str) -> Policy:
-    names = [one.value for one in Policy]
-    if not isinstance(policy, Policy) and policy not in names:
+def _policy(policy: QpPolicy | str) -> QpPolicy:
+    names = [one.value for one in QpPolicy]
+    if not isinstance(policy, QpPolicy) and policy not in names:
         raise UnknownName("policy", str(policy), names)
-    return Policy(policy)
+    return QpPolicy(policy)

@@ -17,6 +17,7 @@ ALL_COMMANDS = {
     "cut": "solfer_tools.cli.commands.cut",
     "rt": COMMANDS["rt"],
     "params": "solfer_tools.cli.commands.params",
+    "policy": "solfer_tools.cli.commands.policy",
     "scenario": "solfer_tools.cli.commands.scenario",
     "study": "solfer_tools.cli.commands.study",
     "top": "solfer_tools.cli.commands.top",

@@ -10,9 +10,8 @@ from support.shared.figure_5 import tree, write
 from support.shared.middlewares import BEGIN, BLEND, STEP, InLayer, InMemory, write_layer
 
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist, Vector
 from solfer.plugins import PluginState
 
 pytestmark = pytest.mark.soak

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solfer.components.wheeled_motion.drive import Twist, Vector
 from solfer.config import load
 from solfer.errors import ComponentError
+from solfer.interfaces.geometry import Twist, Vector
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.plugins import Registry, generate

@@ -7,9 +7,8 @@ from support.robots import centauro
 from support.unit.declarations import named
 
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
 from solfer.config import load
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist, Vector
 
 RATE = 200.0  # [Hz]
 LOWER = 30  # DoFs of the lower body and the base

@@ -11,10 +11,10 @@ from support.unit.declarations import named
 from solfer import Robot
 from solfer.components.support_shaping import SupportShaping
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
 from solfer.errors import ComponentError
+from solfer.interfaces.geometry import Twist
 from solfer.interfaces.support import LiftContacts
 from solfer.interfaces.task_references import Vector
 

@@ -12,11 +12,11 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from solfer.components.wheeled_motion.drive import Drive, Twist
+from solfer.components.wheeled_motion.drive import Drive
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.references import References
 from solfer.errors import ComponentError
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist, Vector
 
 PERIOD, ACCELERATION = 0.005, 0.3  # [s], [m/s2]
 BASE_SPEED, TURN_SPEED, VERTEX_SPEED = 0.5, 0.4, 0.1

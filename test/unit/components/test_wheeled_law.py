@@ -11,10 +11,10 @@ from support.unit.declarations import named
 
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist, WheelsState
+from solfer.components.wheeled_motion.drive import WheelsState
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist, Vector
 from solfer.interfaces.support import LiftContacts
 
 

@@ -10,12 +10,12 @@ from support.unit.declarations import named
 from support.unit.wheeled import LOWER, RATE, cycle, make, move, recorded, robot  # noqa: F401, fixtures
 
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist, WheelsState
+from solfer.components.wheeled_motion.drive import WheelsState
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist, Vector
 from solfer.interfaces.support import LEAD
 from solfer.interfaces.task_references import GetReference
 from solfer.numerics.solvers.damped_descent import DampedDescent

@@ -18,9 +18,9 @@ from solfer.points import LinearPoint
 from solfer.tasks import (
     Constraint,
     Hierarchy,
-    Policy,
     QpFailed,
     QpHierarchy,
+    QpPolicy,
     Stack,
     Task,
     TorqueLimits,
@@ -291,7 +291,7 @@ def test_a_nan_task_is_a_failure(arm):
 
 def test_a_policy_may_be_a_member(arm):
     task = Task("joints", Rows(arm, np.eye(7)))
-    assert QpHierarchy([task], policy=Policy.STOP).policy is Policy("stop")
+    assert QpHierarchy([task], policy=QpPolicy.STOP).policy is QpPolicy("stop")
 
 
 @pytest.mark.slow

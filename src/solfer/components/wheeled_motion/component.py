@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.components.base import Component
 from solfer.components.live_tunings import live_tunings
-from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
+from solfer.components.wheeled_motion.drive import Drive, WheelsState
 from solfer.components.wheeled_motion.inputs import ReferenceInputs
 from solfer.components.wheeled_motion.joints import CommandedJoints
 from solfer.components.wheeled_motion.kernel import FLOOR
@@ -42,6 +42,7 @@ from solfer.components.wheeled_motion.tasks import DrivingTasks
 from solfer.components.wheeled_motion.wheels import DrivenWheels, moved_by
 from solfer.errors import ComponentError, UnknownName
 from solfer.interfaces.declaration import LiveParameter, Service, TopicIn, TopicOut
+from solfer.interfaces.geometry import Twist
 from solfer.interfaces.support import BASE_PORT, VERTICES_PORT, LiftContacts, LiftReply, StepContact
 from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.numerics.planar_move import PlanarMove, about_z

@@ -1,7 +1,7 @@
 """Velocities of the base that others send again and again, such as a joystick or navigation."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,16 +9,8 @@ from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, 
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import STREAM_TIMEOUT, check
 from solfer.errors import ComponentError, NotFinite
-from solfer.interfaces.geometry import Vector
+from solfer.interfaces.geometry import Twist
 from solfer.numerics.planar_move import PlanarMove
-
-
-@dataclass(frozen=True)
-class Twist:
-    """A velocity: linear [m/s] and angular [rad/s]."""
-
-    linear: Vector = field(default_factory=Vector)
-    angular: Vector = field(default_factory=Vector)
 
 
 @dataclass(frozen=True)

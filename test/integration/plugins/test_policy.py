@@ -1,0 +1,125 @@
+"""A policy as a plugin on the simulated CENTAURO: it stands, and where it must not go on the robot is held."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support import robots
+from support.integration.world import CONFIG, World
+from support.plugins.plugin import WHEELS, configuration
+from support.unit import onnx_files
+
+from solfer.config import load
+from solfer.errors import SolferError
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import PluginState, Registry, generate
+from solfer.transport.messages import FieldsMessage
+
+pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
+
+POLICY = "solfer.components.policy:Policy"
+SPRINGS = {"file": str(CONFIG / "support/springs.yaml")}
+TERMS = ("angular_velocity", "projected_gravity", "commands", "joint_position", "joint_velocity", "last_action")
+
+
+def legs():
+    """Return the joints of legs and arms without wheels, and where they are at the start, by name."""
+    robot = robots.centauro("mammal_wide_straight", actuators=True)
+    return {
+        robot.dofs[dof]: float(robot.state.position[dof]) for dof in robot.actuated if robot.dofs[dof] not in WHEELS
+    }
+
+
+def file_of(folder, weights=0.0, offset=0.0, **tags):
+    """Write a linear network of all joints but the wheels, and a configuration with it; returns the configuration."""
+    joints = legs()
+    count = len(joints)
+    onnx_files.linear(folder / "network.onnx", np.full((9 + 3 * count, count), weights), np.full(count, offset))
+    module = {
+        "class": POLICY,
+        "robot": "inertial",
+        "file": "network.onnx",
+        "joints": list(joints),
+        "default": joints,
+        "observations": [{"term": term} for term in TERMS],
+        "action": {"scale": 0.25},
+        "rate": 50.0,
+        **tags,
+    }
+    return configuration(folder, **module)
+
+
+def test_zero_actions_keep_the_robot_standing(tmp_path):
+    """It runs 50 times a second in a loop of 200 Hz, with gains of its own, and the base stays where it is."""
+    tags = {"gains": {"stiffness": dict.fromkeys(legs(), 2000.0), "damping": 50.0}, "secondary_file": SPRINGS}
+    with closing(World()) as world:
+        plugin = world.plugin("test", file_of(tmp_path, **tags), POLICY)
+        world.run(0.5)
+        component = plugin.component
+        before = component.steps
+        start = world.simulation.body.position.copy()
+        world.run(3.0)
+        assert plugin.life is PluginState.RUNNING and not component.fault
+        assert component.steps - before == pytest.approx(150, abs=1)
+        assert np.abs(world.simulation.body.position - start).max() < 0.02
+        dofs = component.contract.dofs
+        assert np.array_equal(plugin.robot.command.position[dofs], component.contract.default)
+        assert (plugin.robot.command["stiffness"][dofs] == 2000.0).all()
+        assert len(world.simulation.contact_links()) == 4
+
+
+def test_a_posture_far_from_the_default_is_held(tmp_path, caplog):
+    """With the gains that the lower level had before."""
+    tags = {"default": legs() | {"torso_yaw": 1.0}, "gains": {"stiffness": 5.0}, "secondary_file": SPRINGS}
+    with closing(World()) as world:
+        plugin = world.plugin("test", file_of(tmp_path, **tags), POLICY)
+        world.run(0.5)
+        start = world.simulation.q.copy()
+        world.run(1.0)
+        assert "'torso_yaw' is -1.0" in caplog.text and caplog.text.count("holds until") == 1
+        assert np.abs(world.simulation.q - start).max() < 2e-3 and not plugin.component.steps
+        assert plugin.robot.command["stiffness"][plugin.robot.dof("torso_yaw")] == 5000.0
+
+
+def test_no_number_of_the_network_holds(tmp_path, caplog):
+    with closing(World()) as world:
+        plugin = world.plugin("test", file_of(tmp_path, offset=np.nan), POLICY)
+        world.run(1.5)
+        assert plugin.life is PluginState.RUNNING and "is not finite" in plugin.component.fault
+        assert caplog.text.count("holds until") == 1 and len(world.simulation.contact_links()) == 4
+
+
+def test_gains_that_no_controller_carries_are_refused(tmp_path):
+    file = file_of(tmp_path, gains={"stiffness": 100.0})
+    with closing(World()) as world, pytest.raises(SolferError, match="stiffness"):
+        generate(load(file, "test"), MemoryMiddleware(world.bus, "test"), Registry().find("test", POLICY))
+
+
+def test_a_message_commands_the_base(tmp_path):
+    """What is published on `<name>/cmd_vel` is observed, and half a second after the last message it is zero."""
+    with closing(World()) as world:
+        component = world.plugin("test", file_of(tmp_path), POLICY).component
+        writer = MemoryMiddleware(world.bus, "driver").writer("test/cmd_vel", "geometry_msgs/Twist")
+        world.run(0.2)
+        writer.write(FieldsMessage({"linear": {"x": 0.2, "y": 0.05}, "angular": {"z": 0.1}}))
+        world.run(0.1)
+        observed = component.network.observations[6:9]
+        assert observed == pytest.approx((0.2, 0.05, 0.1))
+        world.run(0.35)
+        assert observed.any()
+        world.run(0.15)
+        assert not observed.any()
+
+
+def test_lost_feedback_begins_again(tmp_path):
+    """The plugin holds without feedback; then the component begins with no history and no command."""
+    with closing(World()) as world:
+        plugin = world.plugin("test", file_of(tmp_path), POLICY)
+        world.run(1.0)
+        before = plugin.component.steps
+        world.received = False
+        world.run(1.0)
+        assert plugin.life is PluginState.STARTING and not plugin.component.steps
+        world.received = True
+        world.run(1.0)
+        assert plugin.life is PluginState.RUNNING and 40 < plugin.component.steps <= before + 1
