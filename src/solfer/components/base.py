@@ -78,6 +78,10 @@ class Component:
         self.time_lost = lost
         self.time_step = min(passed, max(self.period, 0.05))
 
+    def needs_base(self) -> bool:
+        """Return whether a feedback has to measure the floating base, an IMU at least."""
+        return False
+
     def init(self) -> None:
         """Set the initial conditions; the Robot's state is measured and its kinematics are up to date."""
 

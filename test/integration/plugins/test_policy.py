@@ -95,6 +95,13 @@ def test_gains_that_no_controller_carries_are_refused(tmp_path):
         generate(load(file, "test"), MemoryMiddleware(world.bus, "test"), Registry().find("test", POLICY))
 
 
+def test_a_base_that_nothing_measures_is_refused(tmp_path):
+    """It would count as upright and at rest."""
+    file = file_of(tmp_path, robot="joint_space")
+    with closing(World()) as world, pytest.raises(SolferError, match="no feedback measures it"):
+        generate(load(file, "test"), MemoryMiddleware(world.bus, "test"), Registry().find("test", POLICY))
+
+
 def test_a_message_commands_the_base(tmp_path):
     """What is published on `<name>/cmd_vel` is observed, and half a second after the last message it is zero."""
     with closing(World()) as world:

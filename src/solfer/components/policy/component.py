@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.policy.contract import agree
+from solfer.components.policy.contract import BASE_TERMS, agree
 from solfer.components.policy.network import PolicyNetwork
 from solfer.components.policy.observations import Observations
 from solfer.components.policy.tags import PolicyTags
@@ -89,6 +89,10 @@ class Policy(Component):
             what = f"'{self.name}' runs at {rate:g} Hz, and its network at {self.tags.rate:g} Hz"
             raise ComponentError(what, where=self.tags.where("rate"), expected="a plugin that is at least as fast")
         super().set_rate(rate)
+
+    def needs_base(self) -> bool:
+        """See `Component.needs_base`; the network may observe joints alone."""
+        return any(term.term in BASE_TERMS for term in self.contract.terms)
 
     def init(self) -> None:
         """Start with what the network observes now, unless a joint is too far from the default pose."""

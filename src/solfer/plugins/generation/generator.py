@@ -255,6 +255,7 @@ class Generator:
         if whole:
             errors += self._open_inputs(component) if component else ()
             errors += self._unsent(gains)
+            errors += self._without_base() if component is not None and component.needs_base() else ()
             if component is not None:
                 errors += self._without_effort(robot, component.efforts, [pipe for pipe, _ in controllers])
             if len(feedbacks) == len(self._records(robot)) and any(gate for _, gate in controllers):
@@ -355,6 +356,15 @@ class Generator:
             for name, port in component.inputs.items()
             if port.required and name not in received
         ]
+
+    def _without_base(self) -> list[SolferError]:
+        """Return an error if no feedback measures the floating base: it would count as upright and at rest."""
+        feedbacks = [each for each in self.configuration.feedbacks if each.measures]
+        if any(each.content.body or each.dofs.chain == "base" for each in feedbacks):
+            return []
+        module = self.configuration.module
+        what = f"plugin '{module.name}' needs its floating base, and no feedback measures it"
+        return [PipeError(what, where=module.where("robot"), expected="a robot with a feedback of its base, or an IMU")]
 
     def _unsent(self, gains: Sequence[str]) -> list[SolferError]:
         """Return an error for each gain that the component commands and no pipe carries."""
