@@ -155,5 +155,5 @@ class Wheels:
     def forces(self) -> np.ndarray:
         """Forces of the ground on the wheels along its normal, as they are known, shape (k,) [N]; live."""
         for index, contact in enumerate(self._shared):
-            self._forces[index] = contact.force @ self.normal
+            self._forces[index] = contact.force @ self.ground.normal
         return self._forces

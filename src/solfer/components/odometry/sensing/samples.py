@@ -9,7 +9,6 @@ from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.history import History
 from solfer.robot import Robot
 
-
 NO_NUMBERS = np.zeros(0)
 NO_VALUES = np.zeros((0, 0))
 NO_PLACES = np.zeros(0, dtype=np.int64)

@@ -86,4 +86,3 @@ class PathPace:
         """Begin without a motion, which could go on in full."""
         self._state[[VALUE, LIMITED, HELD, LAGS, FOLLOWED]] = 1.0
         self._state[SPEED] = 0.0
-

@@ -114,7 +114,7 @@ class XbotReader(Reader):
         arrival = 0.0
         for source in self._sources:
             if not source.ahead and source.end.words[NEWEST] != source.end.sequence:
-                ring = source.end
+                ring: Any = source.end  # one that keeps messages
                 lost = ring.lost
                 source.ahead = ring.read(self._kept)
                 self.dropped += ring.lost - lost
