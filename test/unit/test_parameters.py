@@ -22,7 +22,6 @@ POSITIONAL = 6
 """Positional arguments from which on a call has too many."""
 
 KERNELS = {
-    "advance",
     "approach",
     "count_kept",
     "gather",

@@ -103,16 +103,20 @@ def wrapped(displacement, revolution):
     return displacement - revolution * math.floor(displacement / revolution + 0.5) if revolution else displacement
 
 
-def _unwrap(before, revolutions, added, position, part):
+def _unwrap(before, revolutions, added, counts, dofs, position, part):
     """Add whole revolutions to positions of senders that count within one, so that none moves by more than half of it.
 
     Args:
         before: The positions before, NaN: there is none; and the lowest and highest ones that came.
         revolutions: What positions may jump by; 0: nothing.
-        added: What was added before; written.
+        added: What is added; written.
+        counts: What was added before, at the indices `dofs`; may be `added` itself.
+        dofs: See `counts`.
         position: Positions, as they came; written.
         part: Indices of the positions that came.
     """
+    for k in range(len(added)):
+        added[k] = counts[dofs[k]]
     for k in part:
         if revolutions[k]:
             came = position[k]
@@ -123,7 +127,9 @@ def _unwrap(before, revolutions, added, position, part):
             position[k] = came + added[k]
 
 
-unwrap = cached("void(float64[:, ::1], float64[::1], float64[::1], float64[::1], int64[::1])", _unwrap)
+unwrap = cached(
+    "void(float64[:, ::1], float64[::1], float64[::1], float64[::1], int64[::1], float64[::1], int64[::1])", _unwrap
+)
 
 
 def _keep_revolutions(before, added, dofs, counts, position, part):

@@ -244,7 +244,7 @@ class StateFeedbackPipe(FeedbackPipe):
         """Read and accept every message since the last cycle, in the order of their arrival."""
         reader = self.reader
         parts: list[np.ndarray | None] = []
-        history.clear()
+        history.count = 0
         publisher = reader.read_next()
         # a publisher that never stops does not keep the cycle from going on
         rest = history.size * max(1, len(reader.publishers))
@@ -257,7 +257,7 @@ class StateFeedbackPipe(FeedbackPipe):
             publisher = reader.read_next() if rest else None
         history.dropped += reader.dropped - history.unread
         history.unread = reader.dropped
-        return self._unite(parts)
+        return self._unite(parts) if parts else NONE if reader.message is None else OLD
 
     def _take(self, publisher: Publisher) -> bool:
         """Accept the message that was read last, if its publisher counts; return whether it does and fits."""

@@ -9,7 +9,7 @@ from solfer.transport.declared import Publications
 
 
 class ComponentCycle:
-    """Runs a component: its dynamics and its time, jumps of its base, its failures, and what it logs.
+    """What a component needs for a cycle: its dynamics and its time, jumps of its base, its failures, and what it logs.
 
     Args:
         component: The component.
@@ -19,8 +19,7 @@ class ComponentCycle:
         publications: What it declares to publish; None: nothing.
 
     Attributes:
-        robot_time: See above.
-        jumps: See above.
+        robot_time, jumps, guard: See above; its plugin asks them in each cycle.
         dynamics: What it requests of the Robot's dynamics; None: nothing.
         publications: See above; its loop counts them down.
         logger: Where the component logs its cycles; None: it logs nothing by itself.
@@ -37,9 +36,9 @@ class ComponentCycle:
         self.robot_time = robot_time
         self._component = component
         self.jumps = jumps
-        self._guard = guard
+        self.guard = guard
         # made before the first cycle: importing its modules takes a while
-        self.dynamics = component.model.dynamics if component.dynamics else None
+        self.dynamics = component.model.dynamics.manager if component.dynamics else None
         self.publications = publications or Publications()
         self.logger: Logger | None = None
         self._began = 0.0  # [s]
@@ -54,31 +53,10 @@ class ComponentCycle:
         self._component.start_log(logger)
         self.logger = logger if type(self._component).log is not Component.log else None
 
-    def jump(self) -> None:
-        """Move the component's references with a base whose estimate has jumped."""
-        if self.jumps is not None and (move := self.jumps.find(self._component.passed)):
-            self._component.move_world(move)
-
     def forget_jumps(self) -> None:
         """Begin with the base where it is."""
         if self.jumps is not None:
             self.jumps.restart()
-
-    def work(self) -> None:
-        """Run the component; if it fails, or leaves numbers that are not finite, others see what was before."""
-        guard = self._guard
-        if guard is None:
-            self._component.update()
-            self._component.send()
-            return
-        guard.keep()
-        try:
-            self._component.update()
-            self._component.send()
-            guard.check()
-        except BaseException:
-            guard.restore()
-            raise
 
     def log(self, now: float) -> None:
         """Let the component log the cycle of the time `now` [s]."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from solfer.components import Component
 from solfer.errors import NotFinite
 from solfer.model.state import DEFAULTS
 from solfer.robot import Robot
@@ -27,8 +28,12 @@ class MeasuredGuard:
         self._wrenches = np.zeros((0, 6))
         self._kept, self._wrenches_kept = _Kept(self._values), _Kept(self._wrenches)
 
-    def keep(self) -> None:
-        """Remember what is measured now."""
+    def run(self, component: Component) -> None:
+        """Run one cycle of a component; if it fails, what was measured before is put back.
+
+        Raises:
+            NotFinite: A number that it has written is NaN or infinite; names it.
+        """
         kept = self._kept
         kept.target[:] = kept.source
         if self._contacts is not None:
@@ -37,31 +42,31 @@ class MeasuredGuard:
                 self._wrenches, self._wrenches_kept = wrenches, _Kept(wrenches)
             kept = self._wrenches_kept
             kept.target[:] = kept.source
+        try:
+            component.update()
+            component.send()
+            contacts = self._contacts
+            if not self._finite(self._values, self._wrenches if contacts is None else contacts.wrenches):
+                raise self._find()
+        except BaseException:
+            self._restore()
+            raise
 
-    def restore(self) -> None:
+    def _restore(self) -> None:
         """Put back what was remembered."""
         for kept in (self._kept, self._wrenches_kept):
             kept.source[:] = kept.target
         if self._contacts is not None and len(self._contacts.wrenches) == len(self._wrenches):
             self._contacts.wrenches[...] = self._wrenches
 
-    def check(self) -> None:
-        """Check what the component has left.
-
-        Raises:
-            NotFinite: A number that it has written is NaN or infinite; names it.
-        """
-        contacts = self._contacts
-        if self._finite(self._values, self._wrenches if contacts is None else contacts.wrenches):
-            return
+    def _find(self) -> NotFinite:
+        """Return an error that names a number that is not finite."""
         wrong = np.argwhere(~np.isfinite(self._values))
         if len(wrong):
-            raise self._error(f"a '{DEFAULTS[wrong[0][0]]}' of '{self._dofs[wrong[0][1]]}'")
-        if contacts is not None:
-            contact = contacts.names[np.argwhere(~np.isfinite(contacts.wrenches))[0][0]]
-            raise self._error(f"a wrench of contact '{contact}'")
-
-    def _error(self, what: str) -> NotFinite:
+            what = f"a '{DEFAULTS[wrong[0][0]]}' of '{self._dofs[wrong[0][1]]}'"
+        else:
+            contact = self._contacts.names[np.argwhere(~np.isfinite(self._contacts.wrenches))[0][0]]
+            what = f"a wrench of contact '{contact}'"
         return NotFinite(f"'{self._owner}' writes {what} that is not finite", expected="a number in every cycle")
 
 

@@ -213,10 +213,10 @@ class Plugin:
         if life is STARTING:
             self.robot.update()
             self._start()
-        if work.dynamics is not None:
-            work.dynamics.update()  # the kinematics, too
-        elif component.kinematics:
+        if component.kinematics or work.dynamics is not None:
             self.robot.update()
+        if work.dynamics is not None:
+            work.dynamics.update()
         robot_time = work.robot_time
         passed = robot_time.advance(now)
         component.let_pass(passed, robot_time.lost)
@@ -232,11 +232,16 @@ class Plugin:
                 raise fault
             following.start()  # no node receives its commands, which the health says
         if work.jumps is not None and life is RUNNING:
-            work.jump()
+            if move := work.jumps.find(passed):
+                component.move_world(move)
         if self.tuning.moves:
             self.tuning.advance(component.time_step)
         times[ROBOT] = -mark + (mark := clock())
-        work.work()
+        if work.guard is None:
+            component.update()
+            component.send()
+        else:
+            work.guard.run(component)
         times[COMPONENT] = -mark + (mark := clock())
         if component.modify:
             # its pipes publish joints that follow others; who reads the State next computes what it needs

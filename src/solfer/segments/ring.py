@@ -1,5 +1,7 @@
 """Every record of one writer in its order, in fixed memory."""
 
+import sys
+
 from solfer.segments.slot import NEWEST, REFUSED, TAKEN, Slots
 
 
@@ -46,11 +48,13 @@ class Ring(Slots):
         self.put(stamp)
         return True
 
-    def read(self) -> bool:
+    def read(self, most: int = sys.maxsize) -> bool:
         """Fetch the next record into `values`; returns False if there is none. Does not block.
 
-        Records that were overwritten are left out and counted.
+        Records that were overwritten are left out and counted, and so are all but the newest `most`.
         """
+        if self.words[NEWEST] - self.sequence > most:
+            self.limit(most)
         while self.sequence < (newest := self.words[NEWEST]):
             if self._fetch(self.sequence + 1):
                 if self._refuse:

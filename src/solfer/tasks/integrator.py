@@ -26,6 +26,9 @@ class ReferenceIntegrator:
         lead: Largest distance of a reference from the measured position, positive, one number or one a DoF [rad, m];
             inf where there is none.
 
+    Attributes:
+        period: Time by which the next cycle goes on [s].
+
     Raises:
         TaskError: The period or the lead is not positive.
         SizeMismatch: Bounds or lead are of another robot's size.
@@ -45,13 +48,13 @@ class ReferenceIntegrator:
             raise TaskError(f"a lead of {lead.tolist()}", where=where, expected="positive numbers")
         self._state = robot.state
         self._command = robot.command
-        self._period = period
+        self.period = period
         self._lead, self._has_lead = np.full(size, lead), bool(np.isfinite(lead).any())
         self._work = np.zeros(size)
 
     def set_period(self, period: float) -> None:
         """Set the time by which the next cycle goes on [s]."""
-        self._period = period
+        self.period = period
         self._bounds.set_period(period)
 
     def start(self, position: np.ndarray | None = None) -> None:
@@ -80,7 +83,7 @@ class ReferenceIntegrator:
         np.minimum(desired, self._bounds.upper, out=desired)
         if self._has_lead:
             self._follow(position, desired)
-        np.multiply(desired, self._period, out=self._work)
+        np.multiply(desired, self.period, out=self._work)
         position += self._work
         self._stay_inside()
         return desired
@@ -98,7 +101,7 @@ class ReferenceIntegrator:
             np.multiply(self._lead, sign, out=self._work)
             self._work += self._state.position
             self._work -= position
-            self._work /= self._period
+            self._work /= self.period
             # not faster than the joint may go back
             behind(self._work, self._bounds.lower if sign > 0.0 else self._bounds.upper, out=self._work)
             ahead(desired, self._work, out=desired)

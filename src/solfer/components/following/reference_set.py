@@ -223,7 +223,7 @@ class ReferenceSet:
             if target.port.fresh and (wrong := target.read_port()):
                 self._throttle.warning(target.name, "%s: %s: %s is ignored", self._component, target.where, wrong)
             target.refer()
-            if pace:
+            if pace and target.generated is not None:
                 target.generate(step * pace)
         for posture in self._postures:
             posture.update(step, pace)
@@ -268,7 +268,7 @@ class ReferenceSet:
         for target in self.list:
             if not is_still:
                 target.follow()
-            elif target.is_unreachable:
+            elif target.progress.is_unreachable:
                 target.hold()
 
 

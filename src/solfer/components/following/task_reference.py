@@ -37,6 +37,8 @@ class TaskReference:
         frame: Name of the frame.
         port: Receives references.
         reason: Why it came to rest away from its reference, the last time.
+        generated: Reference that the configuration generates; None: it has none.
+        progress: Whether it still comes nearer to its reference; from `connect` on.
     """
 
     def __init__(
@@ -52,10 +54,10 @@ class TaskReference:
         self._correction = task.correction.copy()
         self._feed_forward = FeedForward(task)
         self._held = HeldPlace(task, reference)
-        self._generated = None if generator is None else GeneratedReference(generator, self._numbers)
+        self.generated = None if generator is None else GeneratedReference(generator, self._numbers)
         self._filtered: FilteredReference
         self._residual: Residual
-        self._progress: TaskProgress
+        self.progress: TaskProgress
         self._period: float
 
     @property
@@ -76,12 +78,12 @@ class TaskReference:
     @property
     def stays(self) -> bool:
         """Whether the point's distance from a reference at rest does not change any more."""
-        return self._progress.stays
+        return self.progress.stays
 
     @property
     def is_unreachable(self) -> bool:
         """Whether the task has come to rest away from its reference."""
-        return self._progress.is_unreachable
+        return self.progress.is_unreachable
 
     @property
     def is_held(self) -> bool:
@@ -114,7 +116,7 @@ class TaskReference:
         self._feed_forward.connect(self._filtered.rate, motion.feed_forward and self._moves)
         self.limit(motion)
         self._residual = Residual(self.task.error.value, self._numbers, tolerances, values=residual)
-        self._progress = TaskProgress(float(self.task.gain.max()))
+        self.progress = TaskProgress(float(self.task.gain.max()))
         self._period = references.period
 
     def limit(self, motion: MotionRecord) -> None:
@@ -133,7 +135,7 @@ class TaskReference:
 
     def take_gain(self) -> None:
         """Go on with the gain that the task has."""
-        self._progress.gain = float(self.task.gain.max())
+        self.progress.gain = float(self.task.gain.max())
 
     def start(self) -> None:
         """Begin where the point is, at rest, and go on to the reference that the task has; a look begins there."""
@@ -144,13 +146,13 @@ class TaskReference:
         if not np.array_equal(desired, value):
             self._filtered.aim(desired)
         self._forget()
-        if self._generated is not None:
-            self._generated.start(value)
+        if self.generated is not None:
+            self.generated.start(value)
 
     def generate(self, step: float) -> None:
         """Let a generated reference go on by some time [s]; at its end it stays."""
-        generated = self._generated
-        if generated is not None and generated.is_running:
+        generated = self.generated
+        if generated.is_running:
             generated.advance(step)
             self._filtered.aim(generated.value, generated.is_running)
 
@@ -159,8 +161,8 @@ class TaskReference:
         if self.frame != WORLD:
             return
         self._filtered.displace(move)
-        if self._generated is not None:
-            self._generated.displace(move)
+        if self.generated is not None:
+            self.generated.displace(move)
         if self.is_held:
             self._numbers.displace(move, self._reference.value)
 
@@ -266,7 +268,7 @@ class TaskReference:
     @property
     def is_generated(self) -> bool:
         """Whether it follows the reference that the configuration generates."""
-        return self._generated is not None and self._generated.is_running
+        return self.generated is not None and self.generated.is_running
 
     @property
     def distance(self) -> float:
@@ -283,7 +285,7 @@ class TaskReference:
         residual = self._residual
         if not self._held.is_held:
             residual.measure()
-        return self._progress.gain * self._period * math.hypot(residual.values[0], residual.values[1])
+        return self.progress.gain * self._period * math.hypot(residual.values[0], residual.values[1])
 
     def has_arrived(self) -> bool:
         """Return whether the point is at its reference."""
@@ -296,29 +298,29 @@ class TaskReference:
         """
         is_still = self._filtered.is_still
         if is_still:
-            self._progress.look(self.distance)
+            self.progress.look(self.distance)
         else:
             self._restart_progress()
         return is_still
 
     def refresh(self) -> None:
         """Look again whether the task comes nearer to its reference; one that is held is held where it is now."""
-        self._progress.look_again()
+        self.progress.look_again()
         self._held.take_again()
 
     def come_to_rest(self) -> str:
         """Note whether it has come to rest away from its reference; return a report of that, once."""
-        return str(self._residual) if self._progress.come_to_rest(self._residual.is_beyond()) else ""
+        return str(self._residual) if self.progress.come_to_rest(self._residual.is_beyond()) else ""
 
     def _end_generated(self) -> None:
-        if self._generated is not None:
-            self._generated.is_running = False
+        if self.generated is not None:
+            self.generated.is_running = False
 
     def _forget(self) -> None:
         """Forget how far the task has come with another reference."""
-        self._progress.forget()
+        self.progress.forget()
         self._held.take_again()
 
     def _restart_progress(self) -> None:
-        self._progress.restart()
+        self.progress.restart()
         self._held.take_again()

@@ -152,7 +152,8 @@ class InverseKinematics(Component):
     def update(self) -> None:
         """Compute one cycle."""
         step = self.time_step
-        self._integrator.set_period(step)
+        if step != self._integrator.period:
+            self._integrator.set_period(step)
         self.references.update(step, self.pace)
         if not self._is_measured:
             self._follow_model()

@@ -31,6 +31,7 @@ class CommonSlip:
         speed: Velocity of the base by the wheels in the heading frame, shape (2,) [m/s]; live.
         slip: By how much that is too fast, shape (2,) [m/s]; live.
         lasts: For how long all wheels have slipped [s]; 0: they roll.
+        contradicted: Whether the accelerometer measured what no slip explains, in the last 2 s.
     """
 
     def __init__(self, motion: WheelMotion, slope: np.ndarray):
@@ -64,11 +65,7 @@ class CommonSlip:
         self._lasts[:] = math.nan
         self._probability[:] = 1.0
         self.lasts = 0.0
-
-    @property
-    def contradicted(self) -> bool:
-        """Whether the accelerometer measured what no slip explains, in the last 2 s."""
-        return bool(self._lasts[0] < 0.0)
+        self.contradicted = False
 
     @property
     def probability(self) -> float:
@@ -111,6 +108,7 @@ class CommonSlip:
         )  # fmt: skip
         lasts = float(self._lasts[0])
         self.lasts = lasts if lasts > 0.0 else 0.0
+        self.contradicted = lasts < 0.0
         return self._slipped if found == kernel.BEGINS else None
 
     def velocity_variance(self, time: float) -> float:

@@ -319,7 +319,7 @@ class Odometry(Component):
         base = self._base
         state = self.model.state
         ahead = self.streams.ahead
-        turned = self.streams.turned_since() if ahead else None
+        turned = self.streams.imu.turned
         before, after = turned or (self._position, self._position)
         yaw = heading - base.heading
         filter_kernel.write_pose(
@@ -327,4 +327,5 @@ class Odometry(Component):
         )
         state.position[:6] = self._pose
         state.velocity[:6] = self._rates
-        self.streams.written()
+        if not base.averages:  # without histories of both
+            self.streams.written()

@@ -344,7 +344,8 @@ class FilteredOdometry:
         )
         rate = yaw / period
         covered = imu_time / period
-        expected = rate - covered * kalman.bias
+        bias = kalman.bias
+        expected = rate - covered * bias
         tolerance = tags.slip + tags.slip_share * speed
         consensus.reject(motion.speeds, motion.arms, expected, motion.weights, tolerance=tolerance, time=period)
         shakes = SHAKE_RATIO * leg_speed
@@ -357,7 +358,7 @@ class FilteredOdometry:
         )  # fmt: skip
         kalman.allow_scrubbing(contradiction)
         if imu_time:
-            self._compare(imu_time)
+            self._compare(imu_time, bias)
         if self.slip.lasts:
             kalman.coast(self.slip.speed - self.slip.slip, self.slip.velocity_variance(period))
             consensus.inliers[:] = False
@@ -371,12 +372,15 @@ class FilteredOdometry:
             inliers=consensus.inliers,
         )
         spread_time = 0.1  # [s] over which each wheel's innovations are averaged
-        yaw_rate = rate - covered * (kalman.bias + kalman.noise)
+        yaw_rate = rate - covered * kalman.excess
         keep = spread_time / (spread_time + period)
         filter_kernel.learn_spreads(motion.block.address, kalman.velocity, yaw_rate, consensus.inliers, keep)
 
-    def _compare(self, time: float) -> None:
-        """Compare the wheels with the accelerometer, `time` [s] after it was read; where slip begins, go back."""
+    def _compare(self, time: float, bias: float) -> None:
+        """Compare the wheels with the accelerometer, `time` [s] after it was read; where slip begins, go back.
+
+        `bias` is that of the gyroscope about the vertical [rad/s].
+        """
         base = self._base
         kalman = self.kalman
         x, y, z = base.angular.tolist()
@@ -385,7 +389,7 @@ class FilteredOdometry:
             kalman.axes,
             self.consensus.inliers,
             heading=base.heading,
-            rotation=(x, y, z - kalman.bias, time),
+            rotation=(x, y, z - bias, time),
             tilt=(*kalman.tilt.tolist(), float(kalman.covariance[TILT, TILT])),
         )
         if slipped is not None:
@@ -409,7 +413,7 @@ class FilteredOdometry:
         base = self._base
         wheels = motion.wheels
         period = self._imu.period
-        yaw = measured - (kalman.bias + kalman.noise) * imu_time
+        yaw = measured - kalman.excess * imu_time
         kalman.integrate(self.heading + 0.5 * yaw, period, imu_time, unknown)
         ground.settle(self._tags.settle, period)
         self.position += kalman.correction[:3]
@@ -424,7 +428,7 @@ class FilteredOdometry:
         self.heading = base.heading + imu.offset if base.fresh else self.heading + yaw
         missing = ground.map.missing_height(
             wheels.arms,
-            wheels.normal,
+            wheels.ground.normal,
             self.position,
             heading=self.heading,
             weights=motion.trusted,
@@ -442,7 +446,7 @@ class FilteredOdometry:
         forget = 1.0 - period / forgetting_time
         clearance = self._tags.clearance
         filter_kernel.find_lifted(
-            motion.block.address, ground.block.address, yaw, base.turned, wheels.normal, clearance, forget
+            motion.block.address, ground.block.address, yaw, base.turned, wheels.ground.normal, clearance, forget
         )
 
     def _find_velocity(self) -> None:

@@ -177,9 +177,9 @@ class WheelInertialFilter:
         return float(self._vertical @ self._bias_of_base)
 
     @property
-    def noise(self) -> float:
-        """Noise of the gyroscope about the vertical in this interval [rad/s]."""
-        return float(self.state[kernel.GYRO_NOISE])
+    def excess(self) -> float:
+        """What the gyroscope measures too much about the vertical in this interval: bias and noise [rad/s]."""
+        return float(self._vertical @ self._bias_of_base) + float(self.state[kernel.GYRO_NOISE])
 
     @property
     def bias_variance(self) -> float:

@@ -64,6 +64,7 @@ class Wheels:
         arms: From the base's origin to the contacts, shape (k, 3) [m]; live. These axes and those of the others are
             the world's, turned about the vertical as the base is.
         jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
+        ground: The ground: its `normal`, shape (3,), live, and whether it `is_level`.
         legs: Which of them do not roll, shape (joints,).
 
     Raises:
@@ -105,7 +106,7 @@ class Wheels:
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
         self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
-        self._ground = _Ground(self._contacts)
+        self.ground = _Ground(self._contacts)
         self._forces = np.zeros(count)
         self.position = robot.state.position[6:]
         self.velocity = robot.state.velocity[6:]
@@ -115,7 +116,7 @@ class Wheels:
 
     def set_normal(self, x: float, y: float, z: float) -> None:
         """Set the normal of the ground, any length."""
-        self._ground.set_normal(x, y, z)
+        self.ground.set_normal(x, y, z)
 
     @property
     def carrying(self) -> np.ndarray:
@@ -124,16 +125,6 @@ class Wheels:
         for link in self.links:
             carrying[[column - 6 for column in self._robot.kinematics.attachment(link).columns if column >= 6]] = True
         return carrying & self.legs
-
-    @property
-    def normal(self) -> np.ndarray:
-        """Normal of the ground, shape (3,); live."""
-        return self._ground.normal
-
-    @property
-    def is_level(self) -> bool:
-        """Whether it is vertical."""
-        return self._ground.is_level
 
     @property
     def joints(self) -> int:
@@ -149,7 +140,7 @@ class Wheels:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)
         sine = math.sin(heading)
-        self._ground.rotate(cosine, sine)
+        self.ground.rotate(cosine, sine)
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
         places = self._contacts.value.reshape(-1, 3)
@@ -164,5 +155,5 @@ class Wheels:
     def forces(self) -> np.ndarray:
         """Forces of the ground on the wheels along its normal, as they are known, shape (k,) [N]; live."""
         for index, contact in enumerate(self._shared):
-            self._forces[index] = contact.force @ self.normal
+            self._forces[index] = contact.force @ self.ground.normal
         return self._forces

@@ -238,20 +238,24 @@ class WheeledMotion(Component):
         self._take_over(self._set_step(step))
         if self._lifting.update(step):
             self.targets.leave_vertices()
-        self.received.leave_out()
+        if self.received.straight is not None:
+            self.received.leave_out()
         self._pace.advance(is_paced, self.joints.is_first, self._guard.is_held, self.pace, step)
         self._find_errors()
         velocity = self.tasks.solve(is_paced, self.joints.position)
         if is_paced:
             self._hold_back(step)
         self.joints.integrate(velocity, step, self.model.state.position)
-        self.received.restore()
-        self.wheels.offsets.remember()
+        if self.received.straight is not None:
+            self.received.restore()
+        if self.wheels.offsets.is_late:
+            self.wheels.offsets.remember()
 
     def _set_step(self, step: float) -> float:
         """Set the time over which this cycle integrates, and return the gap before it; both [s]."""
-        self._steering.set_step(step)
-        self.tasks.bounds.set_period(step)
+        if step != self._steering.step:
+            self._steering.set_step(step)
+            self.tasks.bounds.set_period(step)
         return self._delay.advance(step, self.passed, self.time_lost)
 
     def _take_over(self, gap: float) -> None:
@@ -264,7 +268,7 @@ class WheeledMotion(Component):
 
     def _find_errors(self) -> None:
         """Find rows and errors of all tasks, and where wheels are to point."""
-        self.stack.update_jacobian()
+        self.tasks.stack.update_jacobian()
         if self.joints.is_first and self.tags.is_original:
             self.wheels.offsets.errors[:] = 0.0
         self.tasks.steer()
@@ -377,6 +381,7 @@ class WheeledMotion(Component):
 
     def _published_pace(self) -> float:
         """Return the ratio of the received velocities with which the motion goes on."""
+        received = self.received
         if self.references.waits:
             return 0.0
-        return self.references.pace * self.received.ratio * self._delay.ratio * self.drive.progress
+        return self.references.pace * received.ratio * self._delay.ratio * received.drive.progress

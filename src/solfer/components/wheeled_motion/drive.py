@@ -123,7 +123,7 @@ class Drive:
         self.is_active = True
 
     def update(self, references: References, heading: float, ratio: float, passed: float) -> None:
-        """Write the velocity of this cycle to the references.
+        """Write the velocity of this cycle to the references; called while it is active.
 
         Args:
             references: The desired motion.
@@ -131,8 +131,6 @@ class Drive:
             ratio: Factor of the newest velocity, no larger than `self.ratio`.
             passed: Time since the cycle before [s].
         """
-        if not self.is_active:
-            return
         change, yaw_change = self._limits
         given = self._state, references.motion, heading, ratio
         if follow(*given, passed, STREAM_TIMEOUT, change * passed, yaw_change * passed):

@@ -77,31 +77,35 @@ class ReferenceInputs:
                 self.drive.start()
             elif self.drive.is_active:
                 self.targets.leave_base()
-        is_at_rest = self._write(step + gap)
+        if self.drive.is_active or self.targets.is_active:
+            self._move(step + gap)
+        self._settling -= step + gap
+        is_at_rest = self._settling > 0.0 and not self._references.waits
         if gap and not is_at_rest:
             self._references.step(0.5 * gap)
         return is_at_rest
 
-    def _write(self, passed: float) -> bool:
+    def _move(self, passed: float) -> None:
         """Write the velocities of a cycle, `passed` [s] after the one before; see `update`."""
+        drive = self.drive
+        targets = self.targets
         were_abandoned = self.are_abandoned
         if were_abandoned:
-            what = "position" if self.targets.are_places_abandoned else "velocity"
+            what = "position" if targets.are_places_abandoned else "velocity"
             self._throttle.warning(
                 "silence", "%s: no %s for %.2f s, it comes to rest", self._name, what, STREAM_TIMEOUT
             )
-        self.drive.update(self._references, self._wheels.offsets.heading, self.ratio, passed)
-        self.targets.update(self._references, self.ratio, passed)
+        if drive.is_active:
+            drive.update(self._references, self._wheels.offsets.heading, self.ratio, passed)
+        targets.update(self._references, self.ratio, passed)
         if were_abandoned and not self.are_abandoned:
             self._settling = 0.5  # [s] in which the robot is at rest, too
-        elif self.drive.is_active or self.targets.is_active:
+        elif drive.is_active or targets.is_active:
             self._settling = 0.0
-        self._settling -= passed
-        return self._settling > 0.0 and not self._references.waits
 
     def leave_out(self) -> None:
-        """Leave out what wheels that nothing steers cannot do, until `restore`."""
-        if self.straight is None or self._references.waits:
+        """Leave out what wheels that nothing steers cannot do, until `restore`; called where `straight` is there."""
+        if self._references.waits:
             return
         offsets = self._wheels.offsets
         if left := self.straight.update(self._references, offsets.directions[0], offsets.heading):
@@ -109,5 +113,5 @@ class ReferenceInputs:
 
     def restore(self) -> None:
         """Let be desired again what was left out."""
-        if self.straight is not None and not self._references.waits:
+        if not self._references.waits:
             self.straight.restore(self._references)

@@ -124,8 +124,7 @@ class RollingOffsets(CompiledPoint):
         is_late: Whether place and Jacobian of the base are those of the cycle before, as in the original program.
 
     Attributes:
-        vertices: The vertices.
-        axes: The axles, as above.
+        vertices, axes, is_late: See above.
         reference: Desired vertices in the frame of the heading: x, y from the base, z in the world, shape (m, 3) [m].
         states: Vertices in that frame, with the base's present place, shape (m, 3) [m].
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
@@ -147,7 +146,7 @@ class RollingOffsets(CompiledPoint):
         self.vertices = tuple(vertices)
         self.axes = axes
         self._pose = pose
-        self._is_late = is_late
+        self.is_late = is_late
         self._attachments = [robot.kinematics.attachment(vertex.link) for vertex in vertices]
         self._numbers = np.zeros(14 * count + 3)
         blocks = self._numbers[: 9 * count].reshape(3, count, 3)
@@ -175,7 +174,7 @@ class RollingOffsets(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        late = address(self._base_rows) if self._is_late else 0
+        late = address(self._base_rows) if self.is_late else 0
         found = []
         for index, (vertex, each) in enumerate(zip(self.vertices, self._attachments, strict=True)):
             one = Instruction(
@@ -206,9 +205,8 @@ class RollingOffsets(CompiledPoint):
         self.states[:, 2] += move.rise
 
     def remember(self) -> None:
-        """Take over the base of this cycle for the next one, where it is late."""
-        if self._is_late:
-            self.base[1:], self._base_rows[:] = self._pose.value[:2], self._pose.jacobian[:2]
+        """Take over the base of this cycle for the next one; called where it is late."""
+        self.base[1:], self._base_rows[:] = self._pose.value[:2], self._pose.jacobian[:2]
 
 
 def heading_of(pose: np.ndarray) -> float:

@@ -42,11 +42,12 @@ class Steering:
         law: Numbers of the law, shape (1,), for `solfer.components.wheeled_motion.kernel`, which computes it.
         wheels: State of all wheels there, records `WHEEL_DTYPE`, shape (count,).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
+        step: Time since the cycle before [s].
     """
 
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         self._given = period
-        self._step = period
+        self.step = period
         self.law = np.array([(across, period / RELAXATION_LENGTH, rests, *self.numbers(tuning), period)], dtype=LAW)
         self.wheels = np.zeros(count, WHEEL_DTYPE)
         self.before = np.zeros(3)
@@ -65,10 +66,9 @@ class Steering:
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""
-        if step != self._step:
-            self._step = step
-            self.law["rate"] = step / RELAXATION_LENGTH
-            self.law["period"] = step
+        self.step = step
+        self.law["rate"] = step / RELAXATION_LENGTH
+        self.law["period"] = step
 
     def measure(self, directions: np.ndarray) -> None:
         """Take over the directions in which wheels roll in the world, shape (count, 2)."""

@@ -1,6 +1,7 @@
 """The tasks of a component that drives: rows, errors and rates, and the joint velocities that follow from them."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -53,6 +54,8 @@ class DrivingTasks:
         bounds: Bounds of these; from `prepare` on.
         aims: Directions that wheels turn to, within the ranges of their joints, shape (count,) [rad]; live.
         numbers: What the compiled functions read and write; from `prepare` on.
+        steer: Finds where wheels are to point, at the rows of this cycle; from `prepare` on.
+        find_errors: Finds the errors of all tasks; from `prepare` on.
 
     Raises:
         SolferError: A tag does not fit the robot.
@@ -141,6 +144,8 @@ class DrivingTasks:
             forward=self.rates.forward,
             half=HALF_REVOLUTION if self._feeds_forward else ROUNDED_PI,
         )
+        self.steer = partial(steer, self.numbers.address)
+        self.find_errors = partial(find_errors, self.numbers.address)
         self.limit(tags.speeds, tags.accelerations, (tags.correction, tags.turn_correction, tags.furthest))
 
     def limit(self, speeds: Sequence[float], accelerations: Sequence[float], corrections: Sequence[float]) -> None:
@@ -169,14 +174,6 @@ class DrivingTasks:
     def start(self) -> None:
         """Begin with errors that nothing makes go away yet."""
         self.rates.away[:] = 0.0
-
-    def steer(self) -> None:
-        """Find where wheels are to point, at the rows of this cycle."""
-        steer(self.numbers.address)
-
-    def find_errors(self) -> None:
-        """Find the errors of all tasks."""
-        find_errors(self.numbers.address)
 
     def solve(self, is_paced: bool, position: np.ndarray) -> np.ndarray:
         """Return the joint velocities by which the errors go away, and with which what is desired goes on.

@@ -23,7 +23,8 @@ class MeasuredPosition:
         self._turning = np.flatnonzero(revolutions)
         self._added = np.zeros(size)
         self._before = np.zeros((3, size))  # see the kernel
-        self._unwrap = partial(unwrap, self._before, revolutions, self._added)
+        known = self._added, np.arange(size)
+        self._unwrap = partial(unwrap, self._before, revolutions, self._added, *known)
         self._keep_revolutions = partial(keep_revolutions, self._before, self._added, np.arange(size), np.zeros(size))
         self.value = np.zeros(size)
 

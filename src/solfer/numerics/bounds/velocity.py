@@ -1,6 +1,7 @@
 """Bounds of joint velocities that keep joints in their ranges."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -30,6 +31,7 @@ class VelocityBounds:
         upper: Upper bounds as of the last `update` [rad/s, m/s], shape (n,).
         speed: Largest speeds, as above.
         limits: All three in one array, shape (3, n).
+        update: Computes the bounds at a position [rad, m], shape (n,); allocates nothing.
 
     Raises:
         SizeMismatch: An array does not have one number a joint.
@@ -51,21 +53,19 @@ class VelocityBounds:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
         self.lower_position, self.upper_position, speed = limits
         self._horizon = horizon
-        self._rate = 1.0 / horizon
+        self._rate = np.array([1.0 / horizon])
         self.limits = np.stack((-speed, speed, speed))
         self.lower, self.upper, self.speed = self.limits
+        self.update = partial(_bound, self.lower_position, self.upper_position, self._rate, self.limits)
 
     def set_period(self, period: float) -> None:
         """Set the time for which the next velocities hold [s]: no joint leaves its range within a longer one either."""
-        self._rate = 1.0 / max(self._horizon, period)
-
-    def update(self, position: np.ndarray) -> None:
-        """Compute the bounds at `position` [rad, m], shape (n,). Allocates nothing."""
-        _bound(position, self.lower_position, self.upper_position, self._rate, self.limits)
+        self._rate[0] = 1.0 / max(self._horizon, period)
 
 
-def _bound_all(position, lower_position, upper_position, rate, limits):
+def _bound_all(lower_position, upper_position, rates, limits, position):
     """See `VelocityBounds.update`; a NaN stays one."""
+    rate = rates[0]
     speed = limits[2]
     for k in range(len(position)):
         up = upper_position[k] - position[k]
@@ -77,7 +77,7 @@ def _bound_all(position, lower_position, upper_position, rate, limits):
 
 
 _VECTOR = "float64[::1]"
-_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, float64[:, ::1])", _bound_all)
+_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64[:, ::1], {_VECTOR})", _bound_all)
 
 
 def _check(joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray) -> None:

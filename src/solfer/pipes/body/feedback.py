@@ -151,7 +151,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         elif self._alignment is not None and not self.received:
             self._align()
         carried.update(options)
-        if self._measures_pose:
+        if self._measures_pose and abs(carried.base[4]) > STEEP:
             self._warn(carried.base[4])
         for values, measured in self._measured:
             values[...] = measured
@@ -168,11 +168,10 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         )
 
     def _warn(self, tilt: float) -> None:
-        if abs(tilt) > STEEP:
-            self.warnings.throttle.warning(
-                "steep",
-                "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
-                "are not unique, and its rates are not to be trusted",
-                self.name,
-                math.degrees(tilt),
-            )
+        self.warnings.throttle.warning(
+            "steep",
+            "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
+            "are not unique, and its rates are not to be trusted",
+            self.name,
+            math.degrees(tilt),
+        )

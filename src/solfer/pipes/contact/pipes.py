@@ -64,6 +64,7 @@ class _Wrenches:
         self._published = published
         self._turned = np.zeros_like(published) if carried.fixed else published
         self._origins = Handler(LinearPoint(contact.link, robot) for contact in carried.contacts)
+        self._places = self._origins.value.reshape(-1, 3)
         self.all = np.arange(len(published))
         self._memory = np.zeros((0, 6))
         self._positions = np.zeros((0, 3))
@@ -74,18 +75,14 @@ class _Wrenches:
         self._bring_up_to_date()
         if self._turned is not self._published:
             np.matmul(self._published.reshape(2, 3), self._rotation().T, out=self._turned.reshape(2, 3))
-        self._move(self._turned, self._written, -1.0, out=self._memory, places=places)
+        self._shift(self._turned, self._positions, self._places, self._written, -1.0, self._memory, places)
 
     def read(self) -> None:
         """Write the wrenches of all contacts to the message."""
         self._bring_up_to_date()
-        self._move(self._memory, self._read, 1.0, out=self._turned, places=self.all)
+        self._shift(self._memory, self._positions, self._places, self._read, 1.0, self._turned, self.all)
         if self._turned is not self._published:
             np.matmul(self._turned.reshape(2, 3), self._rotation(), out=self._published.reshape(2, 3))
-
-    def _move(self, source: np.ndarray, rows: np.ndarray, sign: float, out: np.ndarray, places: np.ndarray) -> None:
-        origins = self._origins.value.reshape(-1, 3)
-        self._shift(source, self._positions, origins, rows, sign, out, places)
 
     def _rotation(self) -> np.ndarray:
         return self._robot.kinematics.rotation(self._contacts[0].link)
@@ -94,8 +91,8 @@ class _Wrenches:
         """Update kinematics, contacts and origins to the measured State, and find contacts that came or went."""
         self._robot.update()
         contacts = self._robot.contacts  # computed on access
-        self._positions = contacts.positions
         if contacts.wrenches is not self._memory:
+            self._positions = contacts.positions
             self._memory, known = contacts.wrenches, [id(contact) for contact in contacts]
             members = np.array([known.index(id(each)) if id(each) in known else -1 for each in self._contacts])
             self._written = np.stack((self.all, members, members), axis=1)
@@ -156,7 +153,7 @@ class ContactFeedbackPipe(PointFeedbackPipe):
 
     def _copy_named(self, message: Message) -> None:
         super()._copy_named(message)
-        target = self._names.match(message.names).target
+        target = self._names.order.target
         self._brought = self._robots.all if target is None else target
 
 

@@ -36,7 +36,7 @@ class JointTurns:
         from solfer.numerics.kernels import keep_revolutions, unwrap
 
         self._revolutions = robot.revolutions[dofs]
-        self._dofs = dofs
+        self._dofs = dofs = np.asarray(dofs, dtype=np.int64)
         self._function = function
         self._of_robot = robot.added_revolutions
         before = np.repeat([[np.nan], [np.inf], [-np.inf]], len(dofs), axis=1)  # see the kernel
@@ -44,25 +44,21 @@ class JointTurns:
         self._begin = robot.state.position if function == "motor" else np.zeros(robot.size)
         self._aligned = (self._revolutions == 0.0) | (function != "motor" and not is_calibrated)
         counts = self._of_robot if function == "state" else np.zeros(robot.size)
-        self._add = partial(unwrap, before, self._revolutions, self._added)
-        self._keep = partial(keep_revolutions, before, self._added, np.asarray(dofs, dtype=np.int64), counts)
+        # what was added before is the Robot's count, or its own
+        known = (self._of_robot, dofs) if function == "reference" else (self._added, np.arange(len(dofs)))
+        self._add = partial(unwrap, before, self._revolutions, self._added, *known)
+        self._keep = partial(keep_revolutions, before, self._added, dofs, counts)
         self._follow()
 
     def _follow(self) -> None:
         """Choose what each message needs: mostly a call of a kernel, once all joints are aligned."""
         is_aligned = self._aligned.all()
-        add = self._add_counted if self._function == "reference" else self._add
-        self.unwrap = add if is_aligned else partial(self._align, add)
+        self.unwrap = self._add if is_aligned else self._align
         self.keep = self._keep if is_aligned else self._keep_more
 
-    def _add_counted(self, position: np.ndarray, part: np.ndarray) -> None:
-        """Add turns from the Robot's count on."""
-        np.take(self._of_robot, self._dofs, out=self._added, mode="clip")
-        self._add(position, part)
-
-    def _align(self, add: Callable[[np.ndarray, np.ndarray], None], position: np.ndarray, part: np.ndarray) -> None:
+    def _align(self, position: np.ndarray, part: np.ndarray) -> None:
         """Add turns, and those that align joints."""
-        add(position, part)
+        self._add(position, part)
         new = self._to_align(part)
         shift = whole_revolutions(self._begin[self._dofs[new]] - position[new], self._revolutions[new])
         position[new] += shift

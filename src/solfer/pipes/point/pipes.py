@@ -109,7 +109,8 @@ class PointFeedbackPipe(FeedbackPipe):
         return self._names is None or not self._names.not_received.any()
 
     def _decode(self, message: Message) -> None:
-        self._check_frame(message)
+        if message.frame != self._frame:
+            self._check_frame(message)
         if isinstance(message, WrenchMessage):
             self._values[:3], self._values[3:] = message.force, message.torque
         elif self._names is not None:
@@ -117,8 +118,7 @@ class PointFeedbackPipe(FeedbackPipe):
         elif self._notation is not None and self._port.count is None:
             self._notation.read(message.values, self._values)
         else:
-            self._check_size(message.values.shape, self._values.shape)
-            np.copyto(self._values, self._as_here(message.values))
+            np.copyto(self._values, self._as_here(message.values, self._values.shape))
         if self._notation is not None and not self._notation.located:
             self._values[..., :3] = self._port.value[..., :3]
         if not finite(self._numbers):
@@ -127,30 +127,27 @@ class PointFeedbackPipe(FeedbackPipe):
             self._inexact.report(message.sender)
 
     def _check_frame(self, message: Message) -> None:
-        if message.frame != self._frame and bare_frame(message.frame) != self._frame:
+        if bare_frame(message.frame) != self._frame:
             raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
 
     def _copy_named(self, message: Message) -> None:
         """Copy several Points; those that the message lacks keep their values."""
-        order = self._names.match(message.names)
-        self._check_size(message.values.shape, (len(message.names), self._values.shape[1]))
-        values = self._as_here(message.values)
+        names = self._names
+        order = names.order if message.names is names.matched else names.match(message.names)
+        values = self._as_here(message.values, (len(message.names), self._values.shape[1]))
         if order.target is None:
             values.take(order.source, axis=0, out=self._values, mode="clip")
         else:
             np.copyto(self._values, self._port.value)
             self._values[order.target] = values[order.source]
         if not self.received:
-            self._names.note(order)
+            names.note(order)
 
-    def _as_here(self, values: np.ndarray) -> np.ndarray:
-        """Return received numbers in the notation of the port."""
+    def _as_here(self, values: np.ndarray, declared: tuple[int, ...]) -> np.ndarray:
+        """Return received numbers of a declared shape in the notation of the port."""
+        if values.shape != declared:
+            raise PipeError(f"numbers of shape {values.shape}", expected=f"shape {declared}")
         return values if self._notation is None else self._notation.read(values, np.empty_like(values))
-
-    @staticmethod
-    def _check_size(shape: tuple[int, ...], declared: tuple[int, ...]) -> None:
-        if shape != declared:
-            raise PipeError(f"numbers of shape {shape}", expected=f"shape {declared}")
 
 
 class PointCommandPipe(CommandPipe):
@@ -194,7 +191,8 @@ class PointCommandPipe(CommandPipe):
     def send(self, stamp: float) -> None:
         """See `CommandPipe.send`."""
         if self._finite:
-            super().send(stamp)
+            self.sent.stamp = stamp
+            self.writer.write(self.sent)
         else:
             self._throttle.warning(
                 "finite", "controller '%s': a %s that is not finite is not sent", self.name, self._port.quantity

@@ -125,7 +125,13 @@ class Outputs:
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        self.joints.keep()
+        joints = self.joints
+        farthest = 0.0
+        for block, sent, steps in joints.blocks:
+            farthest = max(farthest, joints.copy(block, sent, steps))
+        if joints.is_sent:
+            joints.distance += farthest
+        joints.is_sent = joints.are_followed = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
 

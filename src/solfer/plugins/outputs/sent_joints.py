@@ -16,7 +16,10 @@ class SentJoints:
         period: Time of a control cycle [s].
 
     Attributes:
+        blocks: Numbers of each pipe, those sent last, and for each row the time that it acts [s].
+        copy: Copies a block to what was sent last, and returns the largest step of a joint [rad, m].
         is_sent: Whether anything was sent since the start.
+        are_followed: Whether joints follow what was sent last.
         distance: Sum over all cycles of the largest commanded step of a joint [rad, m].
     """
 
@@ -27,34 +30,25 @@ class SentJoints:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import keep
 
-        self._keep = keep
-        self._blocks = [
+        self.copy = keep
+        self.blocks = [
             (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if moves(pipe) else None)) for pipe in pipes
         ]
         self._positions = [
             (pipe.dofs, sent[row])
-            for pipe, (_, sent, _) in zip(pipes, self._blocks, strict=True)
+            for pipe, (_, sent, _) in zip(pipes, self.blocks, strict=True)
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
         ]
         self._reach = [np.full(dofs.shape, self._LARGEST_DEFLECTION) for dofs, _ in self._positions]
         self._velocities = [values for pipe in pipes for field, values in pipe.fields if field == "velocity"]
-        self._are_followed = False
+        self.are_followed = False
         self.is_sent = False
         self.distance = 0.0
 
-    def keep(self) -> None:
-        """Keep what is sent in this cycle."""
-        farthest = 0.0
-        for block in self._blocks:
-            farthest = max(farthest, self._keep(*block))
-        if self.is_sent:
-            self.distance += farthest
-        self.is_sent = self._are_followed = True
-
     def restore(self) -> None:
         """Let what was sent last be sent again."""
-        for block, sent, _ in self._blocks:
+        for block, sent, _ in self.blocks:
             block[...] = sent
 
     def stop(self, position: np.ndarray) -> None:
@@ -68,11 +62,11 @@ class SentJoints:
 
     def forget(self) -> None:
         """Forget what joints follow: others move them now, or the robot is in another state."""
-        self._are_followed = False
+        self.are_followed = False
 
     def follow(self, position: np.ndarray) -> None:
         """Write where joints are that follow what was sent last, beside where they are measured [rad, m]: there."""
-        for (dofs, sent), reach in zip(self._positions, self._reach, strict=True) if self._are_followed else ():
+        for (dofs, sent), reach in zip(self._positions, self._reach, strict=True) if self.are_followed else ():
             follow = np.abs(sent - position[dofs]) <= reach
             position[dofs[follow]] = sent[follow]
 

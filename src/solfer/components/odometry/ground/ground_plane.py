@@ -67,7 +67,7 @@ class GroundPlane:
 
     def start_map(self) -> None:
         """Begin with a floor where the wheels are on level ground, and measure the tilt by it."""
-        self.map.start(0.0 if self._motion.wheels.is_level else math.nan)
+        self.map.start(0.0 if self._motion.wheels.ground.is_level else math.nan)
         self._floor = self.map.floor
         self._floor_variance = 0.0
         self._measure_tilt()
@@ -106,9 +106,9 @@ class GroundPlane:
         self.turns = found == 2
         if found:
             a, b = self.slope.tolist()
-            if math.hypot(a, b) > self._level * (1.0 if wheels.is_level else 0.7):
+            if math.hypot(a, b) > self._level * (1.0 if wheels.ground.is_level else 0.7):
                 wheels.set_normal(-a, -b, 1.0)
-            elif not wheels.is_level:
+            elif not wheels.ground.is_level:
                 wheels.set_normal(*UP)
         if not fresh:
             return

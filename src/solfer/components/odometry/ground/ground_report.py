@@ -20,10 +20,10 @@ def report_ground(law: FilteredOdometry, wheels: Wheels) -> GroundEstimate:
     places = np.array([law.position + about_vertical(arm, law.heading) for arm in wheels.arms])
     places[:, 2] -= np.where(lifted, law.ground.rise, 0.0)
     point = places[lifted == lifted.all()].mean(axis=0)  # where all are lifted, below them
-    normal = Vector(*about_vertical(wheels.normal, law.heading).tolist())
+    normal = Vector(*about_vertical(wheels.ground.normal, law.heading).tolist())
     # a level floor is one within the slopes of floors; the plane of a slope is measured with the error of the tilt
     covariance = law.kalman.covariance
-    first = SLOPE if wheels.is_level else TILT
+    first = SLOPE if wheels.ground.is_level else TILT
     turned = math.sqrt(float(max(covariance[first, first], covariance[first + 1, first + 1])) + PLANE_DEVIATION**2)
     return GroundEstimate(
         names=wheels.names,

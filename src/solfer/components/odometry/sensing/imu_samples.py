@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry.sensing import samples_kernel
-from solfer.components.odometry.sensing.samples import SensorHistory, SortedSamples
+from solfer.components.odometry.sensing.samples import NO_NUMBERS, SensorHistory, SortedSamples
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.state import State
 
@@ -29,53 +29,53 @@ class ImuSamples:
 
     Attributes:
         stamps: See above.
+        sorted: The samples: angles, their rates, and what `samples_kernel` integrates.
         pushed: Change of the velocity of the IMU since the measurement before in the world, by its accelerometer,
             shape (3,) [m/s]; live. NaN: it has none, or samples since then are missing.
         measured_at: Time of the newest measurement [s]; NaN before the first.
+        turned: The base's angles at the last measurement, and the newest ones, shape (3,) [rad], of what `turned_since`
+            has returned in this cycle; None: not known, or the same.
     """
 
     def __init__(self, offset: float, stamps: StampCheck, origin: np.ndarray):
         self.stamps = stamps
         self._origin = origin
         self.pushed = np.full(3, math.nan)
+        self.turned: tuple[np.ndarray, np.ndarray] | None = None
         self.measured_at = math.nan
         self._offset = offset
-        self._samples = SortedSamples(CAPACITY, 15)
+        self.sorted = SortedSamples(CAPACITY, 15)
         self._integrals = np.zeros(6)
         self._angles = np.zeros(3)
         self._angles_before = np.zeros(3)
 
-    @property
-    def newest(self) -> float:
-        """Time of the newest sample [s]."""
-        return self._samples.newest
-
     def start(self) -> None:
         """Begin without samples."""
-        self._samples.clear()
+        self.sorted.clear()
+        self.turned = None
         self.measured_at = math.nan
         self.stamps.start()
 
     def forget_until(self, stamp: float) -> None:
         """Forget the samples up to a stamp [s], and what was measured then."""
-        samples = self._samples
+        samples = self.sorted
         samples.drop(int(np.searchsorted(samples.stamps[: samples.count], stamp + self._offset, side="right")))
         self.measured_at = math.nan
 
     def receive(self, history: SensorHistory) -> None:
         """Sort the samples of a cycle in, with the integral of the rates up to each."""
-        samples = self._samples
+        samples = self.sorted
+        messages = history.history
         for index, stamp in history.accepted(self.stamps, -math.inf):
-            row = samples.insert(stamp + self._offset)
-            if row < 0:
-                continue
-            history.copy(index, samples.rows[row, :6])
-            force = history.history.forces[index]
-            samples_kernel.integrate(samples.stamps, samples.rows, row, samples.count, force, self._origin)
+            given = NO_NUMBERS, messages.values[index], history.rows, history.places
+            row = samples.insert(stamp + self._offset, *given)
+            if row >= 0:
+                force = messages.forces[index]
+                samples_kernel.integrate(samples.stamps, samples.rows, row, samples.count, force, self._origin)
 
     def turned_since(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the base's angles at the measurement of a time [s], and the newest ones; None: not known."""
-        samples = self._samples
+        samples = self.sorted
         if self.measured_at != time or not samples.newest > time:
             return None
         return self._angles, samples.rows[samples.count - 1, ANGLES]
@@ -90,7 +90,7 @@ class ImuSamples:
         Returns:
             Whether a sample of the IMU is at that time, or samples are on both sides of it.
         """
-        samples = self._samples
+        samples = self.sorted
         after = int(np.searchsorted(samples.stamps[: samples.count], time))
         before = after if samples.stamps[after] == time else after - 1
         if before < 0:

@@ -1,7 +1,6 @@
 """The newest samples of a sensor, in the order of their stamps."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,6 +8,10 @@ from solfer.components.odometry.sensing import samples_kernel
 from solfer.components.odometry.sensing.stamps import StampCheck
 from solfer.model.history import History
 from solfer.robot import Robot
+
+NO_NUMBERS = np.zeros(0)
+NO_VALUES = np.zeros((0, 0))
+NO_PLACES = np.zeros(0, dtype=np.int64)
 
 
 class SortedSamples:
@@ -35,9 +38,24 @@ class SortedSamples:
         self.count = 0
         self.newest = -math.inf
 
-    def insert(self, stamp: float) -> int:
-        """Make room for a sample; return its row, or -1 where there is one with that stamp, or it is too old."""
-        row = samples_kernel.insert(self.stamps, self.rows, self.count, stamp)
+    def insert(
+        self,
+        stamp: float,
+        known: np.ndarray = NO_NUMBERS,
+        values: np.ndarray = NO_VALUES,
+        which: np.ndarray = NO_PLACES,
+        places: np.ndarray = NO_PLACES,
+    ) -> int:
+        """Insert a sample; return its row, or -1 where there is one with that stamp, or it is too old.
+
+        Args:
+            stamp: Its stamp [s].
+            known: Numbers with which it begins, which count where a message lacks some.
+            values: Numbers of its message, one row for each interface.
+            which: `SensorHistory.rows`, those of `values` that it has.
+            places: `SensorHistory.places`, where they belong.
+        """
+        row = samples_kernel.insert(self.stamps, self.rows, self.count, stamp, known, values, which, places)
         if row >= 0:
             self.count = min(self.count + 1, len(self.stamps))
             self.newest = max(self.newest, stamp)
@@ -61,12 +79,17 @@ class SensorHistory:
     Args:
         history: The history.
         first: The first of these DoFs, which follow each other.
+
+    Attributes:
+        history: See above.
+        places: Places of its DoFs among them, shape (k,).
+        rows: Rows of its values that are positions and velocities, shape (2,).
     """
 
     def __init__(self, history: History, first: int):
         self.history = history
-        self._places = np.array(history.dofs - first, dtype=np.int64)
-        self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
+        self.places = np.array(history.dofs - first, dtype=np.int64)
+        self.rows = np.array([history.interfaces.index(name) for name in ("position", "velocity")], dtype=np.int64)
 
     @classmethod
     def find(cls, robot: Robot, dofs: range) -> "SensorHistory | None":
@@ -76,14 +99,16 @@ class SensorHistory:
                 return cls(history, dofs.start)
         return None
 
-    def accepted(self, check: StampCheck, after: float) -> Iterator[tuple[int, float]]:
-        """Iterate over the rows of this cycle whose stamps pass a check and are after a time [s]: row and stamp [s]."""
+    def accepted(self, check: StampCheck, after: float) -> list[tuple[int, float]]:
+        """List the rows of this cycle whose stamps pass a check and are after a time [s]: row and stamp [s]."""
         history = self.history
+        accepted: list[tuple[int, float]] = []
         for index in range(history.count):
             stamp = round(float(history.stamps[index]), 6)  # whatever a transport has rounded: they are alike then
             if check.accepts(stamp, float(history.arrivals[index]), after, history.sender):
-                yield index, stamp
+                accepted.append((index, stamp))
+        return accepted
 
     def copy(self, index: int, out: np.ndarray) -> None:
         """Copy a row: all positions, then all velocities; what it lacks stays as it is."""
-        samples_kernel.copy(self.history.values[index], *self._rows, self._places, out)
+        samples_kernel.copy(self.history.values[index], self.rows, self.places, out)

@@ -12,7 +12,8 @@ LONGEST_LAG = 0.03
 """Longest time for which joints wait for what the IMU measures at their time [s]."""
 
 
-def _insert(stamps, rows, count, stamp):
+@part
+def make_room(stamps, rows, count, stamp):
     """Make room for a sample among `count` others, the oldest of which goes where there is none; return its row.
 
     It is -1, and nothing changes, where there is one with that stamp, or all are newer and there is no room.
@@ -36,16 +37,29 @@ def _insert(stamps, rows, count, stamp):
     return row
 
 
-def _copy(values, first, second, places, out):
-    """Copy two rows of values to the places of each half of `out`; what is NaN is not there."""
-    half = len(out) // 2
-    for k in range(len(places)):
-        value = values[first, k]
-        if value == value:
-            out[places[k]] = value
-        value = values[second, k]
-        if value == value:
-            out[half + places[k]] = value
+@part
+def copy_message(values, which, places, out):
+    """Copy two rows of values, one after the other, to the places of each; what is NaN is not there."""
+    size = len(places)
+    for half in range(len(which)):
+        for k in range(size):
+            value = values[which[half], k]
+            if value == value:
+                out[half * size + places[k]] = value
+
+
+def _insert(stamps, rows, count, stamp, known, values, which, places):
+    """Insert a sample, see `make_room` and `copy_message`; it begins with what is `known`. Returns its row, or -1."""
+    row = make_room(stamps, rows, count, stamp)
+    if row >= 0:
+        rows[row, : len(known)] = known
+        copy_message(values, which, places, rows[row])
+    return row
+
+
+def _copy(values, which, places, out):
+    """See `copy_message`."""
+    copy_message(values, which, places, out)
 
 
 @part
@@ -105,7 +119,8 @@ def _integrate(stamps, rows, first, count, force, origin):
 
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
-insert = cached(f"int64({_V}, {_M}, int64, float64)", _insert)
-copy = cached(f"void({_M}, int64, int64, int64[::1], {_V})", _copy)
+_I = "int64[::1]"
+insert = cached(f"int64({_V}, {_M}, int64, float64, {_V}, {_M}, {_I}, {_I})", _insert)
+copy = cached(f"void({_M}, {_I}, {_I}, {_V})", _copy)
 find_turned = cached(f"void({_V}, {_M}, int64, int64, float64, {_V})", _turned_at)
 integrate = cached(f"void({_V}, {_M}, int64, int64, {_V}, {_M})", _integrate, sources=[Path(base_chart.__file__)])

@@ -70,12 +70,11 @@ class _JointSamples:
 
     def receive(self, history: SensorHistory, begin: float, after: float) -> None:
         """Sort the messages of a cycle in that are after two times [s]; what came before the first is known."""
-        waiting = self.waiting
+        known = self.newest.ravel()
+        values = history.history.values
         for index, stamp in history.accepted(self.stamps, after):
-            row = waiting.insert(stamp) if stamp > begin else -1
-            if row >= 0:
-                waiting.rows[row] = self.newest.ravel()  # which counts where a message lacks joints
-                history.copy(index, waiting.rows[row])
+            if stamp > begin:
+                self.waiting.insert(stamp, known, values[index], history.rows, places=history.places)
 
     def is_frozen(self, row: np.ndarray) -> bool:
         """Return whether joints that move, all positions and then all velocities, are where they were before."""
@@ -126,6 +125,7 @@ class Streams:
         elapsed: Time from the measurement before to this one [s].
         measured: Whether the IMU has measured the base in the meantime.
         ahead: Time from the last measurement to the newest sample of any sensor [s].
+        imu: Samples of the IMU.
         silence: Of joints and IMU together.
         stamp_checks: Checks of the stamps of joints and IMU.
     """
@@ -139,7 +139,7 @@ class Streams:
         self._measurements = _JointSamples(robot.size - 6)
         imu_check = StampCheck(self._measurements.stamps, offset)
         chart = robot.kinematics.base or BaseChart()
-        self._samples = ImuSamples(offset, imu_check, np.ascontiguousarray(chart.rotation))
+        self.imu = ImuSamples(offset, imu_check, np.ascontiguousarray(chart.rotation))
         self.stamp_checks = self._measurements.stamps, imu_check
         self._written = np.zeros((2, 3))
         self._time = math.nan
@@ -156,7 +156,7 @@ class Streams:
     def velocity_change(self) -> VelocityChange:
         """What the accelerometer measures; known from `start` on."""
         place = np.zeros(3) if self._histories is None else self._histories[1].history.place
-        return VelocityChange(self._samples.pushed, place)
+        return VelocityChange(self.imu.pushed, place)
 
     def start(self) -> None:
         """Begin with what the State has; pipes and their histories exist by now."""
@@ -167,7 +167,7 @@ class Streams:
         self._waited = self.ahead = 0.0
         self.silence.start()
         self._measurements.start()
-        self._samples.start()
+        self.imu.start()
         if self._histories is not None:
             self._receive(*self._histories)
             waiting = self._measurements.waiting
@@ -202,13 +202,13 @@ class Streams:
         if not waiting.count:
             return False
         time = float(waiting.stamps[0])
-        is_covered = self._samples.newest >= time
+        is_covered = self.imu.sorted.newest >= time
         if not is_covered and self._waited < LONGEST_LAG and waiting.newest - time < LONGEST_LAG:
             return False
         self.elapsed = self._period if math.isnan(self._time) else time - self._time
         self._time = time
         self._waited = 0.0
-        self.measured = is_covered and self._samples.measure(time, state)
+        self.measured = is_covered and self.imu.measure(time, state)
         measurements.before[:] = waiting.rows[0].reshape(2, -1)
         state.position[6:], state.velocity[6:] = measurements.before
         waiting.drop(1)
@@ -221,8 +221,10 @@ class Streams:
         state = self._robot.state
         state.position[6:], state.velocity[6:] = self._measurements.newest
         self.ahead = min(
-            max(self._measurements.waiting.newest, self._samples.newest, self._time) - self._time, LONGEST_EXTRAPOLATION
+            max(self._measurements.waiting.newest, self.imu.sorted.newest, self._time) - self._time,
+            LONGEST_EXTRAPOLATION,
         )
+        self.imu.turned = self.imu.turned_since(self._time) if self.ahead else None
 
     def distrust(self, reason: str, legs: np.ndarray) -> bool:
         """Let the pipe of the IMU refuse it until it and legs rest; return whether there is one that can.
@@ -239,12 +241,8 @@ class Streams:
             imu.history.others_rest = _JointsAtRest(joints, legs)
         return True
 
-    def turned_since(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the base's angles at the last measurement, and the newest ones, shape (3,) [rad]; None: not known."""
-        return self._samples.turned_since(self._time)
-
     def written(self) -> None:
-        """Note what an estimator has written into the State: only what differs from it is measured."""
+        """Note what an estimator has written into the State, without histories: only what differs is measured."""
         self._written[0] = self._robot.state.position[3:6]
         self._written[1] = self._robot.state.velocity[3:6]
 
@@ -273,8 +271,10 @@ class Streams:
         joint_check, imu_check = self.stamp_checks
         joint_check.begin_cycle()
         newest = imu_check.newest
-        self._measurements.receive(joints, begin, after)
-        self._samples.receive(imu)
+        if joints.history.count:
+            self._measurements.receive(joints, begin, after)
+        if imu.history.count:
+            self.imu.receive(imu)
         is_measured = joint_check.newest != joint_check.before or imu_check.newest != newest
         if is_measured and self.silence.end():
-            self._samples.forget_until(newest)
+            self.imu.forget_until(newest)

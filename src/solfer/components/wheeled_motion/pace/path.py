@@ -1,6 +1,7 @@
 """How fast a motion goes along its path: no faster than wheels and joints can follow."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -31,6 +32,9 @@ class PathPace:
 
     Attributes:
         is_found: Whether motions wait for wheels and joints; else the pace stays what it is in the references.
+        advance: Lets references go on for a cycle, at the pace where it counts, and writes the desired vertices. Takes
+            whether the pace is found, whether nothing has been commanded yet, whether joints at their bounds hold the
+            motion up, the largest pace, and the time for which they go on [s].
     """
 
     def __init__(self, references: References, steering: Steering, offsets: RollingOffsets, error: np.ndarray):
@@ -49,7 +53,7 @@ class PathPace:
             desired=offsets.reference,
             error=error,
         )
-        self._address = self._block.address
+        self.advance = partial(advance, self._block.address)
         self.start()
 
     def limit(self, speeds: Sequence[float], acceleration: float, furthest: float) -> None:
@@ -82,15 +86,3 @@ class PathPace:
         """Begin without a motion, which could go on in full."""
         self._state[[VALUE, LIMITED, HELD, LAGS, FOLLOWED]] = 1.0
         self._state[SPEED] = 0.0
-
-    def advance(self, is_paced: bool, is_first: bool, is_held: bool, most: float, passed: float) -> None:
-        """Let references go on for a cycle, at the pace where it counts, and write the desired vertices.
-
-        Args:
-            is_paced: Whether the pace is found, or stays what it is in the references.
-            is_first: Whether this is the first cycle, in which nothing has been commanded yet.
-            is_held: Whether joints at their bounds hold the motion up.
-            most: Largest pace.
-            passed: Time for which they go on [s].
-        """
-        advance(self._address, is_paced, is_first, is_held, most, passed)

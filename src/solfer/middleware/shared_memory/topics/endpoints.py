@@ -114,7 +114,10 @@ class XbotReader(Reader):
         arrival = 0.0
         for source in self._sources:
             if not source.ahead and source.end.words[NEWEST] != source.end.sequence:
-                self._fetch(source)
+                ring: Any = source.end  # one that keeps messages
+                lost = ring.lost
+                source.ahead = ring.read(self._kept)
+                self.dropped += ring.lost - lost
             if source.ahead:
                 sent = source.record.front[SENT_COLUMN]
                 if oldest is None or sent < arrival:
@@ -127,14 +130,6 @@ class XbotReader(Reader):
         self.message = oldest.record.decode()
         self.arrival = oldest.arrival = arrival
         return oldest
-
-    def _fetch(self, source: SenderSegment) -> None:
-        """Fetch a sender's oldest message that is kept."""
-        ring = source.end
-        lost = ring.lost
-        ring.limit(self._kept)
-        source.ahead = bool(ring.read())
-        self.dropped += ring.lost - lost
 
     def age(self) -> float:
         """See `Reader.age`."""
