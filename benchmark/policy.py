@@ -209,8 +209,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_engine(parser)
     parser.add_argument("--seeds", type=int, default=10, help="number of runs")
     parser.add_argument("--springs", choices=("plugin", "lower_level"), default="plugin", help="what pulls the joints")
-    os.environ.setdefault(ENGINE_VARIABLE, "mujoco")
     options = parser.parse_args(arguments)
+    os.environ.setdefault(ENGINE_VARIABLE, "mujoco")
     logging.disable(logging.ERROR)
     figures = Figures(options.json)
     with tempfile.TemporaryDirectory() as folder:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from support.native import FLAGS, LISTINGS, SOURCES, JointSpaceTwin, TaskTrackingTwin, build
 
 from solfer.components import Component
@@ -247,6 +248,15 @@ def test_libraries_with_classes_of_one_name_stay_apart(tmp_path):
         target = build(tmp_path / f"lib{name}.so", source=_source(tmp_path, f'tags.text("{name}", "");'))
         made.append(load_class(f"{target}::Own"))
     assert [set(each.Tags.model_fields) - {"releases_gil"} for each in made] == [{"first"}, {"second"}]
+
+
+def test_bounds_are_those_of_each_number(tmp_path):
+    tags = 'tags.numbers("way", "way [m]").at_least(-1.0).at_most(2.0); tags.integer("count", 3, "").at_most(5);'
+    made = load_class(f"{build(tmp_path / 'libown.so', source=_source(tmp_path, tags))}::Own")
+    assert made.Tags(way=(-1.0, 2.0)).count == 3
+    for wrong in ({"way": (0.0, 2.1)}, {"way": (-1.1,)}, {"way": (), "count": 6}, {"way": (), "count": 2.5}):
+        with pytest.raises(ValidationError):
+            made.Tags(**wrong)
 
 
 def test_names_find_their_nearest(library, monkeypatch):

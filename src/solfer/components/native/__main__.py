@@ -2,4 +2,5 @@
 
 from solfer.components.native import INCLUDE
 
-print(INCLUDE)
+if __name__ == "__main__":
+    print(INCLUDE)

@@ -2,7 +2,7 @@
 
 import math
 from ctypes import c_double
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, create_model
 
@@ -18,8 +18,9 @@ _TYPES: dict[int, Any] = {
     INTEGER: int,
     SWITCH: bool,
     TEXT: str,
-    NUMBERS: tuple[float, ...],
+    NUMBERS: float,
 }
+"""Types of values, and of each of several numbers."""
 
 
 def record_of(name: str, tags: list[Tag]) -> type[Record]:
@@ -42,15 +43,24 @@ def record_of(name: str, tags: list[Tag]) -> type[Record]:
         if tag.kind not in _TYPES or tag.is_live and tag.kind != NUMBER:
             what = f"the tag '{key}' of the component '{name}' is of the kind {tag.kind}{' and live' * tag.is_live}"
             raise ComponentError(what, expected="a kind of solfer/component.h; numbers alone can be live")
-        fields[key] = _TYPES[tag.kind], _field(tag)
-    return create_model(f"{name}Tags", __base__=Record, __doc__=f"Tags of the component `{name}`.", **fields)
+        fields[key] = _type(tag), _field(tag)
+    about = f"Tags of the component `{name}`."
+    return create_model(f"{name}Tags", __base__=Record, __module__=name, __doc__=about, **fields)
+
+
+def _type(tag: Tag) -> Any:
+    """Return the type of the values of a tag, with the bounds of each number."""
+    kind = _TYPES[tag.kind]
+    if tag.kind in (SWITCH, TEXT):
+        return kind
+    bounds = {"ge": tag.lower} if tag.lower > -math.inf else {}
+    bounds |= {"le": tag.upper} if tag.upper < math.inf else {}
+    bounded = Annotated[kind, Field(**bounds)] if bounds else kind
+    return tuple[bounded, ...] if tag.kind == NUMBERS else bounded  # type: ignore[valid-type]
 
 
 def _field(tag: Tag) -> Any:
     about: dict[str, Any] = {"description": text(tag.description)}
-    if tag.kind in (NUMBER, INTEGER):
-        about |= {"ge": tag.lower} if tag.lower > -math.inf else {}
-        about |= {"le": tag.upper} if tag.upper < math.inf else {}
     if tag.is_live:
         about |= LIVE
     if tag.is_required:
