@@ -420,6 +420,26 @@ def test_the_imu_comes_back_without_a_jump(robot):
     assert robot.state.position[5] == pytest.approx(0.4, abs=1e-3)
 
 
+def test_the_base_does_not_go_on_tilting_without_the_imu(robot):
+    """A rate that was refused soon after it was wrong would move the base by its height above the wheels, on and on."""
+    made, tilts = component(robot), []
+    drive(made, 0.5)
+
+    def tilt_on(k):
+        tilts.append(float(np.abs(made.law.angular[:2]).max()))
+        if k < 5:
+            robot.state.position[3:6] = Rotation.from_euler("ZY", (0.4, 0.5 * (k + 1) / RATE)).as_euler("XYZ")
+            robot.state.velocity[3:6] = 0.0, 0.5, 1e-9 * (k % 2)
+        else:
+            robot.state.position[3:6] = robot.command.position[3:6]
+            robot.state.velocity[3:6] = robot.command.velocity[3:6]
+
+    drive(made, 0.2, move=tilt_on)
+    assert max(tilts) > 0.2
+    assert tilts[-1] < 0.01
+    assert abs(float(np.linalg.norm(made.law.velocity)) - SPEED) < 0.01
+
+
 def test_a_new_start_forgets_what_was_learned(robot):
     made = component(robot)
     drive(made, 1.0, bias=0.003)

@@ -97,6 +97,17 @@ def test_a_sender_without_turn_rates_is_not_contradicted():
         check.check(values(Rotation.from_euler("z", 2.0 * step * PERIOD)), True, step * PERIOD, step * PERIOD)
 
 
+def test_a_gyroscope_in_degrees_is_found_at_rest():
+    """It turns nothing, so only how far both turn to and fro shows it; a robot that sways by its noise would fall."""
+    check, draw = TurnCheck(), np.random.default_rng(2)
+    still = Rotation.random(random_state=2)
+    with pytest.raises(PipeError, match="times those of the orientation"):
+        for step in range(50):
+            noise = Rotation.from_rotvec(draw.normal(0.0, 1e-5, 3))
+            rates = np.degrees(draw.normal(0.0, 5e-3, 3))
+            check.check(values(still * noise, rates), True, step * PERIOD, step * PERIOD)
+
+
 def test_noise_and_a_bias_contradict_nothing():
     check, draw = TurnCheck(), np.random.default_rng(1)
     for step in range(5000):

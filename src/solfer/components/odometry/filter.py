@@ -253,7 +253,8 @@ class FilteredOdometry:
     def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
 
-        Without a sample the base is assumed to tilt on as it did; the next sample measures the difference to that.
+        Without a sample the base is assumed to tilt on as it did, slower and slower from 0.02 s on; the next sample
+        measures the difference to that.
 
         Returns:
             Variance of what the gyroscope misses [rad^2/s^2], and the sample; none at rest.
@@ -262,6 +263,8 @@ class FilteredOdometry:
         base = self._base
         kalman = self.kalman
         if not base.fresh:
+            if imu.since > 0.02:  # [s]
+                base.angular[:2] *= 0.02 / (0.02 + imu.period)  # time constant [s]
             np.multiply(base.angular[:2], self._imu.period, out=base.turned[:2])
             imu.assumed += base.turned[:2]
             return 0.0, NO_SAMPLE

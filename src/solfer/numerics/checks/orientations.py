@@ -11,6 +11,9 @@ TILT_MARGIN = 0.1
 FORCE_WINDOW = 1.5
 """Time constant of the mean specific force [s], in which a velocity may change by 1.5 m/s."""
 
+SHORT = 0.1
+"""Time constant of the angles that are covered [s]: noise and a sway cover one, and turn nothing."""
+
 GRAVITY = 9.81
 """Specific force at rest [m/s^2]."""
 
@@ -30,37 +33,40 @@ ROTATION = 6
 RATES = 9
 """Sum of rotations by the rates, 3 numbers."""
 
-FORCE = 12
+WAY = 12
+"""Angle that the link has covered within `SHORT` by the orientation, and by the rates."""
+
+FORCE = 14
 """Sum of the specific force in the world's axes, 3 numbers."""
 
-IS_APART = 15
+IS_APART = 17
 """Whether the rotations contradicted each other."""
 
-FROZEN_TIME = 16
+FROZEN_TIME = 18
 """For how long the orientation was frozen."""
 
-ACCEPTED = 17
+ACCEPTED = 19
 """Quaternion that was accepted last, 4 numbers."""
 
-LEAPT = 21
+LEAPT = 23
 """By how much the tilt has leapt from there; 0: it has not."""
 
-WITNESSED = 22
+WITNESSED = 24
 """For how long the specific force was measured since then."""
 
-FORCE_SIZE = 23
+FORCE_SIZE = 25
 """Mean size of the specific force."""
 
-IS_DISTRUSTED = 24
+IS_DISTRUSTED = 26
 """Whether others have found it to be wrong; until it rests."""
 
-STILL = 25
+STILL = 27
 """Quaternion from which the tilt has not moved, 4 numbers."""
 
-STILL_TIME = 29
+STILL_TIME = 31
 """For how long."""
 
-NUMBERS = 30
+NUMBERS = 32
 """How many numbers these are."""
 
 
@@ -167,6 +173,9 @@ def _compare_rotations(values, last, own_axes, passed, rate, before):
     if math.sqrt(tx * tx + ty * ty + tz * tz) > 0.05 + fastest * passed:  # the orientation was corrected
         return 0, 0.0
     keep = 1.0 if before[IS_APART] else WINDOW / (WINDOW + passed)  # what contradicted stays until it agrees again
+    keep_way = SHORT / (SHORT + passed)
+    before[WAY] = keep_way * before[WAY] + math.sqrt(tx * tx + ty * ty + tz * tz)
+    before[WAY + 1] = keep_way * before[WAY + 1] + passed * rate
     rotated = rates = apart = 0.0
     for axis, angle in enumerate((tx, ty, tz)):
         before[ROTATION + axis] = keep * before[ROTATION + axis] + angle
@@ -176,7 +185,10 @@ def _compare_rotations(values, last, own_axes, passed, rate, before):
         apart += (before[ROTATION + axis] - before[RATES + axis]) ** 2
     contradicts = math.sqrt(apart) > 0.08 + 0.3 * (math.sqrt(rotated) + math.sqrt(rates))
     before[IS_APART] = 1.0 if contradicts else 0.0
-    return (2, math.sqrt(rotated)) if contradicts else (0, 0.0)
+    if contradicts:
+        return 2, math.sqrt(rotated)
+    # what rotates covers the angle of its rates; an orientation that shakes may cover more
+    return (7, before[WAY + 1] / before[WAY]) if before[WAY + 1] > 0.008 + 2.0 * before[WAY] else (0, 0.0)
 
 
 @part
@@ -230,6 +242,7 @@ def _check_rotation(values, own_axes, force, arrival, stamp, before):
         1 and an angle: the tilt has leapt by it. 2: it rotates by this angle, and otherwise by its rates. 3: the
         specific force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow.
         0: none. 5: the mean specific force is so large [m/s^2], which refutes nothing. 6: others distrust the link.
+        7: rates are so many times what the orientation rotates by.
     """
     fault, size = _find_fault(values, own_axes, force, arrival, stamp, before)
     if fault == 0 or fault == 5:
