@@ -17,12 +17,13 @@ class TurnCheck:
     where it is back, within 0.1 rad, or where the specific force has been vertical within 0.1 rad for 0.5 s since then.
     About the vertical an orientation may jump, as compasses do. Orientation and rates contradict each other where the
     turns of a second by both differ by more than 0.08 rad and 0.3 of their sum, and from then on until the turns since
-    agree again, or until messages pause for 0.1 s. They do too while rates of the last 0.1 s cover an angle of 0.008 rad
-    and twice what the orientation does, as those in degrees of a robot that stands. Rates that are all zero were not measured; those above 10 rad/s are
-    spikes where the orientation since the message before differs from them by half. The mean specific force of 1.5 s is
-    vertical within 0.1 rad, which is a change of the velocity by 1.5 m/s; it does not count where it is not within
-    1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall. A link that others
-    distrust counts again when its tilt has stayed within 0.02 rad for 0.5 s since the last call of `distrust`.
+    agree again, or until messages pause for 0.1 s. They do too while rates of the last 0.1 s cover an angle of
+    0.008 rad and twice what the orientation does, as those in degrees of a robot that stands. Rates that are all zero
+    were not measured; those above 10 rad/s are spikes where the orientation since the message before differs from them
+    by half. The mean specific force of 1.5 s is vertical within 0.1 rad, which is a change of the velocity by 1.5 m/s;
+    it does not count where it is not within 1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
+    A link that others distrust counts again when its tilt has stayed within 0.02 rad for 0.5 s since the last call of
+    `distrust`.
     """
 
     def __init__(self) -> None:
