@@ -16,7 +16,7 @@ from solfer_tools.view.commands.control import ONLY_WATCHES, PageControl
 from solfer_tools.view.commands.emergency_stop import EmergencyStopButton, StopActions
 from solfer_tools.view.commands.own_view import CAMERA, TARGET, OwnViews
 from solfer_tools.view.commands.parameters import KnownParameters
-from solfer_tools.view.commands.plugin_tabs import PluginTabs
+from solfer_tools.view.commands.plugin_tabs import PluginTabs, with_pipes
 from solfer_tools.view.commands.requests import PageRequests
 from solfer_tools.view.commands.simulation_controls import PacedSimulation, SimulationControls
 from solfer_tools.view.drawing import SceneDrawing
@@ -134,8 +134,9 @@ class Page:
             now = self._playback.time - self._playback.begin
         else:
             reports = dict(self._middleware.reports())
-            carry_out("the list of parameters", partial(self._parameters.update, reports))
-            carry_out("the tabs", partial(self._tabs.update, reports))
+            parts = with_pipes(reports)
+            carry_out("the list of parameters", partial(self._parameters.update, parts))
+            carry_out("the tabs", partial(self._tabs.update, parts))
             carry_out("the status", partial(self._show_status, reports))
             carry_out("what is plotted", partial(self._columns.update, state, reports))
             now = self._middleware.now()

@@ -122,7 +122,7 @@ class _PluginTab:
 
     def show(self, report: HealthReport) -> None:
         """Show a report, if it is new, and the parameters as they are known."""
-        if report is not self._report:
+        if report != self._report:
             self._report = report
             self._state.content = _state(report)
             self._figures.content = _table(report)
@@ -261,6 +261,20 @@ def _changes(reply: ParametersReply) -> str:
     ]
     text = f"changed:<ul style='margin:0'>{''.join(rows)}</ul>" if rows else "nothing is changed"
     return f"<div style='font-size:0.8em;padding:0 1em'>{text}</div>"
+
+
+def with_pipes(reports: Mapping[str, HealthReport]) -> dict[str, HealthReport]:
+    """Return the reports of all parts but pipes, each with a sentence of each of its pipes among its figures."""
+    parts = {name: report for name, report in reports.items() if " " not in name}
+    sentences: dict[str, dict[str, str]] = {}
+    for name, report in reports.items():
+        part, _, pipe = name.partition(" ")
+        if pipe and part.rstrip(":") in parts:
+            sentences.setdefault(part.rstrip(":"), {})[pipe] = f"{report.level.name}: {report.summary}"
+    for part, pipes in sentences.items():
+        report = parts[part]
+        parts[part] = HealthReport(report.level, report.summary, {**report.values, **pipes})
+    return parts
 
 
 def _state(report: HealthReport) -> str:
