@@ -5,16 +5,24 @@ from functools import partial
 
 import numpy as np
 import pytest
-from support.integration.world import CONFIG, ROBOT, World
+from support.integration.world import CONFIG, ROBOT, World, perfect
 from support.plugins.policies import POLICY, file_of, legs
 
 from solfer.policy import Environment, Environments
-from solfer.simulation import read_bundle
+from solfer.simulation import Rates, Simulation, SimulationServer
 
 pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
 
 TORQUES = {"file": str(CONFIG / "support/torques.yaml")}
 GAINS = {"gains": {"stiffness": 2000.0, "damping": 50.0}, "secondary_file": TORQUES}
+
+
+class PromptWorld(World):
+    """A World whose sensors measure and publish in each millisecond, as an environment measures."""
+
+    def offer(self, middleware):
+        simulation = Simulation.from_file(perfect())
+        return simulation, SimulationServer(simulation, middleware, Rates(joints=1000.0, base=1000.0, imu=1000.0))
 
 
 def upright(environment):
@@ -40,8 +48,8 @@ def test_observations_and_targets_are_the_plugins(tmp_path, springs, monkeypatch
     """The environment's robot is where that of the plugin is, in each millisecond: then all numbers are the same."""
     weights = np.random.default_rng(1).normal(scale=0.01, size=(9 + 3 * len(legs()), len(legs())))
     file = file_of(tmp_path, weights, action={"scale": 0.25, "springs": springs}, **GAINS)
-    monkeypatch.setattr("solfer.policy.environment.read_bundle", lambda path: read_bundle(path).with_perfect_sensors())
-    with closing(World()) as world, closing(made(file)) as environment:
+    monkeypatch.setattr("solfer.policy.environment.read_bundle", lambda path: perfect())
+    with closing(PromptWorld()) as world, closing(made(file)) as environment:
         plugin = world.plugin("test", file, POLICY)
         world.run(3.0)
         run = plugin.component.network.run
