@@ -42,8 +42,8 @@ class Bench:
         self._dofs, self._places = np.array(shared, dtype=np.intp).T.copy()
         self._is_whole = bool(np.array_equal(self._dofs, self._places)) and len(shared) == self.robot.size
 
-    def connect(self, gains: tuple[str, ...]) -> None:
-        """Find where commands go; `gains` are the names of those that the component commands besides."""
+    def connect(self, fields: tuple[str, ...]) -> None:
+        """Find where commands go; `fields` are those that the component commands, gains among them."""
         lower_level = self.simulation.lower_level
         self._commands = []
         for record in self._configuration.controllers:
@@ -51,13 +51,12 @@ class Bench:
                 continue
             controller = lower_level.controller(record.leads_to)
             dofs = commanded_dofs(record, self.robot)
-            fields = [
+            carried = [
                 field
                 for field in JOINT_FIELDS
-                if getattr(record.interface, field) and field in controller.FIELDS
-                if field not in GAINS or field in gains
+                if field in fields and getattr(record.interface, field) and field in controller.FIELDS
             ]
-            self._commands.append(_Commands(self.robot, controller, dofs, fields))
+            self._commands.append(_Commands(self.robot, controller, dofs, carried))
 
     def begin(self) -> None:
         """Measure, and let the commanded gains be in force at once, as they are when the blend of a start is over."""
@@ -109,41 +108,36 @@ class Bench:
 
 
 class _Commands:
-    """Commands of one pipe to a controller of the lower level."""
+    """Commands of one pipe to a controller of the lower level; gains, which stay, are applied at the begin alone."""
 
     def __init__(self, robot: Robot, controller: LowerLevelController, dofs: np.ndarray, fields: list[str]):
         self._controller = controller
         self._dofs = dofs
         places = {name: place for place, name in enumerate(controller.joints)}
         self._indices = np.array([places[robot.dofs[dof]] for dof in dofs], dtype=np.intp)
-        self._given = {field: np.zeros(len(dofs)) for field in fields}
+        self._given = {field: np.zeros(len(dofs)) for field in fields if field not in GAINS}
+        self._gains = {field: robot.command[field] for field in fields if field in GAINS}
+        for field, values in self._gains.items():
+            values[dofs] = controller.default_gains[field][self._indices]
         self._fields = []
         for field, out in self._given.items():
             interface = interface_of(field)
-            if field in GAINS:
-                robot.command[interface][dofs] = controller.default_gains[field][self._indices]
-                bounds = np.zeros(len(dofs)), np.full(len(dofs), np.inf)
-            else:
-                bounds = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
+            bounds = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
             self._fields.append((robot.command[interface], out, *bounds))
 
     def begin(self) -> None:
         """Let gains be in force, and the springs where the joints are held."""
-        self._collect()
-        gains = {field: values for field, values in self._given.items() if field in GAINS}
+        gains = {field: values[self._dofs] for field, values in self._gains.items()}
         self._controller.apply(self._indices, gains)
         self._controller.advance(1.0)  # [s], longer than a gain takes
 
     def apply(self) -> None:
         """Apply them."""
-        self._collect()
-        self._controller.apply(self._indices, self._given)
-
-    def _collect(self) -> None:
         for values, out, lower, upper in self._fields:
             np.take(values, self._dofs, out=out, mode="clip")
             np.maximum(out, lower, out=out)
             np.minimum(out, upper, out=out)
+        self._controller.apply(self._indices, self._given)
 
 
 class _SimulatedRobot:

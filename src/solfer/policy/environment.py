@@ -75,11 +75,11 @@ class Environment:
         self._urdf = parameters["/robot_description"]
         self.simulation = self._make(None)
         try:
-            senses = bundle.sensors != bundle.sensors.perfect()
+            senses = any(map(_errs, (bundle.sensors.joint_noise, bundle.sensors.imu)))
             self._bench = Bench(loaded, self.simulation, parameters, senses)
             self.component = Learner(self._bench.robot, loaded.tags(Learner.Tags), module)
             self.component.set_rate(loaded.rate)
-            self._bench.connect(tuple(self.component.contract.gains))
+            self._bench.connect(self.component.commanded)
         except Exception:
             self.simulation.close()
             raise
@@ -181,7 +181,7 @@ class Environment:
         self.simulation.close()
         self._masses = factor
         self.simulation = self._bench.simulation = simulation
-        self._bench.connect(tuple(self.component.contract.gains))
+        self._bench.connect(self.component.commanded)
 
     def render(self) -> None:
         """Draw nothing: `solfer view` shows robots that run."""
@@ -189,6 +189,12 @@ class Environment:
     def close(self) -> None:
         """Release the simulation. May be called twice."""
         self.simulation.close()
+
+
+def _errs(sensor: Any) -> bool:
+    """Return whether the record of a sensor has errors."""
+    mounting = {"link", "offset_position", "offset_orientation", "exact"}
+    return sensor is not None and not sensor.exact and not sensor.model_fields_set <= mounting
 
 
 def scaled(urdf: str, factor: float) -> str:

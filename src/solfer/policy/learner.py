@@ -30,6 +30,19 @@ class Learner(Policy):
             return super().make_network()
         return _Actions(sum(size for _, size in widths(terms, len(joints))), len(joints))
 
+    @property
+    def commanded(self) -> tuple[str, ...]:
+        """Fields of commands that move joints, and gains.
+
+        Velocities that are always zero are none, nor are positions of springs whose stiffness is zero.
+        """
+        action = self.tags.action
+        moved = {"position": ("position",), "velocity": ("position", "velocity"), "torque": ("position", "effort")}
+        fields = moved[action.kind]
+        if action.kind == "position" and action.springs == "plugin":
+            fields = ("effort",) if len(self.contract.joints) == len(self.model.actuated) else ("position", "effort")
+        return (*fields, *self.contract.gains)
+
     def begin(self) -> None:
         """Start where the joints are now."""
         np.copyto(self._start, self.model.state.position)
