@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""A policy in the real-time layer at 500 Hz beside the simulator: how long it takes, and periods that are left out.
+
+    pip install ".[policy]"
+    ./run exec python benchmark/policy_layer.py [SECONDS] --runs 3 --json
+
+The policy is that of `examples/policy`, on CENTAURO, 50 times a second; beside it is the layer with `joint_states`
+in its place. Each run has processes of its own. Times are in microseconds, of the stage `component` in the layer's
+statistics. The network runs in each tenth cycle: the p95 is the middle of those that have it, the p99.9 their p99.
+`network` is one run of the network alone in this process.
+"""
+
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import yaml
+from executor import CONFIG, REPOSITORY, simulated_layer, wait_for_all
+from form import Figures, parser_of
+
+from solfer.components.policy.network import PolicyNetwork
+from solfer.supervision import supervise
+from solfer.telemetry.histograms import quantile, since
+from solfer.telemetry.statistics import LoopCount
+
+RATE = 500.0  # [Hz]
+EXAMPLE = REPOSITORY / "examples/policy"
+
+
+def layer_of(folder: Path, plugin: str) -> Path:
+    """Write the files of a layer with one plugin: `level` or `joint_states`."""
+    tree = yaml.safe_load((EXAMPLE / "level.yaml").read_text())
+    modules = tree["mwoibn"]["modules"]
+    modules["level"] |= {"layer": "RT", "file": str(EXAMPLE / "level.onnx")}
+    kept = ("layer", "robot", "controller", "mode", "kinematics", "dynamics", "model_change")
+    joints = {"class": "solfer.components.joint_states:JointStates"}
+    modules["joint_states"] = {key: modules["level"][key] for key in kept} | joints
+    (folder / "main.yaml").write_text(yaml.safe_dump(tree))
+    layer = folder / "layer.yaml"
+    executor = {"rate": RATE, "start": [plugin], "blend": 0.5}
+    layer.write_text(
+        yaml.safe_dump(
+            {"XBotRTPlugins": {"plugins": [plugin]}, "mwoibn": {"config_file": str(folder / "main.yaml")}, "executor": executor}
+        )
+    )
+    return layer
+
+
+def measure(figures: Figures, plugin: str, seconds: float) -> None:
+    """Run the layer with a plugin, and print a row."""
+    with tempfile.TemporaryDirectory() as folder:
+        layer = layer_of(Path(folder), plugin)
+        with simulated_layer(layer, os.environ | {"OPENBLAS_NUM_THREADS": "1"}) as (namespace, processes):
+            statistics = wait_for_all(namespace, processes)
+            time.sleep(1.0)
+            before, skipped = statistics.histograms.copy(), statistics.counts[LoopCount.SKIPPED]
+            time.sleep(seconds)
+            found = since(statistics.histograms, before)
+            row = found[statistics.row(0, list(statistics.stages).index("component"))]
+            shares = {"p50": 0.5, "p95": 0.95, "p99": 0.99, "p99.9": 0.999}
+            took = {f"{name}_us": 1e-3 * quantile(row, share) for name, share in shares.items()}
+            left_out = int(statistics.counts[LoopCount.SKIPPED] - skipped)
+            figures.row(plugin, cycles=int(found[0, 0]), **took, left_out=left_out)
+
+
+def main() -> None:
+    """Measure by turns."""
+    parser = parser_of(__doc__)
+    parser.add_argument("seconds", nargs="?", type=float, default=20.0, help="of each run (default: %(default)g)")
+    parser.add_argument("--runs", type=int, default=3, help="runs of each (default: %(default)g)")
+    given = parser.parse_args()
+    figures = Figures(given.json)
+    network = PolicyNetwork(EXAMPLE / "level.onnx")
+    took = np.zeros(5000)
+    for index in range(len(took)):
+        begin = time.perf_counter()
+        network.run()
+        took[index] = time.perf_counter() - begin
+    p50, p99 = (1e6 * np.percentile(took, (50.0, 99.0))).tolist()
+    figures.row("network", p50_us=p50, p99_us=p99)
+    for _ in range(given.runs):
+        for plugin in ("joint_states", "level"):
+            measure(figures, plugin, given.seconds)
+
+
+if __name__ == "__main__":
+    supervise()
+    main()
