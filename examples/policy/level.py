@@ -26,10 +26,16 @@ from solfer.policy import Environment, write_layers
 from solfer.simulation.robot_body.placement import StartPlacement
 
 HERE = Path(__file__).parent
-SIZES = 4, 8, 8
-"""Observations, hidden numbers and actions."""
+CORNERS = (1, 1), (1, -1), (-1, 1), (-1, -1)
+"""Where the legs stand: signs of x and y."""
 
-PAIRS, NOISE, RATE = 8, 0.15, 0.3
+BENDS = -1, 1, 1, -1
+"""Signs of the joints with which they bend."""
+
+HIDDEN = 4
+"""Hidden numbers of each leg."""
+
+PAIRS, NOISE, RATE = 6, 0.2, 0.5
 """Pairs of networks in an iteration, how far they are from the present one, and how far that moves."""
 
 Weights = np.ndarray
@@ -61,18 +67,24 @@ def environment(degrees: float) -> Environment:
 
 
 def layers(weights: Weights) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return weights and offsets of both layers."""
-    found = []
-    for inputs, outputs in zip(SIZES[:-1], SIZES[1:], strict=True):
-        taken, weights = np.split(weights, [(inputs + 1) * outputs])
-        found.append((taken[outputs:].reshape(inputs, outputs), taken[:outputs]))
-    return found
+    """Return weights and offsets of both layers: each leg has the same small network, mirrored to its corner."""
+    inner, inner_offset, outer, outer_offset = np.split(weights, np.cumsum((4 * HIDDEN, HIDDEN, 2 * HIDDEN)))
+    first = np.zeros((4, 4 * HIDDEN))
+    second = np.zeros((4 * HIDDEN, 8))
+    offset = np.zeros(8)
+    for leg, (along, aside) in enumerate(CORNERS):
+        own = slice(leg * HIDDEN, (leg + 1) * HIDDEN)
+        # gravity x and y, angular velocity x and y; a turn about x tilts sideways
+        first[:, own] = np.array((along, aside, aside, along))[:, None] * inner.reshape(4, HIDDEN)
+        second[own, leg::4] = BENDS[leg] * outer.reshape(HIDDEN, 2)
+        offset[leg::4] = BENDS[leg] * outer_offset
+    return [(first, np.tile(inner_offset, 4)), (second, offset)]
 
 
 def acting(network: Weights | Path | None) -> Callable[[np.ndarray], np.ndarray]:
     """Return what maps observations to actions: weights, a file as the plugin runs it, or nothing."""
     if network is None:
-        return lambda observed: np.zeros(SIZES[-1])
+        return lambda observed: np.zeros(8)
     if isinstance(network, Path):
         ran = PolicyNetwork(network)
 
@@ -104,8 +116,7 @@ def tilts(job: tuple[Weights | Path | None, float, int]) -> np.ndarray:
 def train(pool: Pool, minutes: float, iterations: int, seed: int) -> Weights:
     """Return the weights that an evolution strategy finds: ranks of mirrored pairs, each pair in the same episode."""
     random = np.random.default_rng(seed)
-    weights = random.normal(scale=0.3, size=sum((one + 1) * other for one, other in zip(SIZES[:-1], SIZES[1:], strict=True)))
-    weights[-(SIZES[1] + 1) * SIZES[2] :] *= 0.1
+    weights = 0.3 * random.normal(size=7 * HIDDEN + 2)
     begun = time.monotonic()
     for iteration in range(iterations):
         if time.monotonic() - begun > 60.0 * minutes:
