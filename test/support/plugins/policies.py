@@ -2,8 +2,11 @@
 
 import numpy as np
 from support import robots
+from support.integration.world import ROBOT
 from support.plugins.plugin import WHEELS, configuration
 from support.unit import onnx_files
+
+from solfer.policy import Environment
 
 POLICY = "solfer.components.policy:Policy"
 TERMS = ("angular_velocity", "projected_gravity", "commands", "joint_position", "joint_velocity", "last_action")
@@ -36,3 +39,22 @@ def file_of(folder, weights=0.0, offset=0.0, **tags):
         **tags,
     }
     return configuration(folder, **module)
+
+
+def upright(environment):
+    """Return how upright the base is."""
+    return float(np.cos(environment.tilt)), environment.tilt > 0.5
+
+
+def draw(environment):
+    """Draw masses, friction, a push and a velocity."""
+    random = environment.random
+    environment.scale_masses(float(random.choice((0.9, 1.1))))
+    environment.simulation.set_friction("ground", random.uniform(0.5, 1.0))
+    environment.simulation.pushes.add("pelvis", random.uniform(-300.0, 300.0, 3), np.zeros(3), 0.5)
+    environment.velocity[:] = random.uniform(-0.1, 0.1, 3)
+
+
+def made(file, **options):
+    """Make the environment of a configuration."""
+    return Environment(file, "test", ROBOT / "robot.yaml", upright, **options)
