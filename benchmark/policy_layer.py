@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from executor import CONFIG, REPOSITORY, simulated_layer, wait_for_all
+from executor import REPOSITORY, simulated_layer, wait_for_all
 from form import Figures, parser_of
 
 from solfer.components.policy import Policy
@@ -70,11 +70,8 @@ def layer_of(folder: Path, plugin: str) -> Path:
     (folder / "main.yaml").write_text(yaml.safe_dump(tree))
     layer = folder / "layer.yaml"
     executor = {"rate": RATE, "start": [plugin], "blend": 0.5}
-    layer.write_text(
-        yaml.safe_dump(
-            {"XBotRTPlugins": {"plugins": [plugin]}, "mwoibn": {"config_file": str(folder / "main.yaml")}, "executor": executor}
-        )
-    )
+    main = {"config_file": str(folder / "main.yaml")}
+    layer.write_text(yaml.safe_dump({"XBotRTPlugins": {"plugins": [plugin]}, "mwoibn": main, "executor": executor}))
     return layer
 
 

@@ -61,9 +61,7 @@ def environment(degrees: float) -> Environment:
     with tempfile.TemporaryDirectory() as folder:
         world = Path(folder) / "slope.yaml"
         world.write_text(f"ground: {{slope: {np.radians(degrees)}}}\n")
-        return Environment(
-            HERE / "level.yaml", "level", "centauro", reward, begin=begin, duration=2.5, world=world
-        )
+        return Environment(HERE / "level.yaml", "level", "centauro", reward, begin=begin, duration=2.5, world=world)
 
 
 def layers(weights: Weights) -> list[tuple[np.ndarray, np.ndarray]]:

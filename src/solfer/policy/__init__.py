@@ -1,7 +1,7 @@
 """Training of networks for the component `policy`, over the observations, actions, robot and engine that run them.
 
-`Environment` has the interface of Gymnasium, and `Environments` several of them in processes of their own; `write_layers` writes what was
-trained as an ONNX file.
+`Environment` has the interface of Gymnasium, `Environments` are several of them in processes of their own, and
+`write_layers` writes what was trained as an ONNX file.
 """
 
 from solfer.policy.environment import Environment

@@ -118,7 +118,7 @@ class _Commands:
         self._given = {field: np.zeros(len(dofs)) for field in fields if field not in GAINS}
         self._gains = {field: robot.command[field] for field in fields if field in GAINS}
         for field, values in self._gains.items():
-            values[dofs] = controller.default_gains[field][self._indices]
+            values[dofs] = getattr(controller, field)[self._indices]
         self._fields = []
         for field, out in self._given.items():
             interface = interface_of(field)
@@ -126,7 +126,7 @@ class _Commands:
             self._fields.append((robot.command[interface], out, *bounds))
 
     def begin(self) -> None:
-        """Let gains be in force, and the springs where the joints are held."""
+        """Let gains be in force."""
         gains = {field: values[self._dofs] for field, values in self._gains.items()}
         self._controller.apply(self._indices, gains)
         self._controller.advance(1.0)  # [s], longer than a gain takes

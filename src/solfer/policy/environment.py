@@ -75,7 +75,7 @@ class Environment:
         self._urdf = parameters["/robot_description"]
         self.simulation = self._make(None)
         try:
-            senses = any(map(_errs, (bundle.sensors.joint_noise, bundle.sensors.imu)))
+            senses = any(_errs(getattr(bundle.sensors, kind)) for kind in ("joint_noise", "imu"))
             self._bench = Bench(loaded, self.simulation, parameters, senses)
             self.component = Learner(self._bench.robot, loaded.tags(Learner.Tags), module)
             self.component.set_rate(loaded.rate)

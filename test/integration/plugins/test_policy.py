@@ -17,6 +17,7 @@ pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-pol
 
 SPRINGS = {"file": str(CONFIG / "support/springs.yaml")}
 
+
 def test_zero_actions_keep_the_robot_standing(tmp_path):
     """It runs 50 times a second in a loop of 200 Hz, with gains of its own, and the base stays where it is."""
     tags = {"gains": {"stiffness": dict.fromkeys(legs(), 2000.0), "damping": 50.0}, "secondary_file": SPRINGS}

@@ -14,6 +14,7 @@ from solfer.simulation import Rates, Simulation, SimulationServer
 
 pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
 
+FIELDS = "position", "effort", "stiffness", "damping"
 TORQUES = {"file": str(CONFIG / "support/torques.yaml")}
 GAINS = {"gains": {"stiffness": 2000.0, "damping": 50.0}, "secondary_file": TORQUES}
 
@@ -79,7 +80,10 @@ def test_observations_and_targets_are_the_plugins(tmp_path, springs, monkeypatch
             pairs = [
                 (ours._observations._result, theirs._observations._result),
                 (ours._target, target),
-                *([getattr(each, field) for each in pulled] for field in ("position", "effort", "stiffness", "damping")),
+                *(
+                    [getattr(each, field) for each in pulled]
+                    for field in ("position", "effort", "stiffness", "damping")
+                ),
             ]
             moved = max(moved, np.abs(target - ours.contract.default).max())
             largest = np.maximum(largest, [np.abs(one - other).max() for one, other in pairs])

@@ -24,9 +24,7 @@ def file_of(folder, weights=0.0, offset=0.0, **tags):
     """Write a linear network of all joints but the wheels, and a configuration with it; returns the configuration."""
     joints = legs()
     count = len(joints)
-    onnx_files.linear(
-        folder / "network.onnx", np.broadcast_to(weights, (9 + 3 * count, count)), np.full(count, offset)
-    )
+    onnx_files.linear(folder / "network.onnx", np.broadcast_to(weights, (9 + 3 * count, count)), np.full(count, offset))
     module = {
         "class": POLICY,
         "robot": "inertial",

@@ -1,6 +1,5 @@
 """Small ONNX files."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
