@@ -141,7 +141,7 @@ class _Commands:
 
 
 class _SimulatedRobot:
-    """What the builder of a Robot asks of the outside, answered by a simulated robot."""
+    """The outside for the builder of a Robot: a simulated robot."""
 
     def __init__(self, simulation: Simulation, parameters: dict[str, str]):
         self._simulation = simulation

@@ -35,7 +35,7 @@ class Environments:
             self._ends.append(ours)
             self._processes.append(process)
         try:
-            self.observation_space, self.action_space = self._ask("spaces", [None] * count)[0]
+            self.observation_space, self.action_space = self._call("spaces", [None] * count)[0]
         except BaseException:
             self.close()
             raise
@@ -46,14 +46,14 @@ class Environments:
     def reset(self, *, seed: int | None = None) -> tuple[np.ndarray, list[dict[str, Any]]]:
         """Begin all, each with a seed of its own that follows from `seed`; returns observations, shape (count, n)."""
         seeds = np.random.SeedSequence(seed).generate_state(len(self)).tolist()
-        found = self._ask("reset", seeds)
+        found = self._call("reset", seeds)
         return np.array([observed for observed, _ in found]), [info for _, info in found]
 
     def step(
         self, actions: Sequence[np.ndarray] | np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Step all with actions, shape (count, m); see `Environment.step`, the first four have one more axis."""
-        observed, rewards, terminated, truncated, infos = zip(*self._ask("step", list(actions)), strict=True)
+        observed, rewards, terminated, truncated, infos = zip(*self._call("step", list(actions)), strict=True)
         return np.array(observed), np.array(rewards), np.array(terminated), np.array(truncated), list(infos)
 
     def close(self) -> None:
@@ -67,7 +67,7 @@ class Environments:
         self._ends.clear()
         self._processes.clear()
 
-    def _ask(self, what: str, arguments: Sequence[Any]) -> list[Any]:
+    def _call(self, what: str, arguments: Sequence[Any]) -> list[Any]:
         for end, argument in zip(self._ends, arguments, strict=True):
             end.send((what, argument))
         answers = [end.recv() for end in self._ends]

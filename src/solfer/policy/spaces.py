@@ -1,4 +1,4 @@
-"""Spaces of observations and actions: those of Gymnasium if it is installed, else what programs ask of them."""
+"""Spaces of observations and actions: those of Gymnasium if it is installed, else boxes with the same attributes."""
 
 import importlib
 from importlib.util import find_spec

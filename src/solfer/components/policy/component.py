@@ -70,7 +70,7 @@ class Policy(Component):
             self.efforts = self.contract.dofs.astype(np.int64)
 
     def make_network(self) -> PolicyNetwork:
-        """Load the network of the tags; who trains one has none yet, and puts its own actions in place of it."""
+        """Load the network of the tags; training, which has none yet, replaces it."""
         tags = self.tags
         where = tags.where("file")
         path = located(tags.file, tags.folder("file"), where)
