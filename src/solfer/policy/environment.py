@@ -141,7 +141,8 @@ class Environment:
         component.command_base(self.velocity)
         component.observe()
         if component.fault:
-            raise ComponentError(f"'{component.name}' does not start: {component.fault}", where="reset", expected="a start that it accepts")
+            what = f"'{component.name}' does not start: {component.fault}"
+            raise ComponentError(what, where="reset", expected="a start that it accepts")
         component.send()
         self._bench.begin()
         return component.network.observations.copy(), {}

@@ -11,7 +11,7 @@ from solfer.robot import Robot
 
 
 class Learner(Policy):
-    """A policy whose network is still to be trained: who runs it writes `network.actions` between `observe` and `act`.
+    """A policy whose network is still to be trained: `network.actions` are written between `observe` and `act`.
 
     Its file is read only if the tags leave joints or observations to it.
     """
