@@ -8,7 +8,7 @@ steps 1000 times: a step of the environment is 20 of physics. The plain loop has
 gains, which send torques to the same compiled model by `mj_step`, and nothing else: neither observations nor limits.
 Rows are in CPU time, repeated and with the least of it, since another process may disturb: [us] of one step of physics,
 steps of the policy a second, and the share of the plain loop's. Parts are those of the
-environment: engine, lower level, reading the state, and what is left for the plugin. The first three are measured alone,
+environment: engine, lower level, reading the state, and the rest for the plugin. The first three are measured alone,
 each in a loop of its own with warm caches, so that they add up to less than the whole simulation.
 """
 
