@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 LIMIT = 870.0
 """Longest time of a file of tests on a machine that has much else to do [s]; `faulthandler_timeout` is longer."""
 
-SOAK = ("compensation", "ground_forces", "stepping", "wheeled_kills")
+SOAK = ("compensation", "ground_forces", "policy", "stepping", "wheeled_kills")
 """Files of tests that take long; what they do has a short test in another file."""
 
 GRACE = 30.0

@@ -4,10 +4,8 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support import robots
 from support.integration.world import CONFIG, World
-from support.plugins.plugin import WHEELS, configuration
-from support.unit import onnx_files
+from support.plugins.policies import POLICY, file_of, legs
 
 from solfer.config import load
 from solfer.errors import SolferError
@@ -17,36 +15,7 @@ from solfer.transport.messages import FieldsMessage
 
 pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
 
-POLICY = "solfer.components.policy:Policy"
 SPRINGS = {"file": str(CONFIG / "support/springs.yaml")}
-TERMS = ("angular_velocity", "projected_gravity", "commands", "joint_position", "joint_velocity", "last_action")
-
-
-def legs():
-    """Return the joints of legs and arms without wheels, and where they are at the start, by name."""
-    robot = robots.centauro("mammal_wide_straight", actuators=True)
-    return {
-        robot.dofs[dof]: float(robot.state.position[dof]) for dof in robot.actuated if robot.dofs[dof] not in WHEELS
-    }
-
-
-def file_of(folder, weights=0.0, offset=0.0, **tags):
-    """Write a linear network of all joints but the wheels, and a configuration with it; returns the configuration."""
-    joints = legs()
-    count = len(joints)
-    onnx_files.linear(folder / "network.onnx", np.full((9 + 3 * count, count), weights), np.full(count, offset))
-    module = {
-        "class": POLICY,
-        "robot": "inertial",
-        "file": "network.onnx",
-        "joints": list(joints),
-        "default": joints,
-        "observations": [{"term": term} for term in TERMS],
-        "action": {"scale": 0.25},
-        "rate": 50.0,
-        **tags,
-    }
-    return configuration(folder, **module)
 
 
 def test_zero_actions_keep_the_robot_standing(tmp_path):

@@ -29,6 +29,7 @@ ELSEWHERE = {
     r"\./run demo": ("test/integration/paper/test_demo.py", "demo"),
     r"\./run check": ("test/integration/package/test_run.py", '"check"'),
     r"\./run test( .*)?": ("test/unit/docs/test_commands.py", "test_paths_of_tests_exist"),
+    r"\./run exec python examples/policy/.*": ("test/integration/plugins/test_policy_example.py", "level.py"),
     r"\./run exec python examples/.*": ("test/integration/paper/test_examples.py", "examples"),
     r"\./run exec python benchmark/gallery.py .*": ("test/integration/simulation/test_gallery.py", "gallery.py"),
     r"\./run exec rosrun plugins plugin -p nod .*": ("test/unit/docs/test_recipes.py", '"Nod"'),

@@ -51,10 +51,7 @@ class Policy(Component):
     def __init__(self, robot: Robot, tags: PolicyTags, name: str = "policy"):
         super().__init__(robot, tags, name)
         self.kinematics = False
-        where = tags.where("file")
-        path = located(tags.file, tags.folder("file"), where)
-        check_file(path, where)
-        self.network = PolicyNetwork(path, where)
+        self.network = self.make_network()
         self.contract = agree(tags, self.network, robot)
         self._observations = Observations(robot, self.contract, self.network.observations)
         self._stiffness = self._own_springs()
@@ -71,6 +68,14 @@ class Policy(Component):
         self.steps = 0
         if tags.action.kind == "torque" or self._stiffness is not None:
             self.efforts = self.contract.dofs.astype(np.int64)
+
+    def make_network(self) -> PolicyNetwork:
+        """Load the network of the tags; training, which has none yet, replaces it."""
+        tags = self.tags
+        where = tags.where("file")
+        path = located(tags.file, tags.folder("file"), where)
+        check_file(path, where)
+        return PolicyNetwork(path, where)
 
     def _own_springs(self) -> np.ndarray | None:
         """Return the stiffness of springs that the plugin computes, shape (m,); those of the lower level get none."""
@@ -113,24 +118,33 @@ class Policy(Component):
 
     def update(self) -> None:
         """Run the network if its time has come."""
+        if self.observe():
+            self.network.run()
+            self.act()
+
+    def observe(self) -> bool:
+        """Let a cycle pass; write the observations and return True where the network's time has come."""
         clocks = self._clocks
         clocks.advance(self.passed, self.time_lost)
         if self.fault:
-            return
+            return False
         observations = self._observations
         if self.model.kinematics.base is not None:
             observations.measure_base()
             if observations.tilt > self.tags.largest_tilt:
                 self._hold(f"the base tilts by {observations.tilt:.2f} rad")
-                return
+                return False
         if not clocks.is_due(0.5 * self.period):
-            return
+            return False
         if clocks.silence > COMMAND_TIMEOUT:
             observations.commands[:] = 0.0
         observations.update(clocks.time)
-        self.network.run()
+        return True
+
+    def act(self) -> None:
+        """Make targets of what the network has computed."""
         self.steps += 1
-        action = observations.last_action
+        action = self._observations.last_action
         action[:] = self.network.actions
         if not np.isfinite(action, out=self._finite).all():
             joint = self.contract.joints[int(self._finite.argmin())]

@@ -22,6 +22,7 @@ class Motors:
     def __init__(self, model: Any):
         self.effort = np.zeros(model.nv)
         self._speed = np.zeros(model.nv)
+        self._turns = False
         self._loss = model.dof_frictionloss
         self._find()
 
@@ -31,10 +32,11 @@ class Motors:
             self._loss[dofs] = efforts
             self._find()
         self._speed[dofs] = speeds
+        self._turns = bool(self._speed.any())
 
     def move(self, data: Any) -> None:
         """Move the references of a step's constraints, after these are made."""
-        if len(self._held):
+        if self._turns and len(self._held):  # at rest they are where MuJoCo has made them
             rows = data.ne + self._rows  # they follow the equalities
             data.efc_aref[rows] += data.efc_KBIP[rows, 1] * self._speed[self._held]
 
