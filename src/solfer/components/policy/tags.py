@@ -52,6 +52,11 @@ class ObservationRecord(Record):
         min_length=1,
         description="`phase`: parts of the period by which its sines, and then its cosines, are ahead",
     )
+    rest: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
+        None,
+        description="`phase`: part of the period at which it stays while the commanded velocity is below 0.01 m/s and "
+        "0.01 rad/s, after which it begins from its offsets; left out: it goes on",
+    )
 
 
 class ActionRecord(Record):
