@@ -4,8 +4,8 @@
     pip install --no-deps holosoma holosoma-inference      # those of G1 and T1; the latter without a licence
     ./run exec python benchmark/policy.py --robot go2 --json
 
-The robot is made of the MJCF by `solfer new robot`; speed limits are those of the maker's URDF, and the rotors'
-inertias, which a URDF lacks, are given to the simulated robot. Each run has a seed, which draws the factor of all masses
+The robot is made of the MJCF by `solfer new robot`; speed limits are those of the maker's URDF, and inertias of the
+rotors, which a URDF lacks, are given to the simulated robot. Each run has a seed, which draws the factor of all masses
 of the simulated robot (0.9 or 1.1), the friction of the feet on the ground (0.5 to 1.2), and pushes: every 2 to 4 s one
 of 30 N and 0.2 s on the base, in a random horizontal direction. A run succeeds if the base is 20 m ahead within 80 s,
 without a fall or a fault. A program beside the plugin sends `cmd_vel` 50 times a second: 0.5 m/s and a yaw rate that
@@ -113,6 +113,10 @@ class Disturbance(NamedTuple):
     seed: int | None = None
 
 
+AS_DESCRIBED = Disturbance()
+"""Nothing is wrong."""
+
+
 class World:
     """A simulated robot.
 
@@ -191,7 +195,7 @@ class World:
 class Walk(World):
     """A robot and its policy as a plugin; args as of `World`."""
 
-    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance = Disturbance()):
+    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance = AS_DESCRIBED):
         super().__init__(robot, file, wrong)
         self.bus = Bus(robot_parameters(self.bundle))
         self.bus.every(STEP, SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator")).cycle)
@@ -215,7 +219,7 @@ class Walk(World):
 class OwnWalk(World):
     """The package's own runner in the same world, with the springs of its gains; args as of `World`."""
 
-    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance = Disturbance()):
+    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance = AS_DESCRIBED):
         super().__init__(robot, file, wrong)
         self._act = robot.runner()
         simulation = self.simulation
@@ -316,8 +320,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with closing(walk.simulation):
             difference = compare(walk, robot.runner())
             figures.row("targets of the package's own runner", difference=difference, steps=walk.component.steps)
-        measure(figures, "the package's own runner", OwnWalk(robot, file), Disturbance())
-        measure(figures, "the plugin", Walk(robot, file), Disturbance())
+        measure(figures, "the package's own runner", OwnWalk(robot, file), AS_DESCRIBED)
+        measure(figures, "the plugin", Walk(robot, file), AS_DESCRIBED)
         reached = 0
         for seed in range(options.seeds):
             wrong = drawn(seed)

@@ -1,4 +1,4 @@
-"""Robots of packages from PyPI with policies that walk: their files, the contract of the network, and its own runner."""
+"""Robots of packages from PyPI with policies that walk: files, the contract of the network, and its own runner."""
 
 import importlib
 import importlib.util

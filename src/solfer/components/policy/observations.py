@@ -143,12 +143,14 @@ class Observations:
         self._step = self._history[-total:]
         places = np.arange(longest * total).reshape(longest, total)
         begins = np.cumsum([0, *sizes])
-        self._picked = np.concatenate(
-            [
-                places[-term.history :, begin : begin + size].ravel()
+        if contract.history_order == "terms":
+            parts = [
+                places[-term.history :, begin : begin + size]
                 for (term, size), begin in zip(terms, begins[:-1], strict=True)
             ]
-        )
+        else:  # all terms have one history
+            parts = [places if contract.history_order == "oldest_step_first" else places[::-1]]
+        self._picked = np.concatenate([part.ravel() for part in parts])
         self._result = np.zeros(len(self._picked))
         self.reset()
 
