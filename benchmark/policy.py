@@ -14,6 +14,10 @@ corrects the heading; for the Go2 the `VelocityTracker` of the package corrects 
 `--engine bullet` takes PyBullet. The first row compares targets with those of the package's own runner in the same
 states, along a walk of 5 s [rad]. The second one is the runner itself in the same world, without solfer's plugin and
 lower level; `speed` is the mean one over the way [m/s].
+
+`--wrong` checks wrong contracts instead, by `solfer policy check --rollout`: names of the legs in each wrong order (23
+for four legs), and each joint with a wrong sign of what is observed of it, of its action, and of both with its default
+pose. The rows have what is said of each, and how many are found, and the right contract's first.
 """
 
 import logging
@@ -32,6 +36,7 @@ import numpy as np
 import yaml
 from form import Figures, add_engine, parser_of
 from policy_cases.robots import PERIOD, ROBOTS, Act, WalkingRobot
+from policy_cases.wrong import checked, wrong_orders, wrong_signs
 
 from solfer.components.policy import Policy
 from solfer.config import load
@@ -302,6 +307,19 @@ def measure(figures: Figures, title: str, world: World, wrong: Disturbance) -> b
     return ahead >= DISTANCE
 
 
+def check_wrong(figures: Figures, robot: WalkingRobot, file: Path) -> None:
+    """Check the right contract, and wrong ones."""
+    code, error = checked(file, robot.contract)
+    figures.row("the right contract", code=code, found=error or "nothing")
+    for title, cases in (("orders", [*wrong_orders(robot, len(robot.feet))]), ("signs", [*wrong_signs(robot)])):
+        found = 0
+        for name, contract in cases:
+            code, error = checked(file, contract)
+            found += code == 2
+            figures.row(name, code=code, found=error or "nothing")
+        figures.row(f"wrong {title} that are found", cases=len(cases), reached=found)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark."""
     parser = parser_of(__doc__)
@@ -309,6 +327,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--robot", choices=ROBOTS, default="go2", help="which one (default: go2)")
     parser.add_argument("--seeds", type=int, default=10, help="number of runs")
     parser.add_argument("--springs", choices=("plugin", "lower_level"), default="plugin", help="what pulls the joints")
+    parser.add_argument("--wrong", action="store_true", help="check wrong contracts instead")
     options = parser.parse_args(arguments)
     os.environ.setdefault(ENGINE_VARIABLE, "mujoco")
     logging.disable(logging.ERROR)
@@ -316,6 +335,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     robot = ROBOTS[options.robot]()
     with tempfile.TemporaryDirectory() as folder:
         file = make_robot(Path(folder), options.robot, robot, options.springs)
+        if options.wrong:
+            check_wrong(figures, robot, file)
+            return 0
         walk = Walk(robot, file)
         with closing(walk.simulation):
             difference = compare(walk, robot.runner())
