@@ -16,6 +16,9 @@ from solfer_tools.cli.main import main as solfer
 SECONDS = 4
 """How long a rollout has each of its commands [s]."""
 
+PUSH = 0.6
+"""Speed that its pushes give the robot [m/s]."""
+
 
 def wrong_orders(robot: WalkingRobot, legs: int) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield a title and a contract for each order of the legs but the right one; the names alone are wrong."""
@@ -57,6 +60,7 @@ def checked(file: Path, contract: dict[str, Any]) -> tuple[int, str]:
     changed.write_text(yaml.safe_dump(tree, sort_keys=False))
     bundle = file.parent / f"robots/{file.stem}/robot.yaml"
     words = ["policy", "check", str(changed), "--robot", str(bundle), "--rollout", str(SECONDS)]
+    words += ["--push", str(PUSH)]
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as error:
         code = solfer(words)
     return code, error.getvalue().strip().partition("\n")[0].partition(": policy: ")[2]

@@ -21,11 +21,18 @@ PERIOD = 0.02
 
 SETTLING, LONGEST_START = 1.0, 10.0  # [s]
 
-COMMANDS = ((0.5, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.8))
+COMMANDS = ((0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, 0.8), (0.0, 0.0, -0.8))
 """Commanded velocities: x, y [m/s] and yaw rate [rad/s]; each shows mistakes that others do not show."""
+
+PUSH = 0.1
+"""Duration of a push [s]."""
 
 SHARE = 0.6
 """Share of a commanded velocity by which the one that is reached may be wrong."""
+
+
+TURN = 0.4
+"""Yaw rate that may be wrong in any case: many policies turn where they should not [rad/s]."""
 
 
 class RolloutRow(NamedTuple):
@@ -48,7 +55,9 @@ def rollout(
     configuration: Configuration,
     given: RobotFiles | None,
     commands: Sequence[Sequence[float]] = COMMANDS,
+    *,
     seconds: int = 4,
+    push: float = 0.0,
 ) -> Iterator[RolloutRow]:
     """Simulate a policy with one command after the other, each of which begins from rest; yield each second of them.
 
@@ -57,6 +66,7 @@ def rollout(
         given: Files of the robot; None: those beside the configuration.
         commands: Commanded x, y [m/s] and yaw rates [rad/s].
         seconds: How long each is commanded.
+        push: Speed that a push gives the robot in every second second, to its left and to its right in turns [m/s].
 
     Raises:
         SolferError: The plugin or the robot cannot be made; it holds or falls, or does not reach a velocity.
@@ -67,17 +77,18 @@ def rollout(
             raise ComponentError("a rollout measures how the base moves", where=where, expected="a floating base")
         with closing(generate(configuration, robot.middleware, generator_of(configuration))) as plugin:
             robot.every(1.0 / plugin.rate, plugin.cycle)
-            run = _Rollout(robot, plugin, where)
+            run = _Rollout(robot, plugin, where=where, push=push)
             run.begin()
             for command in commands:
                 yield from run.seconds(np.array(command), seconds)
 
 
 class _Rollout:
-    def __init__(self, robot: StandingRobot, plugin: Plugin, where: str):
+    def __init__(self, robot: StandingRobot, plugin: Plugin, *, where: str, push: float):
         self._robot = robot
         self._plugin = plugin
         self._where = where
+        self._momentum = push * robot.simulation.body.robot.mass()
         assert isinstance(plugin.component, Policy)
         self._component = plugin.component
         self._simulation = robot.simulation
@@ -97,19 +108,24 @@ class _Rollout:
         self._advance(np.zeros(3), SETTLING)
         start = self._simulation.body.position.copy()
         reached = []
-        for _ in range(count):
+        for second in range(count):
+            if second % 2 and self._momentum:
+                self._push(1.0 if second % 4 == 1 else -1.0)
             velocity, tilt = self._advance(command, 1.0)
             reached.append(velocity)
             distance = float(np.linalg.norm((self._simulation.body.position - start)[:2]))
             yield RolloutRow(command, velocity, distance, tilt=tilt)
         wrong = np.mean(reached[count // 2 :], axis=0) - command
-        for kind, part, unit in (("velocity", slice(2), "m/s"), ("yaw rate", slice(2, 3), "rad/s")):
-            error = float(np.linalg.norm(wrong[part]))
-            asked = float(np.linalg.norm(command[part]))
-            if asked and error > SHARE * asked:
-                what = f"a {kind} of {asked:g} {unit} is commanded, and the one that is reached is wrong by {error:.2f}"
-                expected = f"at most {SHARE:g} of it: is the order of the joints, a sign, a scale or a frame wrong?"
-                raise ComponentError(what, where=self._where, expected=expected)
+        speed, turn = float(np.hypot(*command[:2])), abs(float(command[2]))
+        if speed:
+            self._check("velocity", speed, float(np.hypot(*wrong[:2])), bound=SHARE * speed)
+        self._check("yaw rate", turn, abs(float(wrong[2])), bound=max(SHARE * turn, TURN))
+
+    def _check(self, kind: str, asked: float, error: float, *, bound: float) -> None:
+        if error > bound:
+            what = f"a {kind} of {asked:g} is commanded, and the one that is reached is wrong by {error:.2f}"
+            expected = f"at most {bound:.2g}: is the order of the joints, a sign, a scale or a frame wrong?"
+            raise ComponentError(what, where=self._where, expected=expected)
 
     def _advance(self, command: np.ndarray, duration: float) -> tuple[np.ndarray, float]:
         """Let time pass; return the mean velocity, x and y in axes of the base, shape (3,), and the largest tilt."""
@@ -137,6 +153,11 @@ class _Rollout:
             if self._simulation.body.position[2] < 0.5 * self._height:
                 raise self._ended("the base is at less than half of its height")
         return np.mean(velocities, axis=0), tilt
+
+    def _push(self, side: float) -> None:
+        heading = self._heading()
+        force = side * self._momentum / PUSH * np.array((-math.sin(heading), math.cos(heading), 0.0))
+        self._simulation.pushes.add(self._base, force, np.zeros(3), PUSH)
 
     def _heading(self) -> float:
         rotation = self._simulation.state.now.rotation(self._base)

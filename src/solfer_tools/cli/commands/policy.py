@@ -33,7 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=3,
         action="append",
         metavar=("X", "Y", "YAW"),
-        help="a commanded velocity of the rollout; may stand several times (default: ahead, to the left, a turn)",
+        help="a commanded velocity of the rollout; may stand several times (default: both ways along x, y and about z)",
+    )
+    check.add_argument(
+        "--push",
+        type=Number(0.01, 10.0, "m/s", zero=True),
+        default=0.0,
+        metavar="SPEED",
+        help="push the robot of the rollout in every second second, to its left and right in turns (default: 0 m/s)",
     )
     add_search_paths(check)
 
@@ -90,7 +97,8 @@ def _roll_out(configuration: "Configuration", options: argparse.Namespace) -> No
     given = RobotFiles(path) if path.is_file() else None
     rows = [("command", "ahead [m/s]", "left [m/s]", "turn [rad/s]", "distance [m]", "tilt [rad]")]
     try:
-        for row in rollout(configuration, given, options.command or COMMANDS, options.rollout):
+        commands = options.command or COMMANDS
+        for row in rollout(configuration, given, commands, seconds=options.rollout, push=options.push):
             numbers = (f"{each:.2f}" for each in (*row.velocity, row.distance, row.tilt))
             rows.append((" ".join(f"{each:g}" for each in row.command), *numbers))
     finally:  # also what came before the end of one that falls
