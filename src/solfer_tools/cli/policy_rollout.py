@@ -121,9 +121,9 @@ class _Rollout:
             self._check("velocity", speed, float(np.hypot(*wrong[:2])), bound=SHARE * speed)
         self._check("yaw rate", turn, abs(float(wrong[2])), bound=max(SHARE * turn, TURN))
 
-    def _check(self, kind: str, asked: float, error: float, *, bound: float) -> None:
+    def _check(self, kind: str, commanded: float, error: float, *, bound: float) -> None:
         if error > bound:
-            what = f"a {kind} of {asked:g} is commanded, and the one that is reached is wrong by {error:.2f}"
+            what = f"a {kind} of {commanded:g} is commanded, and the one that is reached is wrong by {error:.2f}"
             expected = f"at most {bound:.2g}: is the order of the joints, a sign, a scale or a frame wrong?"
             raise ComponentError(what, where=self._where, expected=expected)
 

@@ -95,7 +95,9 @@ def _roll_out(configuration: "Configuration", options: argparse.Namespace) -> No
 
     path = Path(options.robot)
     given = RobotFiles(path) if path.is_file() else None
-    rows = [("command", "ahead [m/s]", "left [m/s]", "turn [rad/s]", "distance [m]", "tilt [rad]")]
+    rows: list[tuple[str, ...]] = [
+        ("command", "ahead [m/s]", "left [m/s]", "turn [rad/s]", "distance [m]", "tilt [rad]")
+    ]
     try:
         commands = options.command or COMMANDS
         for row in rollout(configuration, given, commands, seconds=options.rollout, push=options.push):
