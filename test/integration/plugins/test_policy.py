@@ -12,6 +12,7 @@ from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
 from solfer.transport.messages import FieldsMessage
+from solfer_tools.cli.main import main as solfer
 
 pytest.importorskip("onnxruntime", reason="needs pip install -r requirements-policy.txt")
 
@@ -99,3 +100,25 @@ def test_lost_feedback_begins_again(tmp_path):
         world.received = True
         world.run(1.0)
         assert plugin.life is PluginState.RUNNING and 40 < plugin.component.steps <= before + 1
+
+
+@pytest.mark.parametrize(
+    ("command", "tags", "code", "said"),
+    [
+        pytest.param("0 0 0", {}, 0, "", marks=pytest.mark.soak),
+        ("0.5 0 0", {}, 2, "a velocity of 0.5 is commanded, and the one that is reached is wrong by 0.50"),
+        ("0 0 0.5", {"default": {"torso_yaw": 1.0}}, 2, "'torso_yaw' is -1.000 from the default pose"),
+    ],
+)
+def test_a_rollout_finds_what_does_not_walk(tmp_path, capsys, command, tags, code, said):
+    """The check simulates the plugin: a network of zeros stands, and does not reach a velocity."""
+    tags = {key: legs() | value for key, value in tags.items()}
+    gains = {"stiffness": dict.fromkeys(legs(), 2000.0), "damping": 50.0}
+    file = file_of(tmp_path, gains=gains, secondary_file=SPRINGS, **tags)
+    words = f"policy check {file} -n test --robot centauro --rollout 2 --command {command}"
+    assert solfer(words.split()) == code
+    printed = capsys.readouterr()
+    assert said in printed.err and ("Traceback" not in printed.err)
+    rows = [line.split() for line in printed.out.splitlines() if line.startswith(command)]
+    assert len(rows) == (0 if tags else 2)
+    assert np.abs(np.array([row[3:] for row in rows], dtype=float)).max(initial=0.0) < 0.02

@@ -24,6 +24,7 @@ def test_metadata_alone_are_enough(tmp_path, capsys):
         joint_stiffness="[20, 30]",
         observation_names="base_ang_vel,joint_pos,actions",
     )
+    assert main(["policy", "check", str(file), "--robot", "centauro", "--rollout", "2"]) == 2
     assert main(["policy", "check", str(file), "--robot", "centauro"]) == 0
     printed = capsys.readouterr().out
     assert "7 observations, 2 actions, states: none" in printed

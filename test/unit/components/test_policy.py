@@ -213,6 +213,53 @@ def test_a_command_counts_for_half_a_second(tmp_path):
     assert not cycle(component, 3).velocity[dofs].any()
     with pytest.raises(NotFinite, match="velocity"):
         component.receive(Twist(Vector(math.nan, 0.0, 0.0)))
+    assert not cycle(component).velocity[dofs].any()
+
+
+def test_a_file_that_changes_counts_at_a_restart(tmp_path):
+    """The plugin has read it whole; what takes its place is read by the plugin that is made next."""
+    file = onnx_files.linear(tmp_path / "network.onnx", np.zeros((9, 3)), np.full(3, 0.5))
+    component = policy(file, action={"kind": "velocity"})
+    dofs = [component.model.dof(name) for name in JOINTS]
+    onnx_files.linear(file, np.zeros((9, 3)), np.full(3, 0.25))
+    assert (cycle(component, 20).velocity[dofs] == 0.5).all()
+    file.write_text("a text")
+    component.reset()
+    component.init()
+    assert (cycle(component, 20).velocity[dofs] == 0.5).all()
+    with pytest.raises(SolferError, match="is no network"):
+        policy(file)
+
+
+def test_a_gait_rests_while_nothing_is_commanded(tmp_path):
+    """As holosoma counts: both feet at half of the period; then it begins, however long it has rested."""
+    file, *_ = random_network(tmp_path, 7)
+    gait = {"term": "phase", "period": 0.8, "offsets": (0.0, 0.5), "rest": 0.5}
+    component = policy(file, observations=({"term": "commands"}, gait), rate=50.0)
+    phases = component.network.observations[3:]
+    for _ in range(2):
+        for _ in range(3):
+            cycle(component)
+            assert phases == pytest.approx((0.0, 0.0, -1.0, -1.0), abs=1e-6)
+        for step in range(3):
+            component.receive(Twist(Vector(0.02, 0.0, 0.0)))
+            cycle(component)
+            angle = 2.0 * math.pi * step * 0.02 / 0.8
+            assert phases == pytest.approx(
+                (math.sin(angle), -math.sin(angle), math.cos(angle), -math.cos(angle)), abs=1e-6
+            )
+        component.receive(Twist(Vector(0.005, 0.005, 0.0), Vector(0.0, 0.0, 0.009)))
+
+
+def test_ranges_of_commands_are_those_of_the_metadata(tmp_path):
+    """As holosoma writes them; a tag wins, and both bound what is observed."""
+    ranges = {"command_ranges": '{"lin_vel_x": [-1.0, 0.5], "ang_vel_yaw": [-0.25, 1.0], "heading": [-3.14, 3.14]}'}
+    file = onnx_files.linear(tmp_path / "commands.onnx", np.eye(3), np.zeros(3), metadata=ranges)
+    tags = {"observations": terms("commands"), "action": {"kind": "velocity"}, "rate": 50.0}
+    for given, expected in (({}, (0.5, 7.0, -0.25)), ({"command_range": {"y": (-0.125, 0.125)}}, (9.0, 0.125, -9.0))):
+        component = policy(file, **tags, **given)
+        component.receive(Twist(Vector(9.0, 7.0, 0.0), Vector(0.0, 0.0, -9.0)))
+        assert np.array_equal(cycle(component).velocity[component.contract.dofs], expected)
 
 
 def test_metadata_count_where_tags_are_left_out(tmp_path):
@@ -269,6 +316,8 @@ def written(tmp_path, content="", **options):
     onnx_files.write(tmp_path / "lies.onnx", matmul, ends[0], [onnx_files.value("actions", (1, 4))], constants)
     named = {"joint_names": "j_arm1_1,j_arm1_x,j_arm1_3", "observation_names": "joint_pos,height_scan"}
     onnx_files.linear(tmp_path / "named.onnx", weights, np.zeros(3), metadata=named)
+    ranges = {"command_ranges": '{"lin_vel_x": [1.0, -1.0]}'}
+    onnx_files.linear(tmp_path / "ranges.onnx", weights, np.zeros(3), metadata=ranges)
     onnx_files.linear(tmp_path / "words.onnx", weights, np.zeros(3), metadata={"default_joint_pos": "nan,1,2"})
     tags = {
         "file": "network.onnx",
@@ -301,6 +350,15 @@ REFUSALS = [
     ("default: {j_arm1_1: 0, j_arm1_2: 0, j_arm1_4: 0}", r":3:.*unknown joint 'j_arm1_4'", "j_arm1_3"),
     ("default: -", r":1:.*neither the tag `default` nor", "`default`"),
     ("default: -; file: words.onnx", r":1:.*'default_joint_pos' of the file", "finite numbers"),
+    ("command_range: {x: [1.0, -1.0]}", r":5:.*begins at 1 and ends at -1", "the smaller one first"),
+    ("file: ranges.onnx", r":1:.*'command_ranges' of the file", "lin_vel_x"),
+    ("action: {lower: 0.1, upper: 0.0}", r":5:.*bounds of the actions of 'j_arm1_1'", "`lower` below `upper`"),
+    (
+        "history_order: oldest_step_first; observations: [{term: joint_position, history: 2}, {term: joint_velocity}]",
+        r":\d:.*histories of different lengths",
+        "one `history`",
+    ),
+    ("contract: none.yaml", r":5:.*there is no file", "a file"),
     ("action: {scale: [1, 2]}", r":5:.*2 numbers of 'action.scale'", "one for each joint"),
     ("action: {kind: positions}", r":5:.*positions", "position"),
     ("gains: {stiffness: -1.0}", r":5:.*a stiffness of -1", "from zero on"),

@@ -60,13 +60,13 @@ class Policy(Component):
             sent["stiffness"][:] = 0.0
         self._gains = [(robot.command.add(gain), numbers) for gain, numbers in sent.items()]
         self._standing: list[np.ndarray] = []
-        self._clocks = _Clocks(tags.rate)
+        self._clocks = _Clocks(self.contract.rate)
         self._target, self._torque = np.zeros((2, len(self.contract.joints)))
         self._finite = np.zeros(len(self.contract.joints), dtype=bool)
         self._held = np.zeros(robot.size)
         self.fault = ""
         self.steps = 0
-        if tags.action.kind == "torque" or self._stiffness is not None:
+        if self.contract.action.kind == "torque" or self._stiffness is not None:
             self.efforts = self.contract.dofs.astype(np.int64)
 
     def make_network(self) -> PolicyNetwork:
@@ -79,7 +79,7 @@ class Policy(Component):
 
     def _own_springs(self) -> np.ndarray | None:
         """Return the stiffness of springs that the plugin computes, shape (m,); those of the lower level get none."""
-        action = self.tags.action
+        action = self.contract.action
         if action.kind != "position" or action.springs != "plugin":
             return None
         stiffness = self.contract.gains.get("stiffness")
@@ -90,8 +90,8 @@ class Policy(Component):
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`; the network's rate is no higher."""
-        if self.tags.rate > rate * (1.0 + 1e-9):
-            what = f"'{self.name}' runs at {rate:g} Hz, and its network at {self.tags.rate:g} Hz"
+        if self.contract.rate > rate * (1.0 + 1e-9):
+            what = f"'{self.name}' runs at {rate:g} Hz, and its network at {self.contract.rate:g} Hz"
             raise ComponentError(what, where=self.tags.where("rate"), expected="a plugin that is at least as fast")
         super().set_rate(rate)
 
@@ -150,12 +150,15 @@ class Policy(Component):
             joint = self.contract.joints[int(self._finite.argmin())]
             self._hold(f"the network's action of '{joint}' is not finite")
             return
-        clip = self.tags.action.clip
+        contract = self.contract
+        clip = contract.action.clip
         np.minimum(action, clip, out=action)
         np.maximum(action, -clip, out=action)
-        np.multiply(action, self.contract.scale, out=self._target)
-        if self.tags.action.kind == "position":
-            self._target += self.contract.default
+        np.multiply(action, contract.scale, out=self._target)
+        if contract.action.kind == "position":
+            self._target += contract.default
+        np.maximum(self._target, contract.bounds[0], out=self._target)
+        np.minimum(self._target, contract.bounds[1], out=self._target)
 
     def send(self) -> None:
         """Write what the network commands, with its gains; where the robot is held, its posture."""
@@ -169,7 +172,7 @@ class Policy(Component):
             return
         dofs = self.contract.dofs
         if self._stiffness is None:
-            command[self.tags.action.kind][dofs] = self._target
+            command[self.contract.action.kind][dofs] = self._target
         else:
             np.take(self.model.state.position, dofs, out=self._torque, mode="clip")
             command.position[dofs] = self._torque
@@ -196,7 +199,7 @@ class Policy(Component):
         return (TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, handler=self.receive, stream="velocities"),)
 
     def receive(self, message: Twist) -> None:
-        """Take over a velocity of the base in its own axes: x, y and the yaw rate count, for 0.5 s.
+        """Take over a velocity of the base in its own axes: x, y and the yaw rate count, in their ranges, for 0.5 s.
 
         Raises:
             NotFinite: A number is NaN or infinite.
@@ -204,7 +207,8 @@ class Policy(Component):
         desired = message.linear.x, message.linear.y, message.angular.z
         if not all(map(math.isfinite, desired)):
             raise NotFinite(f"a velocity of {desired}", where="cmd_vel", expected="finite numbers")
-        self._observations.commands[:] = desired
+        lower, upper = self.contract.commands
+        np.clip(desired, lower, upper, out=self._observations.commands)
         self._clocks.silence = 0.0
 
     def start_log(self, logger: Any) -> None:

@@ -10,6 +10,9 @@ from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.twist_transport import BaseKinematics
 from solfer.robot import Robot
 
+SLOWEST = 0.01
+"""Commanded velocity below which a gait rests [m/s, rad/s]."""
+
 
 class StepNumbers:
     """All that a network can observe in one step, before order and scale.
@@ -33,8 +36,16 @@ class StepNumbers:
         chart = robot.kinematics.base
         self._base = BaseKinematics(chart if chart is not None else BaseChart())
         self._down = robot.gravity / max(float(np.linalg.norm(robot.gravity)), 1e-9)
-        phases = [(each, term.period) for term in contract.terms if term.term == "phase" for each in term.offsets]
-        self._offsets, self._periods = np.array(phases, dtype=float).reshape(-1, 2).T.copy()
+        phases = [
+            (each, term.period, math.nan if term.rest is None else term.rest)
+            for term in contract.terms
+            if term.term == "phase"
+            for each in term.offsets
+        ]
+        self._offsets, self._periods, self._rest = np.array(phases, dtype=float).reshape(-1, 3).T.copy()
+        self._rests = ~np.isnan(self._rest)
+        self._starts = np.zeros(len(phases))  # of the gaits [s]
+        self._has_rested = True
         self._angles = np.zeros(len(phases))
         count = len(contract.joints)
         sizes = {term: count if term.startswith(("joint", "last")) else 3 for term in TERMS}
@@ -78,11 +89,27 @@ class StepNumbers:
         """Write the phases `time` after the start [s]."""
         angles = self._angles
         phase = self.of["phase"]
-        np.divide(time, self._periods, out=angles)
+        is_at_rest = self._is_at_rest()
+        if not is_at_rest and self._has_rested:
+            np.copyto(self._starts, time, where=self._rests)
+        self._has_rested = is_at_rest
+        np.subtract(time, self._starts, out=angles)
+        angles /= self._periods
         angles += self._offsets
+        if is_at_rest:
+            np.copyto(angles, self._rest, where=self._rests)
         angles *= 2.0 * math.pi
         np.sin(angles, out=phase[: len(angles)])
         np.cos(angles, out=phase[len(angles) :])
+
+    def reset(self) -> None:
+        """Forget commands, the last action, and when gaits began."""
+        self.all[:] = 0.0
+        self._has_rested = True
+
+    def _is_at_rest(self) -> bool:
+        x, y, turn = self.of["commands"].tolist()
+        return math.hypot(x, y) < SLOWEST and abs(turn) < SLOWEST
 
 
 class Observations:
@@ -116,12 +143,14 @@ class Observations:
         self._step = self._history[-total:]
         places = np.arange(longest * total).reshape(longest, total)
         begins = np.cumsum([0, *sizes])
-        self._picked = np.concatenate(
-            [
-                places[-term.history :, begin : begin + size].ravel()
+        if contract.history_order == "terms":
+            parts = [
+                places[-term.history :, begin : begin + size]
                 for (term, size), begin in zip(terms, begins[:-1], strict=True)
             ]
-        )
+        else:  # all terms have one history
+            parts = [places if contract.history_order == "oldest_step_first" else places[::-1]]
+        self._picked = np.concatenate([part.ravel() for part in parts])
         self._result = np.zeros(len(self._picked))
         self.reset()
 
@@ -132,7 +161,7 @@ class Observations:
 
     def reset(self) -> None:
         """Forget histories, commands and the last action."""
-        self._numbers.all[:] = 0.0
+        self._numbers.reset()
         self._history[:] = math.nan
 
     def measure_base(self) -> None:

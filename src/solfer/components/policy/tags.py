@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from solfer.config import ComparedWith, NameOf, Record
 from solfer.config.records.bounds import RATE, Name
@@ -32,6 +32,12 @@ ACTIONS = Literal["position", "velocity", "torque"]
 """What the actions of a network can be."""
 
 
+def _ordered(range_: tuple[float, float]) -> tuple[float, float]:
+    if range_[0] > range_[1]:
+        raise ValueError(f"the range begins at {range_[0]:g} and ends at {range_[1]:g}; expected the smaller one first")
+    return range_
+
+
 class ObservationRecord(Record):
     """A term of the observations: (number * scale), clipped, the oldest first where it has a history."""
 
@@ -52,6 +58,11 @@ class ObservationRecord(Record):
         min_length=1,
         description="`phase`: parts of the period by which its sines, and then its cosines, are ahead",
     )
+    rest: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
+        None,
+        description="`phase`: part of the period at which it stays while the commanded velocity is below 0.01 m/s and "
+        "0.01 rad/s, after which it begins from its offsets; left out: it goes on",
+    )
 
 
 class ActionRecord(Record):
@@ -69,6 +80,20 @@ class ActionRecord(Record):
     clip: float = Field(
         100.0, gt=0.0, le=1e9, description="largest amount of an action before its scale; `last_action` is clipped, too"
     )
+    lower: PerJoint | None = Field(None, description="smallest of what the actions become; left out: no bound")
+    upper: PerJoint | None = Field(None, description="largest of what the actions become; left out: no bound")
+
+
+Range = Annotated[tuple[Number, Number], AfterValidator(_ordered)]
+"""A smallest and a largest number."""
+
+
+class CommandRangeRecord(Record):
+    """Bounds of the commanded velocity of the base."""
+
+    x: Range = Field((-1e5, 1e5), description="ahead [m/s]")
+    y: Range = Field((-1e5, 1e5), description="to the left [m/s]")
+    yaw: Range = Field((-1e5, 1e5), description="yaw rate [rad/s]")
 
 
 class PolicyGainsRecord(Record):
@@ -82,6 +107,16 @@ class PolicyTags(Record):
     """Tags of the component `policy`; what they leave out, the metadata of the file may have."""
 
     file: Name = Field(description="network: an ONNX file, relative to the file that names it")
+    contract: Name | None = Field(
+        None,
+        description="contract that was exported with the network: `deploy.yaml` of unitree_rl_lab, IO descriptors of "
+        "Isaac Lab, or `config.yaml` of rl_sar; tags take precedence over it, and it over the metadata of `file`",
+    )
+    motors: tuple[Annotated[str, NameOf("joint")], ...] | None = Field(
+        None,
+        min_length=1,
+        description="names of the joints in the order of the motors that `joint_ids_map` of a `deploy.yaml` counts",
+    )
     joints: tuple[Annotated[str, NameOf("joint")], ...] | None = Field(
         None, min_length=1, description="names of the joints in the network's order; left out: the file's"
     )
@@ -89,7 +124,15 @@ class PolicyTags(Record):
     observations: tuple[ObservationRecord, ...] | None = Field(
         None, min_length=1, description="terms of the observations in the network's order; left out: the file's"
     )
+    history_order: Literal["terms", "oldest_step_first", "newest_step_first"] = Field(
+        "terms",
+        description="order of histories: `terms`: all steps of a term, the oldest first, before the next term; "
+        "otherwise all terms of a step before the next step",
+    )
     action: ActionRecord = Field(ActionRecord(), description="what the network's actions are")
+    command_range: CommandRangeRecord | None = Field(
+        None, description="bounds of the commanded velocity; left out: the file's, or none"
+    )
     gains: PolicyGainsRecord = Field(
         PolicyGainsRecord(), description="gains of the joints; those that neither has are the lower level's"
     )

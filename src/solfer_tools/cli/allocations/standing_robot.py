@@ -21,6 +21,7 @@ class StandingRobot:
 
     Attributes:
         middleware: What the plugin is connected to.
+        simulation: The robot.
 
     Raises:
         SolferError: There are no files of the robot, or they are wrong.
@@ -34,8 +35,8 @@ class StandingRobot:
             )
         bundle = read_bundle(file, None if given is None else given.srdf)
         self._bus = Bus(robot_parameters(bundle))
-        self._simulation = Simulation.from_file(bundle)
-        server = SimulationServer(self._simulation, MemoryMiddleware(self._bus, "simulator"))
+        self.simulation = Simulation.from_file(bundle)
+        server = SimulationServer(self.simulation, MemoryMiddleware(self._bus, "simulator"))
         self.middleware = MemoryMiddleware(self._bus, configuration.module.name)
         self.every(STEP, server.cycle)
 
@@ -54,4 +55,4 @@ class StandingRobot:
 
     def close(self) -> None:
         """Release the simulation."""
-        self._simulation.close()
+        self.simulation.close()
