@@ -28,6 +28,8 @@ executor: {{rate: 100, start: [joint_states], blend: 0.2}}
         with view("--namespace", layer.name, "--control") as address, opened_page(address) as page:
             page.until(lambda: "/measured/pelvis" in page.positions and "RUNNING" in page.content, "robot and plugin")
             page.until(lambda: "joint_states" in page.tabs and "xbotcore" in page.tabs, "tabs")
+            page.until(lambda: "link_side_online" in page.content, "pipes, in the tab of their plugin")
+            assert not [tab for tab in page.tabs if "feedback" in tab]
             page.until(lambda: any("[rad/s2]" in str(each) for each in page.labels), "parameters")
             assert "GOOD</b> RUNNING" in page.content and "cycles" in page.content
             page.click("take control")
