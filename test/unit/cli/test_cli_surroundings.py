@@ -75,11 +75,11 @@ def test_streams_that_cannot_be_written_to(words):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "environment",
-    [ASCII, {}, pytest.param({"PYTHONOPTIMIZE": "2"}, marks=pytest.mark.soak)],
+    [ASCII, *(pytest.param(each, marks=pytest.mark.soak) for each in ({}, {"PYTHONOPTIMIZE": "2"}))],
     ids=["ascii", "without docstrings", "optimized"],
 )
 def test_a_terminal_of_ascii_and_a_python_without_docstrings(tmp_path, environment):
-    """With docstrings of others in a test of every day; `PYTHONOPTIMIZE` itself first compiles numba for 20 s."""
+    """Without docstrings, of solfer alone and of all, a library is compiled first, for 20 s."""
     if not environment:
         (tmp_path / "sitecustomize.py").write_text(WITHOUT_DOCSTRINGS)
         environment = {"PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}
