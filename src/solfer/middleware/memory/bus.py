@@ -117,7 +117,10 @@ class _Delivery:
 
 @dataclass(order=True)
 class _Entry:
-    """Repeated work; times are multiples of the period, so that they do not drift."""
+    """Repeated work; times are multiples of the period, so that they do not drift.
+
+    They are whole nanoseconds: what is due at one time by two periods comes in the order of its registration.
+    """
 
     due: float
     order: int
@@ -273,17 +276,17 @@ class Bus:
         first = self.time if start is None else start
         if cycles and (self.faults.loop.skip or self.faults.loop.stalls):
             work = self._disturbed(work, period)
-        heapq.heappush(self._agenda, _Entry(first, next(self._order), work, period=period, start=first))
+        heapq.heappush(self._agenda, _Entry(round(first, 9), next(self._order), work, period=period, start=first))
 
     def run_until(self, end: float) -> None:
         """Do all work that is due before `end` [s], then set the clock to it."""
-        while self._agenda and self._agenda[0].due < end - 1e-12 and not self.ended:
+        while self._agenda and self._agenda[0].due < end - 1e-10 and not self.ended:
             if self._deliveries:
                 self._arrive(self._agenda[0].due)
             entry = heapq.heappop(self._agenda)
             self.time = max(self.time, entry.due)
             entry.count += 1
-            entry.due = entry.start + entry.count * entry.period
+            entry.due = round(entry.start + entry.count * entry.period, 9)
             heapq.heappush(self._agenda, entry)
             entry.work()
         if self._deliveries:
