@@ -34,7 +34,7 @@ class Overload:
         limits: When the loop is overloaded.
 
     Attributes:
-        reason: What is overloaded, with figures of the beginning; empty while nothing is.
+        reason: Why it is overloaded, with the figure of the beginning; empty while nothing is.
         figures: Ratio of the periods left out, age of the measurement [s], and pace; live, shape (3,).
         pace: Ratio of their speed with which motions may go on.
     """
@@ -85,14 +85,15 @@ class Overload:
         worst = max(ratio, age)
         if worst > 1.0 and not self.reason:
             self.reason = (
-                f"overloaded: it leaves out {self._left_out:.0%} of its periods, the newest measurement is "
-                f"{1e3 * self._age:.0f} ms old"
+                f"overloaded: it leaves out {self._left_out:.0%} of its periods"
+                if ratio > age
+                else f"behind: its newest measurement is {1e3 * self._age:.0f} ms old"
             )
             logger.warning("%s is %s; motions slow down", self._plugin, self.reason)
         self._calm = self._calm + passed if worst < 0.5 else 0.0
         if self.reason and self._calm > 1.0:
             self.reason = ""
-            logger.info("%s is no longer overloaded", self._plugin)
+            logger.info("%s keeps up again", self._plugin)
         oldest = 4.0  # age of the measurement at which motions rest, in ages at which the overload begins
         slowed = max((self._left_out - self._slowed) / (REST_RATIO - SLOWING_RATIO), (age - 1.0) / (oldest - 1.0), 0.0)
         if slowed and not self.pace:  # what rests goes on when nothing slows it down any more, and does not creep
