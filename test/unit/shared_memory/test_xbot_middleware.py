@@ -94,6 +94,24 @@ def test_no_message_is_lost_at_a_new_layout(world):
     assert received[-1].names == ("b",) and received[-1].position is None and received[-1].velocity.tolist() == [3.0]
 
 
+def test_no_message_is_lost_while_the_sender_changes_its_layout(world, monkeypatch):
+    """What comes between a look at the messages and one at the segments would stay in a segment that is left."""
+    queue = world.node("b").queue("t", JOINT_STATE)
+    writer = world.node("sender").writer("t", JOINT_STATE)
+    writer.write(JointMessage(("a",), position=np.array([1.0])))
+    assert len(queue.drain()) == 1
+    changed = queue._sender_segments.changed
+
+    def sends_first():
+        for value, names in ((2.0, ("a",)), (3.0, ("a", "b"))):
+            writer.write(JointMessage(names, position=np.full(len(names), value)))
+        return changed()
+
+    monkeypatch.setattr(queue._sender_segments, "changed", sends_first)
+    writer.write(JointMessage(("a",), position=np.array([1.5])))
+    assert [message.position[0] for message in queue.drain()] == [1.5, 2.0, 3.0]
+
+
 def test_a_full_queue_drops_the_oldest_and_counts(world):
     """What it hands over has the values of its own message, not of the newest one."""
     queue = world.node().queue("t", JOINT_STATE, 3)

@@ -184,6 +184,7 @@ class XbotQueue(Queue):
         sender_segments = self._sender_segments
         self._collect()
         if sender_segments.changed():
+            self._collect()  # what a sender has sent before it left its segment for another one
             sender_segments.update()
             self._collect()
         messages = list(self._messages)
