@@ -183,7 +183,7 @@ def layer_report(now: LayerSummary, before: LayerSummary | None) -> HealthReport
     skipped = now.skipped - (before.skipped if same else 0)
     overruns = now.overruns - (before.overruns if same else 0)
     if skipped or overruns:
-        return HealthReport(Health.WARNING, f"{skipped} periods left out, {overruns} cycles too long", values)
+        return HealthReport(Health.WARNING, f"periods left out: {skipped}, cycles too long: {overruns}", values)
     return HealthReport(Health.GOOD, f"runs at {now.rate:g} Hz", values)
 
 

@@ -107,7 +107,7 @@ def test_lateness_is_a_warning_once(statistics, observer):
     statistics.counts[LoopCount.SKIPPED], statistics.counts[LoopCount.OVERRUNS] = 3, 1
     late = observer.look()
     report = layer_report(late, before)
-    assert (report.level, report.summary) == (Health.WARNING, "3 periods left out, 1 cycles too long")
+    assert (report.level, report.summary) == (Health.WARNING, "periods left out: 3, cycles too long: 1")
     cycle(statistics)
     assert layer_report(observer.look(), late).level == Health.GOOD
 
