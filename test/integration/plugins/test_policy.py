@@ -4,13 +4,17 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+import yaml
 from support.integration.world import CONFIG, World
-from support.plugins.policies import POLICY, file_of, legs
+from support.plugins.plugin import SilentRelay
+from support.plugins.policies import POLICY, TERMS, file_of, legs
+from support.recording.sine import taped
 
 from solfer.config import load
 from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState, Registry, generate
+from solfer.recording.reader import read
 from solfer.transport.messages import FieldsMessage
 from solfer_tools.cli.main import main as solfer
 
@@ -86,6 +90,73 @@ def test_a_message_commands_the_base(tmp_path):
         assert observed.any()
         world.run(0.15)
         assert not observed.any()
+
+
+def test_a_command_of_nan_is_refused_once(tmp_path, caplog):
+    """The log has one warning of ten messages, and the robot goes on."""
+    with closing(World()) as world:
+        component = world.plugin("test", file_of(tmp_path), POLICY).component
+        writer = MemoryMiddleware(world.bus, "driver").writer("test/cmd_vel", "geometry_msgs/Twist")
+        world.run(0.2)
+        for _ in range(10):
+            writer.write(FieldsMessage({"linear": {"x": np.nan}}))
+            world.run(0.02)
+        assert not component.network.observations[6:9].any() and not component.fault and component.steps > 15
+        (record,) = (each for each in caplog.records if "cmd_vel" in each.message)
+        assert record.levelname == "WARNING" and "nan" in record.message
+
+
+def test_an_imu_that_is_silent_holds(tmp_path):
+    """The timeout of its feedback holds the plugin, though the joints are measured."""
+    file = file_of(tmp_path)
+    tree = yaml.safe_load(file.read_text())
+    tree["mwoibn"]["ros"]["feedback"]["imu_base"]["source"] = SilentRelay.topic
+    file.write_text(yaml.safe_dump(tree))
+    with closing(World()) as world:
+        relay = SilentRelay(world, "imu", "sensor_msgs/Imu")
+        check_silence(world, world.plugin("test", file, POLICY), lambda: setattr(relay, "received", False))
+
+
+def test_an_odometry_that_is_silent_holds(tmp_path):
+    """That of the linear velocity, which no sensor measures."""
+    with closing(World()) as world:
+        world.plugin("odometry", target="solfer.components.odometry:Odometry")
+        terms = [{"term": term} for term in ("linear_velocity", *TERMS[1:])]
+        file = file_of(tmp_path, robot="located", observations=terms)
+        check_silence(world, world.plugin("test", file, POLICY), lambda: world.asleep.add("odometry"))
+
+
+def check_silence(world, plugin, silence):
+    """Check that a plugin runs, and that 0.3 s of silence hold it."""
+    world.run(1.0)
+    assert plugin.life is PluginState.RUNNING and plugin.component.steps > 20
+    silence()
+    world.run(0.1)
+    assert plugin.life is PluginState.RUNNING
+    world.run(0.2)
+    assert plugin.life is PluginState.STARTING and not plugin.component.steps
+
+
+def test_a_replay_has_the_actions(tmp_path, capsys):
+    """Position commands are the default pose and the scaled action; another network's are others."""
+    weights = np.random.default_rng(1).normal(scale=0.02, size=(9 + 3 * len(legs()), len(legs())))
+    with closing(World()) as world:
+        plugin = world.plugin("test", file_of(tmp_path, weights), POLICY)
+        world.asleep.add("test")
+        driver = MemoryMiddleware(world.bus, "driver").writer("test/cmd_vel", "geometry_msgs/Twist")
+
+        def step(cycle):
+            world.run(1.0 / plugin.rate)
+            if cycle == 100:
+                driver.write(FieldsMessage({"linear": {"x": 0.2}}))
+
+        file = taped(tmp_path, plugin, world.bus, step, cycles=200)
+    actions = read(file)["test/log/action"].values
+    assert np.ptp(actions, axis=0).min() > 0.01
+    assert solfer(["replay", str(file), "-n", "test"]) == 0
+    assert "the same commands, to 0" in capsys.readouterr().out
+    file_of(tmp_path, weights + 1e-4)
+    assert solfer(["replay", str(file), "-n", "test"]) == 1
 
 
 def test_lost_feedback_begins_again(tmp_path):
