@@ -7,7 +7,7 @@
 
 The policy is that of `examples/policy`, on CENTAURO in PyBullet, 50 times a second, or one of `policy.py` in MuJoCo,
 which a program beside the layer lets walk ahead at 0.5 m/s, by where the base truly is: `ahead_m` is its way
-[m]. Beside it is the layer with `joint_states`
+[m], and `held` says why the plugin does not run at the end. Beside it is the layer with `joint_states`
 in its place. Each run has processes of its own. Times are in microseconds, of the stage `component` in the layer's
 statistics. The network runs in each tenth cycle: the p95 is the middle of those that have it, the p99.9 their p99.
 `network` is one run of the network alone in this process, `network in the layer` that in the layer.
@@ -160,7 +160,7 @@ def measure(figures: Figures, case: Case, plugin: str, seconds: float) -> None:
             before, skipped = statistics.histograms.copy(), statistics.counts[LoopCount.SKIPPED]
             walked = {}
             if plugin == case.plugin:
-                walked = {"ahead_m": walk(namespace, case, seconds), "state": statistics.state(0).name}
+                walked = {"ahead_m": walk(namespace, case, seconds), "held": statistics.text(0) or "no"}
             else:
                 time.sleep(seconds)
             found = since(statistics.histograms, before)
