@@ -11,9 +11,9 @@ of 30 N and 0.2 s on the base, in a random horizontal direction. A run succeeds 
 without a fall or a fault. A program beside the plugin sends `cmd_vel` 50 times a second: 0.5 m/s and a yaw rate that
 corrects the heading; for the Go2 the `VelocityTracker` of the package corrects both, because the policy alone turns by
 5 degrees a second, also in the package's own world. `--springs lower_level` leaves springs to the lower level,
-`--engine bullet` takes PyBullet. The first row compares targets with those of the package's own runner in the same
-states, along a walk of 5 s [rad]. The second one is the runner itself in the same world, without solfer's plugin and
-lower level; `speed` is the mean one over the way [m/s].
+`--engine bullet` takes PyBullet, and `--first 25 --seeds 25` runs other seeds alone. The first row compares targets
+with those of the package's own runner in the same states, along a walk of 5 s [rad]. The second one is the runner
+itself in the same world, without solfer's plugin and lower level; `speed` is the mean one over the way [m/s].
 
 `--wrong` checks wrong contracts instead, by `solfer policy check --rollout`: names of the legs in each wrong order (23
 for four legs; for two one, and six joints of them exchanged), and each joint of a leg with a wrong sign of what is
