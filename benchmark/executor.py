@@ -106,11 +106,13 @@ def wait_for_robot(name: str) -> None:
 
 
 @contextmanager
-def simulated_layer(layer: Path, environment: Mapping[str, str]) -> Iterator[tuple[Namespace, list[subprocess.Popen]]]:
-    """Run a real-time layer beside CENTAURO in PyBullet; yields its namespace, and its processes, which end with it."""
+def simulated_layer(
+    layer: Path, environment: Mapping[str, str], robot: Path = CONFIG / "robots" / "centauro" / "robot.yaml"
+) -> Iterator[tuple[Namespace, list[subprocess.Popen]]]:
+    """Run a real-time layer beside a simulated robot; yields its namespace, and its processes, which end with it."""
     namespace = Namespace(f"benchmark-{os.getpid()}")
     processes: list[subprocess.Popen] = []
-    robot, world = CONFIG / "robots" / "centauro" / "robot.yaml", CONFIG / "worlds" / "flat.yaml"
+    world = CONFIG / "worlds" / "flat.yaml"
     try:
         for node, *arguments in (("xbot_simulator", "--robot", robot, "--world", world), ("xbot", layer)):
             command = [sys.executable, REPOSITORY / "nodes" / node, *arguments, "--namespace", namespace.name]

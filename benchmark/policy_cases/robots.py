@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import re
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -25,6 +26,8 @@ ABSENT = (
 )
 """Packages that the module of holosoma's runner imports, and that its observations and actions do not need."""
 
+SIDES = "left", "right"
+
 Act = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Targets [rad] of a package's own runner, of: rotation of the base; its angular velocity in the world [rad/s];
 positions [rad] and velocities [rad/s] of the joints; commanded x, y [m/s] and yaw rate [rad/s]."""
@@ -39,6 +42,8 @@ class WalkingRobot(NamedTuple):
         contract: Tags of the component.
         speeds: Speed limits of the joints by name [rad/s].
         feet: Links that touch the ground.
+        legs: Names of the joints of each leg, shape (legs, joints).
+        push: Speed that the check of wrong contracts gives the robot [m/s].
         runner: Makes the package's own runner.
         steer: Makes what corrects heading and speed: of a desired and a measured velocity, x, y [m/s] and yaw rate
             [rad/s], and a period [s] the command.
@@ -49,6 +54,8 @@ class WalkingRobot(NamedTuple):
     contract: dict[str, Any]
     speeds: dict[str, float]
     feet: tuple[str, ...]
+    legs: list[list[str]]
+    push: float
     runner: Callable[[], Act]
     steer: Callable[[], Callable[[np.ndarray, np.ndarray, float], np.ndarray]]
 
@@ -95,6 +102,8 @@ def go2() -> WalkingRobot:
         contract=contract,
         speeds={joint: SPEEDS[joint.split("_")[1]] for joint in joints},
         feet=tuple(f"{leg}_calf" for leg in ("FL", "FR", "RL", "RR")),
+        legs=[joints[first : first + 3] for first in range(0, 12, 3)],
+        push=0.6,
         runner=_go2_runner,
         steer=lambda: _go2_module().VelocityTracker().update,
     )
@@ -154,6 +163,11 @@ def _holosoma(name: str, model: str, feet: tuple[str, ...]) -> WalkingRobot:
         contract=contract,
         speeds={joint: float(limits[joint].get("velocity")) for joint in robot.dof_names},  # type: ignore[union-attr,arg-type]
         feet=feet,
+        legs=[
+            [joint for joint in robot.dof_names if re.match(f"{side}_(hip|knee|ankle)_", joint.lower())]
+            for side in SIDES
+        ],
+        push=0.0,
         runner=lambda: _holosoma_runner(name, network),
         steer=lambda: _heading,
     )

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from copy import deepcopy
 from io import StringIO
-from itertools import permutations
+from itertools import chain, permutations
 from pathlib import Path
 from typing import Any
 
@@ -16,24 +16,31 @@ from solfer_tools.cli.main import main as solfer
 SECONDS = 4
 """How long a rollout has each of its commands [s]."""
 
-PUSH = 0.6
-"""Speed that its pushes give the robot [m/s]."""
+
+def wrong_orders(robot: WalkingRobot) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield a title and a contract for each order of the legs but the right one; the names alone are wrong.
+
+    Of two legs there is one, and then each of their joints is exchanged alone.
+    """
+    orders = {f"legs {order}": [robot.legs[leg] for leg in order] for order in permutations(range(len(robot.legs)))}
+    for title, legs in list(orders.items())[1:]:
+        yield title, _renamed(robot, dict(zip(chain(*robot.legs), chain(*legs), strict=True)))
+    if len(robot.legs) == 2:
+        for left, right in zip(*robot.legs, strict=True):
+            yield f"{left} for {right}", _renamed(robot, {left: right, right: left})
 
 
-def wrong_orders(robot: WalkingRobot, legs: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield a title and a contract for each order of the legs but the right one; the names alone are wrong."""
-    size = len(robot.joints) // legs
-    parts = [robot.joints[leg * size : (leg + 1) * size] for leg in range(legs)]
-    for order in list(permutations(range(legs)))[1:]:
-        contract = deepcopy(robot.contract)
-        contract["joints"] = [joint for leg in order for joint in parts[leg]]
-        yield f"legs {order}", contract
+def _renamed(robot: WalkingRobot, names: dict[str, str]) -> dict[str, Any]:
+    contract = deepcopy(robot.contract)
+    contract["joints"] = [names.get(joint, joint) for joint in robot.joints]
+    return contract
 
 
 def wrong_signs(robot: WalkingRobot) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield a title and a contract for each joint whose sign is wrong: as observed, as acted on, and as both."""
+    """Yield a title and a contract for each leg's joint whose sign is wrong: as observed, as acted on, and as both."""
     count = len(robot.joints)
-    for number, joint in enumerate(robot.joints):
+    for joint in chain(*robot.legs):
+        number = robot.joints.index(joint)
         signs = [-1.0 if each == number else 1.0 for each in range(count)]
         for what in ("observed", "acted on", "both"):
             contract = deepcopy(robot.contract)
@@ -50,8 +57,8 @@ def wrong_signs(robot: WalkingRobot) -> Iterator[tuple[str, dict[str, Any]]]:
             yield f"sign of {joint}, {what}", contract
 
 
-def checked(file: Path, contract: dict[str, Any]) -> tuple[int, str]:
-    """Return exit code and error of the check of a configuration with another contract."""
+def checked(file: Path, contract: dict[str, Any], push: float) -> tuple[int, str]:
+    """Return exit code and error of the check of a configuration with another contract, and with pushes [m/s]."""
     tree = yaml.safe_load(file.read_text())
     module = tree["mwoibn"]["modules"]["policy"]
     springs = module["action"]["springs"]
@@ -60,7 +67,7 @@ def checked(file: Path, contract: dict[str, Any]) -> tuple[int, str]:
     changed.write_text(yaml.safe_dump(tree, sort_keys=False))
     bundle = file.parent / f"robots/{file.stem}/robot.yaml"
     words = ["policy", "check", str(changed), "--robot", str(bundle), "--rollout", str(SECONDS)]
-    words += ["--push", str(PUSH)]
+    words += ["--push", str(push)]
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as error:
         code = solfer(words)
     return code, error.getvalue().strip().partition("\n")[0].partition(": policy: ")[2]

@@ -3,28 +3,12 @@
 import numpy as np
 import pytest
 import yaml
-from support.plugins.plugin import WHEELS, Saboteur, configuration
+from support.plugins.plugin import WHEELS, Saboteur, SilentRelay, configuration
 from support.plugins.plugin_claims import kill
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
-
-MEASURED, RELAYED = "joint_states", "relayed_states"
-
-
-class SilentRelay:
-    """Publishes joint states on another topic, until it does not; the robot itself goes on."""
-
-    def __init__(self, world):
-        middleware = MemoryMiddleware(world.bus, "relay")
-        self.received, self._reader = True, middleware.reader(MEASURED, "sensor_msgs/JointState")
-        self._writer = middleware.writer(RELAYED, "sensor_msgs/JointState")
-        world.bus.every(0.002, self._publish)
-
-    def _publish(self):
-        if self.received and self._reader.read():
-            self._writer.write(self._reader.message)
 
 
 def speeds(world):
@@ -37,9 +21,9 @@ def test_damp_relaxes_springs_until_a_reset(world, tmp_path):
     path = configuration(tmp_path, **{"class": "solfer.components.joint_states:JointStates"})
     tree = yaml.safe_load(path.read_text())
     tree["mwoibn"]["feedback"]["link_side_online"]["on_timeout"] = "damp"
-    tree["mwoibn"]["ros"]["feedback"]["link_side_online"]["source"] = RELAYED
+    tree["mwoibn"]["ros"]["feedback"]["link_side_online"]["source"] = SilentRelay.topic
     path.write_text(yaml.safe_dump(tree))
-    relay, plugin = SilentRelay(world), world.plugin("test", path)
+    relay, plugin = SilentRelay(world, "joint_states", "sensor_msgs/JointState"), world.plugin("test", path)
     world.run(0.5)
     assert world.ask("test/trajectory", joints=WHEELS, velocities=(2.0,) * 4).success
     world.run(1.5)

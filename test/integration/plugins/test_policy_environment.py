@@ -104,7 +104,7 @@ def episode(environment, seed, count=3):
 
 
 def test_a_seed_draws_an_episode(tmp_path):
-    """Equal seeds give equal numbers to the last bit, with noise and all that is drawn, also in another process."""
+    """Equal seeds give equal numbers to the last bit, with noise and all that is drawn."""
     file = file_of(tmp_path)
     make = partial(made, file, begin=draw, duration=0.06)
     (tmp_path / "network.onnx").unlink()  # it need not be there yet
@@ -114,6 +114,12 @@ def test_a_seed_draws_an_episode(tmp_path):
         assert not np.array_equal(episode(environment, 2), first)
         assert np.array_equal(episode(environment, 1), first)
         assert environment.simulation.body.mass() == pytest.approx(0.9 * 116.07, rel=0.01)
+
+
+@pytest.mark.soak
+def test_processes_draw_the_same_episodes(tmp_path):
+    """Each has a seed of its own; what it draws and steps is what one process would."""
+    make = partial(made, file_of(tmp_path), begin=draw, duration=0.06)
     with closing(Environments(make, 1)) as environments:
         observed, _ = environments.reset(seed=3)
         seed = int(np.random.SeedSequence(3).generate_state(1)[0])

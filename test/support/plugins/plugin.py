@@ -5,6 +5,7 @@ import yaml
 from support.integration.world import CONFIG, ROBOT
 
 from solfer.components import Component
+from solfer.middleware.memory import MemoryMiddleware
 
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 
@@ -40,6 +41,29 @@ class Saboteur(Component):
 
     def close(self):
         self._maybe("close")
+
+
+class SilentRelay:
+    """Publishes messages of one topic on another one, until it does not; the robot itself goes on.
+
+    Args:
+        world: The World.
+        topic: The topic.
+        message: The type of its messages.
+    """
+
+    topic = "relayed"
+
+    def __init__(self, world, topic, message):
+        middleware = MemoryMiddleware(world.bus, "relay")
+        self.received = True
+        self._reader = middleware.reader(topic, message)
+        self._writer = middleware.writer(self.topic, message)
+        world.bus.every(0.002, self._publish)
+
+    def _publish(self):
+        if self.received and self._reader.read():
+            self._writer.write(self._reader.message)
 
 
 def configuration(tmp_path, **tags):

@@ -173,20 +173,30 @@ def recorded(folder, component="Sine", cycles=300, made=Follower, calls=CALLS):
 
     `calls` are the services that are called, by the cycle, with their fields.
     """
-    follower, box_at = made(folder, component), folder / "box"
+    follower = made(folder, component)
+    bus = follower.fleet.bus
+
+    def step(cycle):
+        bus.run_until((cycle + 1) / fleet.RATE)
+        if cycle in calls:
+            service, fields = calls[cycle]
+            bus.call(f"first/{service}", None, **fields)
+        if cycle > 5 and cycle % 3:
+            follower.move()
+
+    return taped(folder, follower.plugin, bus, step, cycles=cycles)
+
+
+def taped(folder, plugin, bus, step, *, cycles):
+    """Record a plugin on a bus; `step` lets a period pass, and takes the number of the cycle. Returns the file."""
+    box_at = folder / "box"
     box_at.mkdir()
-    bus, plugin = follower.fleet.bus, follower.plugin
     plugins = PluginSet([plugin])
     with closing(BlackBox(box_at, [plugin], seconds=5.0)) as box:
         plugins.changed = lambda index, managed: box.note(index, managed, round(1e9 * bus.time))
         plugins.start()
         for cycle in range(cycles):
-            bus.run_until((cycle + 1) / fleet.RATE)
-            if cycle in calls:
-                service, fields = calls[cycle]
-                bus.call(f"first/{service}", None, **fields)
-            if cycle > 5 and cycle % 3:
-                follower.move()
+            step(cycle)
             plugins.cycle()
             box.record(round(1e9 * bus.time), 0, 0)
         return _drained(box_at)
