@@ -33,7 +33,7 @@ ROTATION = 6
 RATES = 9
 """Sum of rotations by the rates, 3 numbers."""
 
-WAY = 12
+COVERED = 12
 """Angle that the link has covered within `SHORT` by the orientation, and by the rates."""
 
 FORCE = 14
@@ -173,9 +173,9 @@ def _compare_rotations(values, last, own_axes, passed, rate, before):
     if math.sqrt(tx * tx + ty * ty + tz * tz) > 0.05 + fastest * passed:  # the orientation was corrected
         return 0, 0.0
     keep = 1.0 if before[IS_APART] else WINDOW / (WINDOW + passed)  # what contradicted stays until it agrees again
-    keep_way = SHORT / (SHORT + passed)
-    before[WAY] = keep_way * before[WAY] + math.sqrt(tx * tx + ty * ty + tz * tz)
-    before[WAY + 1] = keep_way * before[WAY + 1] + passed * rate
+    short_keep = SHORT / (SHORT + passed)
+    before[COVERED] = short_keep * before[COVERED] + math.sqrt(tx * tx + ty * ty + tz * tz)
+    before[COVERED + 1] = short_keep * before[COVERED + 1] + passed * rate
     rotated = rates = apart = 0.0
     for axis, angle in enumerate((tx, ty, tz)):
         before[ROTATION + axis] = keep * before[ROTATION + axis] + angle
@@ -188,7 +188,7 @@ def _compare_rotations(values, last, own_axes, passed, rate, before):
     if contradicts:
         return 2, math.sqrt(rotated)
     # what rotates covers the angle of its rates; an orientation that shakes may cover more
-    return (7, before[WAY + 1] / before[WAY]) if before[WAY + 1] > 0.008 + 2.0 * before[WAY] else (0, 0.0)
+    return (7, before[COVERED + 1] / before[COVERED]) if before[COVERED + 1] > 0.008 + 2.0 * before[COVERED] else (0, 0.0)
 
 
 @part
