@@ -364,7 +364,8 @@ class _Converter:
             if joint in rotors and joint in self._efforts:
                 rotors[joint] += float(model.actuator_gear[actuator, 0] ** 2 * model.actuator_armature[actuator])
         self._warn(
-            "armature [kg m^2, kg] is left out: write it into an actuators' file as `phi`, with `reflected: true`",
+            "armature [kg m^2, kg] is left out: write it into an actuators' file as `phi`, beside `Ks`, `D` and "
+            "`Torque_limit`, with `reflect_inertia: true`",
             [f"{self._joints[joint]} {value:g}" for joint, value in rotors.items() if value],
         )
         self._warn(
