@@ -63,7 +63,11 @@ class Carried:
         Args:
             options: Sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, CONTINUOUS.
         """
-        _update(self._values, self._mount, self.world, self._chart, self.base, self.rates, options)
+        self.write(options, self.base, self.rates)
+
+    def write(self, options: int, base: np.ndarray, rates: np.ndarray) -> None:
+        """Compute as `update`, into the first six of other numbers."""
+        _update(self._values, self._mount, self.world, self._chart, base, rates, options)
 
 
 # In the kernel a matrix is nine numbers, row by row.

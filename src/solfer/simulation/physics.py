@@ -113,7 +113,7 @@ class RobotInEngine(Protocol):
         Args:
             position: Positions [rad, m].
             velocity: Velocities [rad/s, m/s].
-            effort: What motors that hold a speed did in the newest step [Nm, N]; None: nobody asks.
+            effort: What motors that hold a speed did in the newest step [Nm, N]; None: they are not needed.
         """
 
     def read_base(self, motion: np.ndarray) -> None:

@@ -4,10 +4,6 @@ from typing import Protocol
 
 import numpy as np
 
-REGULARISATION = 1e-9
-"""Ratio of the largest diagonal entry of M that is added to all, so that M is positive definite where the base's chart
-is singular."""
-
 
 class Dynamics(Protocol):
     """Dynamics of a robot that the law needs; `solfer.model.Kinematics` provides them.

@@ -5,9 +5,9 @@ All numbers of a law are rows of one table.
 
 from pathlib import Path
 
-from solfer.lower_level.laws import controllers_kernel, impedance
+from solfer.lower_level.laws import controllers_kernel, springs
 from solfer.lower_level.laws.controllers_kernel import controller_at
-from solfer.lower_level.laws.impedance import REGULARISATION
+from solfer.lower_level.laws.springs import REGULARISATION
 from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, exact_part, part
 from solfer.numerics.lapack import LAPACK, solve_positive
@@ -241,7 +241,7 @@ def _collect(address, factor):
         drives.speed[k] = table[VELOCITY, drives.speed_dofs[k]]
 
 
-_SOURCES = [LAPACK, Path(impedance.__file__), Path(controllers_kernel.__file__)]
+_SOURCES = [LAPACK, Path(springs.__file__), Path(controllers_kernel.__file__)]
 _LAW = "void(int64, float64[:, :], float64[::1], float64[::1], float64)"
 update_rigid = cached(_LAW, _update_rigid, sources=_SOURCES)
 update_two_mass = cached(_LAW, _update_two_mass, sources=_SOURCES)

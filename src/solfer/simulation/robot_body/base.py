@@ -45,5 +45,4 @@ class FloatingBase:
         if not self.floats:
             return
         self._robot.read_base(self._motion)
-        self._in_chart.update(self._whole)
-        q[:6], v[:6] = self._in_chart.base, self._in_chart.rates
+        self._in_chart.write(self._whole, q, v)
