@@ -164,6 +164,7 @@ class ImpedanceController(LowerLevelController):
         self.stiffness, self.damping = (gain.copy() for gain in self.default_gains.values())
         self.position, self.target, self.effort, self.applied_effort = np.zeros((4, size))
         self._revolutions = np.where(np.isinf(limits.upper), math.tau, 0.0)
+        self._turns = bool(self._revolutions.any())
         self.feed_forward = True
         self._feed_forward_ratio = 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self.default_gains}
@@ -201,10 +202,10 @@ class ImpedanceController(LowerLevelController):
         super().apply(indices, given)
         if "position" in given:
             position = given["position"]
-            # joints without ends may be counted in another revolution
-            self.position[indices] = position + whole_revolutions(
-                self.position[indices] - position, self._revolutions[indices]
-            )
+            if self._turns:  # joints without ends may be counted in another revolution
+                ahead = self.position[indices] - position
+                position = position + whole_revolutions(ahead, self._revolutions[indices])
+            self.position[indices] = position
             self._catch_up.renew(indices)
         if "effort" in given:
             self.effort[indices] = given["effort"]
