@@ -182,8 +182,8 @@ class ImpedanceController(LowerLevelController):
             lower=limits.lower,
             upper=limits.upper,
             fastest=limits.velocity,
-            ramps=np.array([each.block.address for each in (*self._ramps.values(), self._leftover)]),
-            catch_up=self._catch_up.block.address,
+            ramp_addresses=np.array([each.block.address for each in (*self._ramps.values(), self._leftover)]),
+            catch_up_address=self._catch_up.block.address,
         )
 
     def load_gains(self, stiffness: ArrayLike, damping: ArrayLike) -> None:

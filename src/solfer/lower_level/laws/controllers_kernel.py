@@ -41,8 +41,8 @@ CONTROLLER = BlockLayout(
     lower=(float, "count"),
     upper=(float, "count"),
     fastest=(float, "count"),
-    ramps=(int, 3),  # addresses of blocks
-    catch_up=int,  # address of a block
+    ramp_addresses=(int, 3),  # addresses of blocks
+    catch_up_address=int,  # of a block
 )
 """What a controller reads and writes."""
 
@@ -121,7 +121,7 @@ def _fade(catch_up, dt):
 @exact_part
 def _follow(controller, dt):
     """Move the targets of the springs on towards the accepted positions."""
-    catch_up = _catch_up_at(controller.catch_up)
+    catch_up = _catch_up_at(controller.catch_up_address)
     for k in range(controller.count):
         catch_up.age[k] += dt
     if catch_up.flags[1]:
@@ -144,7 +144,7 @@ def _advance(address, dt, feed_forward):
         if controller.age[k] > controller.timeout:
             controller.velocity[k] = 0.0
     if controller.has_springs:
-        for ramp in controller.ramps:
+        for ramp in controller.ramp_addresses:
             _advance_ramp(ramp, dt)
         for k in range(controller.count):
             controller.applied_effort[k] = controller.effort[k] * feed_forward

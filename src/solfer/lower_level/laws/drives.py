@@ -68,7 +68,7 @@ class Drives:
             size=kinematics.size,
             table=self._law.table,
             controller_count=len(controllers),
-            controllers=np.array([item.block.address for item in controllers]),
+            controller_addresses=np.array([item.block.address for item in controllers]),
             speed_count=len(self.speed),
             speed_dofs=self.speed_dofs,
             speed=self.speed,

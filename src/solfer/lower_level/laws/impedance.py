@@ -75,7 +75,7 @@ class ImplicitImpedance:
         self._block = MemoryBlock(
             kernel.LAW,
             size=size,
-            dposv=dposv_address(),
+            dposv_address=dposv_address(),
             table=table,
             matrix=np.zeros((size, size)),
             elastic=self._elastic,

@@ -22,7 +22,7 @@ ROWS = 29
 LAW = BlockLayout(
     "Law",
     size=int,
-    dposv=int,  # address of LAPACK's function
+    dposv_address=int,  # of LAPACK's function
     table=(float, ROWS, "size"),
     matrix=(float, "size", "size"),
     elastic=(bool, "size"),  # which DoFs have two masses
@@ -35,7 +35,7 @@ DRIVES = BlockLayout(
     size=int,
     table=(float, ROWS, "size"),  # that of the law
     controller_count=int,
-    controllers=(int, "controller_count"),  # addresses of their blocks
+    controller_addresses=(int, "controller_count"),  # addresses of their blocks
     speed_count=int,
     speed_dofs=(int, "speed_count"),
     speed=(float, "speed_count"),
@@ -184,7 +184,7 @@ def _accelerate(law, inertia):
     little = REGULARISATION * largest
     for k in range(size):
         matrix[k, k] += little
-    if not solve_positive(law.dposv, matrix, table[RIGHT]):  # leave this step to the explicit law
+    if not solve_positive(law.dposv_address, matrix, table[RIGHT]):  # leave this step to the explicit law
         table[RIGHT, :] = 0.0
 
 
@@ -227,7 +227,7 @@ def _collect(address, factor):
     """Write what controllers command to the table, springs and feed-forward torques times a factor; and speeds."""
     drives = _drives_at(address)
     table = drives.table
-    for each in drives.controllers:
+    for each in drives.controller_addresses:
         controller = controller_at(each)
         for k in range(controller.count):
             dof = controller.dofs[k]
