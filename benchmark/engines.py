@@ -76,7 +76,9 @@ def acceleration_error(engine: str, path: Path, floats: bool) -> float:
             robot.place_base((0.0, 0.0, 50.0), (0.0, 0.0, 0.0, 1.0))
             group.apply_torques(torque[[joint.idx_v for joint in numbers]])
             made.step()
-            found = np.array(robot.joint_states().velocity) / STEP
+            position, velocity = np.zeros((2, len(joints)))
+            robot.read_joints(position, velocity)
+            found = velocity / STEP
             worst = max(worst, float(abs(found - expected).max() / max(1.0, abs(expected).max())))
     return worst
 
@@ -168,10 +170,12 @@ def wheel_errors(name: str, camber: float, torus: TorusWheel) -> np.ndarray:
         drive = robot.group([2])
         places = []
         for count in range(1000):
-            drive.hold_speeds(np.array([6.4]), [100.0])
+            drive.hold_speeds(np.array([6.4]), (100.0,))
             engine.step()
             if count in (499, 999):
-                places.append(robot.joint_states().position)
+                position, velocity = np.zeros((2, len(joints)))
+                robot.read_joints(position, velocity)
+                places.append(position)
         way, _, angle = np.subtract(*places)
         contact = np.mean([point.position[1] for point in robot.contacts()])
         found = np.array((places[1][1], contact, way / angle))

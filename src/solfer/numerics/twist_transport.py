@@ -63,7 +63,11 @@ class Carried:
         Args:
             options: Sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, CONTINUOUS.
         """
-        _update(self._values, self._mount, self.world, self._chart, self.base, self.rates, options)
+        self.write(options, self.base, self.rates)
+
+    def write(self, options: int, base: np.ndarray, rates: np.ndarray) -> None:
+        """Compute as `update`, into the first six of other numbers."""
+        _update(self._values, self._mount, self.world, self._chart, base, rates, options)
 
 
 # In the kernel a matrix is nine numbers, row by row.
@@ -197,3 +201,35 @@ def move(base, rates, origin, out):
 
 
 _move = cached(f"void({', '.join(['float64[::1]'] * 4)})", move, sources=[Path(chart.__file__)])
+
+
+def _read_freedom(position, velocity, place, dof, motion):
+    """Write the motion of a body from the numbers of its free joint in MuJoCo.
+
+    Args:
+        position: At `place` its position and its quaternion (w, x, y, z).
+        velocity: At `dof` its linear velocity, and its angular velocity in its own axes.
+        place: See above.
+        dof: See above.
+        motion: See `RobotInEngine.read_base`.
+    """
+    w = position[place + 3]
+    ux = position[place + 4]
+    uy = position[place + 5]
+    uz = position[place + 6]
+    vx = velocity[dof + 3]
+    vy = velocity[dof + 4]
+    vz = velocity[dof + 5]
+    tx = 2.0 * (uy * vz - uz * vy)
+    ty = 2.0 * (uz * vx - ux * vz)
+    tz = 2.0 * (ux * vy - uy * vx)
+    motion[0], motion[1], motion[2], motion[3] = ux, uy, uz, w
+    for axis in range(3):
+        motion[4 + axis] = position[place + axis]
+        motion[7 + axis] = velocity[dof + axis]
+    motion[10] = vx + w * tx + uy * tz - uz * ty
+    motion[11] = vy + w * ty + uz * tx - ux * tz
+    motion[12] = vz + w * tz + ux * ty - uy * tx
+
+
+read_freedom = cached("void(float64[::1], float64[::1], int64, int64, float64[::1])", _read_freedom)

@@ -1,5 +1,6 @@
 """Messages that arrive later than they were sent."""
 
+import math
 from collections import deque
 from typing import Generic, TypeVar
 
@@ -23,9 +24,14 @@ class DelayLine(Generic[Item]):
     def due(self, cycle: int) -> list[Item]:
         """Remove and return the items that are due in this cycle."""
         due = []
-        while self._items and self._items[0][0] <= cycle:
+        while self.next <= cycle:
             due.append(self._items.popleft()[1])
         return due
+
+    @property
+    def next(self) -> float:
+        """Cycle in which the next item is due; infinity without any."""
+        return self._items[0][0] if self._items else math.inf
 
 
 def steps_of(delay: float, where: str) -> int:

@@ -19,36 +19,6 @@ Pose = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
 """Position [m] and quaternion (x, y, z, w)."""
 
 
-class SimulatedJoints(NamedTuple):
-    """What joints do, in the order in which the robot was loaded.
-
-    Attributes:
-        position: Positions [rad, m].
-        velocity: Velocities [rad/s, m/s].
-        effort: What motors that hold a speed did in the newest step [Nm, N].
-    """
-
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
-
-
-class BaseState(NamedTuple):
-    """What the base link of a robot does.
-
-    Attributes:
-        position: Position of the link's origin in the world [m].
-        orientation: Orientation of the link, (x, y, z, w).
-        linear: Velocity of its origin in world axes [m/s].
-        angular: Angular velocity in world axes [rad/s].
-    """
-
-    position: Vector
-    orientation: Quaternion
-    linear: Vector
-    angular: Vector
-
-
 class ContactPoint(NamedTuple):
     """Where the world pushes a link.
 
@@ -115,12 +85,12 @@ class JointGroup(Protocol):
     def apply_torques(self, torques: np.ndarray) -> None:
         """Let these torques act in the next step, shape (n,) [Nm, N]."""
 
-    def hold_speeds(self, speeds: np.ndarray, efforts: Sequence[float]) -> None:
+    def hold_speeds(self, speeds: np.ndarray, efforts: tuple[float, ...]) -> None:
         """Let motors hold speeds from the next step on, with no more than the efforts.
 
         Args:
             speeds: Shape (n,) [rad/s, m/s].
-            efforts: Largest efforts, n of them [Nm, N].
+            efforts: Largest efforts, n of them [Nm, N]; the same tuple costs nothing again.
         """
 
 
@@ -137,11 +107,22 @@ class RobotInEngine(Protocol):
     links: tuple[str, ...]
     owner: Mapping[str, str]
 
-    def joint_states(self) -> SimulatedJoints:
-        """Read what the joints do."""
+    def read_joints(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray | None = None) -> None:
+        """Write what joints do, in the order in which the robot was loaded, shape (n,) each.
 
-    def base_state(self) -> BaseState:
-        """Read what the base link does."""
+        Args:
+            position: Positions [rad, m].
+            velocity: Velocities [rad/s, m/s].
+            effort: What motors that hold a speed did in the newest step [Nm, N]; None: they are not needed.
+        """
+
+    def read_base(self, motion: np.ndarray) -> None:
+        """Write what the base link does.
+
+        Args:
+            motion: Orientation (x, y, z, w), position of the link's origin in the world [m], its velocity [m/s] and the
+                angular velocity [rad/s] in world axes, shape (13,).
+        """
 
     def place_joints(self, positions: Sequence[float] | np.ndarray) -> None:
         """Put all joints somewhere, at rest [rad, m]."""

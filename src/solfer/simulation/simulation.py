@@ -80,8 +80,9 @@ class Simulation:
             )
             self.world = World(self._engine, world, bundle.friction.ground)
             self._contacts = ContactDetector(self.body)
-            self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
-            self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
+            self._before, self._now = np.zeros((2, 3, kinematics.size))
+            self.q, self.v, self.torque = self._now
+            self.q_before, self.v_before, self.torque_before = self._before
             self._motor_torque = np.zeros(len(drives.speed_dofs))
             if drives.two_mass is not None:
                 self.body.push_motors()
@@ -226,7 +227,8 @@ class Simulation:
         self._count += 1
         self._read()
         self.torque[:] = torque
-        self.torque[self.lower_level.drives.speed_dofs] += self._motor_torque
+        if self._motor_torque.size:
+            self.torque[self.lower_level.drives.speed_dofs] += self._motor_torque
 
     def set_friction(self, name: str, coefficient: float) -> None:
         """Change a friction coefficient; those of two bodies that touch are multiplied.
@@ -300,16 +302,14 @@ class Simulation:
 
     def _remember(self) -> None:
         """Keep the state in which a step begins."""
-        np.copyto(self.q_before, self.q)
-        np.copyto(self.v_before, self.v)
-        np.copyto(self.torque_before, self.torque)
+        self._before[:] = self._now
         self.state.before.expire()
 
     def _read(self) -> None:
         self.state.now.expire()
         self.body.read(self.q, self.v, self._motor_torque)
         highest = 1e6  # norm of all speeds [rad/s, m/s], which stays far below in a world that makes sense
-        if not float(np.dot(self.v, self.v)) < highest**2:  # true for NaN as well
+        if not float(self.v.dot(self.v)) < highest**2:  # true for NaN as well
             raise SimulationError(
                 f"the simulation diverged after {self.time:g} s",
                 expected="smaller gains or forces, or masses and inertias as the real robot has them",

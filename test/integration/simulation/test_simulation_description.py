@@ -55,7 +55,7 @@ def coast(simulation, speed, duration):
     simulation.body.robot.place_joint(0, -1.0, speed)
     for _ in range(round(duration * 1e3)):
         simulation.step()
-    return simulation.body.robot.joint_states().velocity[0]
+    return simulation.v[0]
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.2, 1.0])

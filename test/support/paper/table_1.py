@@ -2,6 +2,7 @@
 
 import numpy as np
 from support.bullet import raw_bullet
+from support.simulation.engine_state import joint_states
 from support.table_1 import FILE, GRAVITY, Table1System
 
 
@@ -33,7 +34,7 @@ class MemorySystem(Table1System):
         self.world.run(duration)
 
     def joint(self, name):
-        states, number = self._body.robot.joint_states(), self._body.joints.index(name)
+        states, number = joint_states(self._body.robot), self._body.joints.index(name)
         return states.position[number], states.velocity[number]
 
     def pose(self, link):

@@ -124,7 +124,8 @@ class Digest:
             return [value.__func__.__qualname__, value.__self__]
         if isinstance(value, MemoryBlock):  # its record has addresses, too
             numbers = [name for name in value.record.dtype.names if name not in value.arrays]
-            return [[float(value.record[name]) for name in numbers], value.arrays]
+            arrays = {name: array for name, array in value.arrays.items() if "address" not in name}
+            return [[float(value.record[name]) for name in numbers if "address" not in name], arrays]
         if isinstance(value, types.FunctionType):
             cells = [cell.cell_contents for cell in value.__closure__ or () if _full(cell)]
             return [value.__qualname__, cells, value.__defaults__]

@@ -5,7 +5,6 @@ import pytest
 from support.controllers import accept
 
 from solfer.lower_level import ImpedanceController, JointLimits
-from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.transport.messages import JointMessage
 
 DT = 0.001  # [s]
@@ -74,21 +73,33 @@ def test_a_stream_may_change_its_speed_fast(joint):
 @pytest.mark.parametrize("pause", [0, 300])
 def test_each_joint_has_a_stream_of_its_own(pause):
     """Commands of one joint do not count as commands of the other, which has been silent since its start."""
-    speeds, position = np.full(2, SPEED), np.full(2, 0.5)
-    catch_up = CatchUp(speeds)
+    names = ("first", "second")
+    limits = JointLimits(
+        names,
+        np.arange(2),
+        np.full(2, -LIMIT),
+        upper=np.full(2, LIMIT),
+        velocity=np.full(2, SPEED),
+        effort=np.full(2, 100.0),
+    )
+    controller, position = ImpedanceController("both", limits, np.full(2, 100.0), np.ones(2)), np.full(2, 0.5)
+
+    def command(joint):
+        accept(controller, JointMessage(names[joint : joint + 1], position=position[joint : joint + 1]))
+
     for _ in range(2):  # a start forgets what was commanded
-        catch_up.start(position)
+        controller.start(position)
         for _ in range(pause):
             position[0] += 0.5 * DT
-            catch_up.renew(np.array([0]))
-            catch_up.advance(DT, position)
-        catch_up.renew(np.array([0]))
-        catch_up.advance(DT, position)
+            command(0)
+            controller.advance(DT)
+        command(0)
+        controller.advance(DT)
         position[1] += 0.009  # less than a jump, for a joint that was not commanded a moment ago
-        catch_up.renew(np.array([1]))
-        catch_up.advance(DT, position)
-        assert not catch_up.active and not catch_up.distance.any()
-        catch_up.renew(np.array([1]))  # pending at the next start
+        command(1)
+        controller.advance(DT)
+        np.testing.assert_allclose(controller.target, position, atol=1e-15)
+        command(1)  # pending at the next start
 
 
 @pytest.mark.parametrize("ahead", [0.05, 0.1, 0.75, -0.4])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.lower_level.laws.impedance import REGULARISATION
+from solfer.lower_level.laws.springs import REGULARISATION
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 

@@ -3,7 +3,7 @@
 import abc
 import math
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,12 @@ from solfer.errors import NotFinite, SizeMismatch, Suspended
 from solfer.lower_level.gains.ramp import ALL_JOINTS, GainRamp
 from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.lower_level.laws.command_check import CommandCheck
-from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
 from solfer.numerics.rotations import whole_revolutions
 from solfer.transport.messages import JOINT_FIELDS
+
+if TYPE_CHECKING:
+    from solfer.numerics.blocks import MemoryBlock
 
 VELOCITY_TIMEOUT = 0.5
 """Time after which a velocity that is not renewed becomes zero, without a record [s]."""
@@ -38,6 +40,7 @@ class LowerLevelController(abc.ABC):
         running: False while it is stopped and holds; then `LowerLevel` refuses commands.
         velocity: Commanded velocities, shape (len(joints),) [rad/s, m/s].
         check: Checks a command, for `apply`; see `CommandCheck.check`.
+        block: The numbers of the compiled step.
     """
 
     TYPE: ClassVar[str]
@@ -51,7 +54,18 @@ class LowerLevelController(abc.ABC):
         self.running = True
         self.velocity = np.zeros(len(self.joints))
         self.check = CommandCheck(name, limits, self.FIELDS).check
-        self._watchdog = CommandTimeout(len(self.joints), timeout)
+        self._age = np.full(len(self.joints), np.inf)  # of the velocities
+        self.block = self._make_block(timeout)
+
+    def _make_block(self, timeout: float, **springs: Any) -> "MemoryBlock":
+        """Make the block, and find what is compiled."""
+        # imported here: its compiler takes a while to load
+        from solfer.lower_level.laws import controllers_kernel as kernel
+        from solfer.numerics.blocks import MemoryBlock
+
+        self._advance = kernel.advance
+        numbers = {"dofs": self.dofs, "velocity": self.velocity, "age": self._age}
+        return MemoryBlock(kernel.CONTROLLER, count=len(self.joints), timeout=timeout, **numbers, **springs)
 
     def restore(self, field: str, joints: np.ndarray) -> None:  # noqa: B027 wheels have none
         """Let a gain of joints, indices, return to its default, and a feed-forward torque to zero."""
@@ -73,7 +87,7 @@ class LowerLevelController(abc.ABC):
         """Apply a checked command; joints and fields that it does not name stay as they are."""
         if "velocity" in given:
             self.velocity[indices] = given["velocity"]
-            self._watchdog.renew(indices)
+            self._age[indices] = 0.0
 
     def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
         """Find the joint that a command moves furthest ("": none), and its distance from the held position [rad, m]."""
@@ -95,7 +109,7 @@ class LowerLevelController(abc.ABC):
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass."""
-        self.velocity[self._watchdog.advance(dt)] = 0.0
+        self._advance(self.block.address, dt, 1.0)
 
     def start(self, position: np.ndarray) -> None:
         """Forget all commands, and start with the joints at `position`, shape (len(joints),)."""
@@ -148,13 +162,29 @@ class ImpedanceController(LowerLevelController):
         size = len(self.joints)
         self.default_gains = self._gains(stiffness=stiffness, damping=damping)
         self.stiffness, self.damping = (gain.copy() for gain in self.default_gains.values())
-        self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
+        self.position, self.target, self.effort, self.applied_effort = np.zeros((4, size))
         self._revolutions = np.where(np.isinf(limits.upper), math.tau, 0.0)
+        self._turns = bool(self._revolutions.any())
         self.feed_forward = True
         self._feed_forward_ratio = 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self.default_gains}
         self._leftover = GainRamp(self.effort)
-        self._catch_up = CatchUp(limits.velocity)
+        self._catch_up = CatchUp(limits.velocity, self.position)
+        self.block = self._make_block(
+            timeout,
+            has_springs=1,
+            position=self.position,
+            target=self.target,
+            effort=self.effort,
+            applied_effort=self.applied_effort,
+            stiffness=self.stiffness,
+            damping=self.damping,
+            lower=limits.lower,
+            upper=limits.upper,
+            fastest=limits.velocity,
+            ramp_addresses=np.array([each.block.address for each in (*self._ramps.values(), self._leftover)]),
+            catch_up_address=self._catch_up.block.address,
+        )
 
     def load_gains(self, stiffness: ArrayLike, damping: ArrayLike) -> None:
         """Set other default gains, and ramp to them within RAMP_DURATION.
@@ -172,10 +202,10 @@ class ImpedanceController(LowerLevelController):
         super().apply(indices, given)
         if "position" in given:
             position = given["position"]
-            # joints without ends may be counted in another revolution
-            self.position[indices] = position + whole_revolutions(
-                self.position[indices] - position, self._revolutions[indices]
-            )
+            if self._turns:  # joints without ends may be counted in another revolution
+                ahead = self.position[indices] - position
+                position = position + whole_revolutions(ahead, self._revolutions[indices])
+            self.position[indices] = position
             self._catch_up.renew(indices)
         if "effort" in given:
             self.effort[indices] = given["effort"]
@@ -208,7 +238,7 @@ class ImpedanceController(LowerLevelController):
         target = position[kept] + np.clip(away, -furthest, furthest)
         np.clip(target, self.limits.lower[kept], self.limits.upper[kept], out=target)
         self.position[kept] = self.target[kept] = target
-        self._catch_up.start(self.position, kept)
+        self._catch_up.start(kept)
         for field, ramp in self._ramps.items():
             at_once = np.intersect1d(kept, free[field])
             ramp.begin(self.default_gains[field][at_once], 0.0, at_once)
@@ -247,7 +277,7 @@ class ImpedanceController(LowerLevelController):
         """Hold `position` with the default gains and no feed-forward torque."""
         super().start(position)
         self.position[:] = self.target[:] = position
-        self._catch_up.start(position)
+        self._catch_up.start()
         self.effort[:] = self.applied_effort[:] = 0.0
         self._leftover.stop()
         for field, ramp in self._ramps.items():
@@ -259,32 +289,15 @@ class ImpedanceController(LowerLevelController):
         ahead -= whole_revolutions(ahead, self._revolutions[joint])
         self.position[joint] = position + ahead
         self.target[joint] = position
-        self._catch_up.fall_behind(joint, self.position[joint], distance=ahead)
+        self._catch_up.fall_behind(joint, ahead)
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass: the springs' targets move on towards the accepted position."""
-        super().advance(dt)
-        for ramp in self._ramps.values():
-            ramp.advance(dt)
-        self._leftover.advance(dt)
         goal = 1.0 if self.feed_forward else 0.0
         if self._feed_forward_ratio != goal:
             largest = dt / RAMP_DURATION
             self._feed_forward_ratio += float(np.clip(goal - self._feed_forward_ratio, -largest, largest))
-        np.multiply(self.effort, self._feed_forward_ratio, out=self.applied_effort)
-        self._catch_up.advance(dt, self.position)
-        change = self._change
-        step = self.limits.velocity * dt
-        if self._catch_up.active:
-            np.subtract(self.position, self._catch_up.distance, out=change)
-            np.minimum(change, self.limits.upper, out=change)
-            np.maximum(change, self.limits.lower, out=change)
-            np.subtract(change, self.target, out=change)
-        else:
-            np.subtract(self.position, self.target, out=change)
-        np.minimum(change, step, out=change)
-        np.maximum(change, np.negative(step, out=step), out=change)
-        np.add(self.target, change, out=self.target)
+        self._advance(self.block.address, dt, self._feed_forward_ratio)
 
     def _gains(self, **given: ArrayLike) -> dict[str, np.ndarray]:
         gains = {kind: np.array(values, dtype=float) for kind, values in given.items()}

@@ -45,6 +45,10 @@ class Drives:
         actuators: Actuators | None,
         posture: np.ndarray | None,
     ):
+        # imported here: its compiler takes a while to load
+        from solfer.lower_level.laws import kernel
+        from solfer.numerics.blocks import MemoryBlock
+
         _check_joints(kinematics, controllers, passive)
         impedances = [item for item in controllers if isinstance(item, ImpedanceController)]
         motors = [item for item in controllers if isinstance(item, VelocityController)]
@@ -58,18 +62,18 @@ class Drives:
         self._law.damping[swinging] = 1e7  # [Nms/rad], with which a motor holds its speed
         self.torque = self._law.torque
         self.speed = np.zeros(len(self.speed_dofs))
-        self._copies = [
-            (target, source, item.dofs)
-            for item in impedances
-            for target, source in (
-                (self._law.position, item.target),
-                (self._law.velocity, item.velocity),
-                (self._law.effort, item.applied_effort),
-                (self._law.stiffness, item.stiffness),
-                (self._law.damping, item.damping),
-            )
-        ]
-        self._copies += [(self._law.velocity, item.velocity, item.dofs) for item in motors]
+        self._controllers = controllers
+        self._block = MemoryBlock(
+            kernel.DRIVES,
+            size=kinematics.size,
+            table=self._law.table,
+            controller_count=len(controllers),
+            controller_addresses=np.array([item.block.address for item in controllers]),
+            speed_count=len(self.speed),
+            speed_dofs=self.speed_dofs,
+            speed=self.speed,
+        )
+        self._collect = kernel.collect
 
     @property
     def two_mass(self) -> TwoMassImpedance | None:
@@ -99,12 +103,7 @@ class Drives:
             dt: Duration of the step [s].
             factor: Factor of springs and feed-forward torques, from 0 to 1.
         """
-        for target, source, dofs in self._copies:
-            target[dofs] = source
-        if factor != 1.0:
-            self._law.stiffness *= factor
-            self._law.effort *= factor
-        np.take(self._law.velocity, self.speed_dofs, out=self.speed)
+        self._collect(self._block.address, factor)
         self._law.update(q, v, dt)
 
 

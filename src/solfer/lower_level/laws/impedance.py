@@ -3,11 +3,6 @@
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dposv
-
-REGULARISATION = 1e-9
-"""Ratio of the largest diagonal entry of M that is added to all, so that M is positive definite where the base's chart
-is singular."""
 
 
 class Dynamics(Protocol):
@@ -54,16 +49,19 @@ class ImplicitImpedance:
     Attributes:
         position, velocity, effort, stiffness, damping: q_d, v_d, tau_ff, and the diagonals of K and D; to be written
             by the caller, shape (size,).
+        table: All numbers of the law, see `kernel`.
         torque: The torques of the newest `update`, within the effort limits, shape (size,) [Nm, N].
     """
 
     def __init__(self, dynamics: Dynamics, effort_limit: np.ndarray, velocity_limit: np.ndarray):
         # imported here: its compiler takes a while to load
         from solfer.lower_level.laws import kernel
+        from solfer.numerics.blocks import MemoryBlock
+        from solfer.numerics.lapack import dposv_address
 
         size = dynamics.size
         self._kernel = kernel
-        table = self._table = np.zeros((kernel.ROWS, size))
+        table = self.table = np.zeros((kernel.ROWS, size))
         table[kernel.UPPER] = effort_limit
         table[kernel.FASTEST] = velocity_limit
         self.position, self.velocity, self.effort = (
@@ -73,37 +71,26 @@ class ImplicitImpedance:
         self.damping = table[kernel.DAMPING]
         self.torque = table[kernel.TORQUE]
         self._dynamics = dynamics
-        self._force, self._loss, self._right, self._outside = (
-            table[row] for row in (kernel.FORCE, kernel.LOSS, kernel.RIGHT, kernel.OUTSIDE)
+        self._elastic, self._sprung = np.zeros((2, size), dtype=bool)
+        self._block = MemoryBlock(
+            kernel.LAW,
+            size=size,
+            dposv_address=dposv_address(),
+            table=table,
+            matrix=np.zeros((size, size)),
+            elastic=self._elastic,
+            sprung=self._sprung,
         )
-        self._matrix = np.zeros((size, size), order="F")
-        self._diagonal = self._matrix.reshape(-1, order="F")[:: size + 1]
 
     def place(self, q: np.ndarray) -> None:
         """Begin with a robot at rest that was put to q, shape (size,), and is held there."""
-        self._table[[self._kernel.BEFORE, self._kernel.TORQUE]] = 0.0
+        self.table[[self._kernel.BEFORE, self._kernel.TORQUE]] = 0.0
 
     def limit(self, dof: int, torque: float) -> None:
         """Change the largest torque of a drive [Nm, N]; 0: it has no power."""
-        self._table[self._kernel.UPPER, dof] = torque
+        self.table[self._kernel.UPPER, dof] = torque
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque` for the step of `dt` [s] that begins at position q and velocity v, shape (size,)."""
-        inertia = self._dynamics.inertia(q)
-        self._kernel.feel(self._table, inertia, v, dt)
-        self._kernel.pull(self._table, q, v, dt)
-        self._kernel.damp(self._table, self._accelerations(inertia))
-        self._kernel.limit(self._table, v)
+        self._kernel.update_rigid(self._block.address, self._dynamics.inertia(q), q, v, dt)
         return self.torque
-
-    def _accelerations(self, inertia: np.ndarray) -> np.ndarray:
-        """Solve (M + W) a = r + f, with r, f and the diagonal W in the table, for a, shape (size,)."""
-        diagonal = self._diagonal
-        np.copyto(self._matrix, inertia)
-        np.add(self._force, self._outside, out=self._right)
-        np.add(diagonal, self._loss, out=diagonal)
-        np.add(diagonal, REGULARISATION * diagonal.max(), out=diagonal)
-        _, acceleration, failed = dposv(self._matrix, self._right, lower=1, overwrite_a=1, overwrite_b=1)
-        if failed:  # M is not positive definite: leave this step to the explicit law
-            acceleration[:] = 0.0
-        return acceleration

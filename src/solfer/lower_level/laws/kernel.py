@@ -1,9 +1,16 @@
-"""Loops over the DoFs of the laws, compiled, or read from the cache, on import.
+"""The laws of the drives, compiled, or read from the cache, on import.
 
-All numbers of a law are rows of one table, so that a call has few arguments.
+All numbers of a law are rows of one table.
 """
 
-from solfer.numerics.compilation import REORDERED, cached
+from pathlib import Path
+
+from solfer.lower_level.laws import controllers_kernel, springs
+from solfer.lower_level.laws.controllers_kernel import controller_at
+from solfer.lower_level.laws.springs import REGULARISATION
+from solfer.numerics.blocks import BlockLayout
+from solfer.numerics.compilation import cached, exact_part, part
+from solfer.numerics.lapack import LAPACK, solve_positive
 
 POSITION, VELOCITY, EFFORT, STIFFNESS, DAMPING, TORQUE, UPPER, FASTEST, FORCE, LOSS, RIGHT, BEFORE, OUTSIDE = range(13)
 # only of the law with two masses
@@ -12,11 +19,34 @@ TENSION, PULLED, TAKEN, LINKS, MOTORS, FREE, INERT = range(22, 29)
 ROWS = 29
 """Numbers for each DoF: rows of the table of a law."""
 
-_TABLE = "float64[:, ::1]"
-_NUMBERS = "float64[::1]"
-_FLAGS = "boolean[::1]"
+LAW = BlockLayout(
+    "Law",
+    size=int,
+    dposv_address=int,  # of LAPACK's function
+    table=(float, ROWS, "size"),
+    matrix=(float, "size", "size"),
+    elastic=(bool, "size"),  # which DoFs have two masses
+    sprung=(bool, "size"),  # which have a spring
+)
+"""What the laws read and write."""
+
+DRIVES = BlockLayout(
+    "DriveNumbers",
+    size=int,
+    table=(float, ROWS, "size"),  # that of the law
+    controller_count=int,
+    controller_addresses=(int, "controller_count"),  # addresses of their blocks
+    speed_count=int,
+    speed_dofs=(int, "speed_count"),
+    speed=(float, "speed_count"),
+)
+"""What the drives read and write."""
+
+_law_at = LAW.at
+_drives_at = DRIVES.at
 
 
+@exact_part
 def _pull(table, position, velocity, dt):
     """Write the force of springs and dampers at a position and a velocity, and what a unit of acceleration takes."""
     for k in range(table.shape[1]):
@@ -26,6 +56,7 @@ def _pull(table, position, velocity, dt):
         table[LOSS, k] = table[DAMPING, k] * dt
 
 
+@part
 def _feel(table, inertia, velocity, dt):
     """Write the force that was there in the last step beside the torque, M dv/dt - tau, and the new BEFORE."""
     size = table.shape[1]
@@ -39,12 +70,14 @@ def _feel(table, inertia, velocity, dt):
         table[OUTSIDE, k] = outside
 
 
-def _damp(table, acceleration):
+@exact_part
+def _damp(table):
     """Take what accelerations cost from the force."""
     for k in range(table.shape[1]):
-        table[FORCE, k] -= table[LOSS, k] * acceleration[k]
+        table[FORCE, k] -= table[LOSS, k] * table[RIGHT, k]
 
 
+@exact_part
 def _limit(table, velocity):
     """Write the force, within the limits of the drives at a velocity, to the torque; NaN stays NaN."""
     for k in range(table.shape[1]):
@@ -57,6 +90,7 @@ def _limit(table, velocity):
         table[TORQUE, k] = torque
 
 
+@exact_part
 def _stretch(table, elastic, position, velocity):
     """Write the torques of the springs; motors of joints without two masses are where the joints are."""
     for k in range(table.shape[1]):
@@ -66,6 +100,7 @@ def _stretch(table, elastic, position, velocity):
         table[TENSION, k] = tension + table[DAMPER, k] * (table[MOTOR_VELOCITY, k] - velocity[k])
 
 
+@exact_part
 def _soften(table, elastic, dt):
     """Write the law's force, and what it loses for a unit of acceleration: dt D, with two masses dt (D + dt K)."""
     for k in range(table.shape[1]):
@@ -75,6 +110,7 @@ def _soften(table, elastic, dt):
         table[PULLED, k] = table[FORCE, k] / softening
 
 
+@exact_part
 def _balance(table, elastic):
     """Write force and diagonal of the linear system for the links' accelerations; see `TwoMassImpedance._solve`."""
     for k in range(table.shape[1]):
@@ -87,10 +123,11 @@ def _balance(table, elastic):
         table[LOSS, k] = ratio * inert
 
 
-def _move(table, elastic, acceleration):
+@exact_part
+def _move(table, elastic):
     """Write the accelerations of links and motors, and the force of the law at these."""
     for k in range(table.shape[1]):
-        links = motors = acceleration[k]
+        links = motors = table[RIGHT, k]
         table[LINKS, k] = links
         if elastic[k]:
             motors = (table[FREE, k] + table[COUPLING, k] * links) / (table[INERT, k] + table[COUPLING, k])
@@ -98,6 +135,7 @@ def _move(table, elastic, acceleration):
         table[FORCE, k] = table[DRIVE, k] = table[PULLED, k] - table[TAKEN, k] * motors
 
 
+@exact_part
 def _clip(table, sprung):
     """Let drives behind a spring that reach a limit be constant; returns whether there are any."""
     some = False
@@ -111,6 +149,7 @@ def _clip(table, sprung):
     return some
 
 
+@exact_part
 def _release(table, elastic, dt):
     """Write the springs' torques with what the drives have left, and move the motors on."""
     for k in range(table.shape[1]):
@@ -128,13 +167,82 @@ def _release(table, elastic, dt):
         table[MOTOR_POSITION, k] += table[MOTOR_VELOCITY, k] * dt
 
 
-pull = cached(f"void({_TABLE}, {_NUMBERS}, {_NUMBERS}, float64)", _pull)
-feel = cached(f"void({_TABLE}, float64[:, :], {_NUMBERS}, float64)", _feel, fastmath=REORDERED)
-damp = cached(f"void({_TABLE}, {_NUMBERS})", _damp)
-limit = cached(f"void({_TABLE}, {_NUMBERS})", _limit)
-stretch = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS}, {_NUMBERS})", _stretch)
-soften = cached(f"void({_TABLE}, {_FLAGS}, float64)", _soften)
-balance = cached(f"void({_TABLE}, {_FLAGS})", _balance)
-move = cached(f"void({_TABLE}, {_FLAGS}, {_NUMBERS})", _move)
-clip = cached(f"boolean({_TABLE}, {_FLAGS})", _clip)
-release = cached(f"void({_TABLE}, {_FLAGS}, float64)", _release)
+@exact_part
+def _accelerate(law, inertia):
+    """Solve (M + W) a = r + f, with r, f and the diagonal W in the table, for a, which replaces r + f."""
+    table = law.table
+    matrix = law.matrix
+    size = table.shape[1]
+    largest = 0.0
+    for k in range(size):
+        table[RIGHT, k] = table[FORCE, k] + table[OUTSIDE, k]
+        for j in range(size):
+            matrix[k, j] = inertia[j, k]
+        matrix[k, k] += table[LOSS, k]
+        if k == 0 or not matrix[k, k] <= largest:  # NaN stays NaN
+            largest = matrix[k, k]
+    little = REGULARISATION * largest
+    for k in range(size):
+        matrix[k, k] += little
+    if not solve_positive(law.dposv_address, matrix, table[RIGHT]):  # leave this step to the explicit law
+        table[RIGHT, :] = 0.0
+
+
+@exact_part
+def _drive(law, inertia):
+    """Write accelerations and torques of the drives; see `TwoMassImpedance`. Returns whether some reach a limit."""
+    table = law.table
+    _balance(table, law.elastic)
+    _accelerate(law, inertia)
+    _move(table, law.elastic)
+    _limit(table, table[MOTOR_VELOCITY])
+    return _clip(table, law.sprung)
+
+
+def _update_rigid(address, inertia, position, velocity, dt):
+    """Write the torques for a step, see `ImplicitImpedance.update`."""
+    law = _law_at(address)
+    table = law.table
+    _feel(table, inertia, velocity, dt)
+    _pull(table, position, velocity, dt)
+    _accelerate(law, inertia)
+    _damp(table)
+    _limit(table, velocity)
+
+
+def _update_two_mass(address, inertia, position, velocity, dt):
+    """Write the torques for a step, and move the motors on, see `TwoMassImpedance.update`."""
+    law = _law_at(address)
+    table = law.table
+    _feel(table, inertia, velocity, dt)
+    _stretch(table, law.elastic, position, velocity)
+    _pull(table, table[MOTOR_POSITION], table[MOTOR_VELOCITY], dt)
+    _soften(table, law.elastic, dt)
+    if _drive(law, inertia):  # then some drives do not follow their law, and all is different
+        _drive(law, inertia)
+    _release(table, law.elastic, dt)
+
+
+def _collect(address, factor):
+    """Write what controllers command to the table, springs and feed-forward torques times a factor; and speeds."""
+    drives = _drives_at(address)
+    table = drives.table
+    for each in drives.controller_addresses:
+        controller = controller_at(each)
+        for k in range(controller.count):
+            dof = controller.dofs[k]
+            table[VELOCITY, dof] = controller.velocity[k]
+            if controller.has_springs:
+                table[POSITION, dof] = controller.target[k]
+                table[EFFORT, dof] = controller.applied_effort[k] * factor
+                table[STIFFNESS, dof] = controller.stiffness[k] * factor
+                table[DAMPING, dof] = controller.damping[k]
+    for k in range(drives.speed_count):
+        drives.speed[k] = table[VELOCITY, drives.speed_dofs[k]]
+
+
+_SOURCES = [LAPACK, Path(springs.__file__), Path(controllers_kernel.__file__)]
+_LAW = "void(int64, float64[:, :], float64[::1], float64[::1], float64)"
+update_rigid = cached(_LAW, _update_rigid, sources=_SOURCES)
+update_two_mass = cached(_LAW, _update_two_mass, sources=_SOURCES)
+collect = cached("void(int64, float64)", _collect, sources=_SOURCES)

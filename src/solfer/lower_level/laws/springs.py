@@ -4,10 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.lower_level.laws.impedance import REGULARISATION
 from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
+
+REGULARISATION = 1e-9
+"""Ratio of the largest diagonal entry of M that is added to all, so that M is positive definite where the base's chart
+is singular."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,10 @@ class TwoMassImpedance(ImplicitImpedance):
     oscillation. Its frequency w is right up to (w dt)^4 / 480, its damping up to (w dt)^2 / 12. gamma grows towards 1
     where D alone would stop the joint within a step. delta'' is found for all motors and links together, from one
     linear system of the size of M, with what else acted on the links in the last step. Link and motor feel opposite
-    torques.
+    torques. For the law p - l alpha of force p and loss l, with the spring's gain c and m = B + dt d + l, a motor has
+    alpha = (p - d theta' - tension + c a) / (m + c). What remains is (M + W) a = tension + c / (m + c)
+    (p - d theta' - tension) + f with W = c m / (m + c). Without two masses W is m, and p - d q' acts on the link.
+    Drives behind a spring that reach their limits are constant, and all is solved again.
 
     A spring that swings faster than a step resolves only yields, theta = q + tau / K: its rotor has no inertia, and
     the impedance acts on the joint, with spring, damper and torque of the law times 1 / (1 + stiffness / K),
@@ -57,10 +60,10 @@ class TwoMassImpedance(ImplicitImpedance):
         super().__init__(dynamics, *limits)
         self._dt = dt
         self.springs = springs
-        table = self._table
+        table = self.table
         row = self._kernel
-        self._elastic = springs.two_mass
-        self._sprung = springs.stiffness > 0.0
+        self._elastic[:] = springs.two_mass
+        self._sprung[:] = springs.stiffness > 0.0
         table[row.SPRING], table[row.DAMPER] = (
             np.where(self._elastic, values, 0.0) for values in (springs.stiffness, springs.damping)
         )
@@ -74,7 +77,7 @@ class TwoMassImpedance(ImplicitImpedance):
     @property
     def motor_side(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Which DoFs have two masses, position and velocity of their motors, and the compliance of other springs."""
-        return self._elastic, self.motor_position, self.motor_velocity, self._table[self._kernel.COMPLIANCE]
+        return self._elastic, self.motor_position, self.motor_velocity, self.table[self._kernel.COMPLIANCE]
 
     def place(self, q: np.ndarray) -> None:
         """Put the motors where the joints are, at rest; q has the shape (size,)."""
@@ -90,16 +93,7 @@ class TwoMassImpedance(ImplicitImpedance):
             v: Velocity of the links, shape (size,).
             dt: Duration of the step, that of all steps [s].
         """
-        table = self._table
-        elastic = self._elastic
-        inertia = self._dynamics.inertia(q)
-        self._kernel.feel(table, inertia, v, dt)
-        self._kernel.stretch(table, elastic, q, v)
-        self._kernel.pull(table, self.motor_position, self.motor_velocity, dt)
-        self._kernel.soften(table, elastic, dt)
-        if self._solve(inertia):  # then some drives do not follow their law, and all is different
-            self._solve(inertia)
-        self._kernel.release(table, elastic, dt)
+        self._kernel.update_two_mass(self._block.address, self._dynamics.inertia(q), q, v, dt)
         return self.torque
 
     def _coupled(self, inertia: np.ndarray) -> np.ndarray:
@@ -107,26 +101,9 @@ class TwoMassImpedance(ImplicitImpedance):
         elastic = self._elastic
         dt = self._dt
         row = self._kernel
-        spring, damper = (self._table[each, elastic] for each in (row.SPRING, row.DAMPER))
+        spring, damper = (self.table[each, elastic] for each in (row.SPRING, row.DAMPER))
         alone = mobility_of(inertia, self.springs.rotor, elastic).diagonal()
         damped = dt * damper * alone
         gamma = np.maximum(0.5, 1.0 - np.divide(1.0, damped, out=np.full(len(damped), np.inf), where=damped > 0.0))
         beta = 1.0 / 12.0  # periods are right to the fourth order of the step
         return beta * dt**2 * spring + gamma * dt * damper
-
-    def _solve(self, inertia: np.ndarray) -> bool:
-        """Write accelerations and torques of the drives, for the law p - l alpha of force p and loss l.
-
-        With the spring's gain c and m = B + dt d + l a motor has alpha = (p - d theta' - tension + c a) / (m + c). What
-        remains is (M + W) a = tension + c / (m + c) (p - d theta' - tension) + f with W = c m / (m + c). Without two
-        masses W is m, and p - d q' acts on the link.
-
-        Returns:
-            Whether drives behind a spring reach their limits; they are constant from now on.
-        """
-        table = self._table
-        elastic = self._elastic
-        self._kernel.balance(table, elastic)
-        self._kernel.move(table, elastic, self._accelerations(inertia))
-        self._kernel.limit(table, self.motor_velocity)
-        return self._kernel.clip(table, self._sprung)

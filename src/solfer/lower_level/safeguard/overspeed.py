@@ -21,6 +21,9 @@ class Overspeed:
     """
 
     def __init__(self, kinematics: Kinematics, factor: float, time: float):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import inside
+
         self.reason = ""
         self._factor = factor
         self._time = time
@@ -32,8 +35,10 @@ class Overspeed:
         ]
         limit = kinematics.velocity_limit
         self._limit = np.where(limit > 0.0, limit, np.inf)  # also that of a floating base
-        self._bound = factor * self._limit if factor > 0.0 else np.full_like(limit, np.inf)
-        self._enabled = bool(np.isfinite(self._bound).any())
+        bound = factor * self._limit if factor > 0.0 else np.full_like(limit, np.inf)
+        self._bounds = -bound, bound
+        self._enabled = bool(np.isfinite(bound).any())
+        self._inside = inside
         self._speed, self._age, self._change = (np.zeros_like(limit) for _ in range(3))
         self._beyond = np.zeros(limit.shape, dtype=bool)
         self._counts = False
@@ -58,13 +63,13 @@ class Overspeed:
         """
         if not self._enabled:
             return False
+        if not self._counts and not self.reason and self._inside(v, *self._bounds):
+            return False
         np.absolute(v, out=self._speed)
         if self.reason:
             self._settle(dt, stay)
             return False
-        np.greater(self._speed, self._bound, out=self._beyond)
-        if not self._counts and not self._beyond.any():
-            return False
+        np.greater(self._speed, self._bounds[1], out=self._beyond)
         return self._count(dt)
 
     def _count(self, dt: float) -> bool:

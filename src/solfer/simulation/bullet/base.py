@@ -6,7 +6,6 @@ import numpy as np
 
 from solfer.numerics.rotations import quaternion_product, rotated
 from solfer.simulation.bullet.client import BulletClient
-from solfer.simulation.physics import BaseState
 
 
 class BulletBase:
@@ -33,17 +32,23 @@ class BulletBase:
         self._bullet.resetBasePositionAndOrientation(self._body, com, quaternion_product(orientation, rotation))
         self._bullet.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3)
 
-    def state(self) -> BaseState:
-        """See `RobotInEngine.base_state`."""
+    def read(self, motion: np.ndarray) -> None:
+        """See `RobotInEngine.read_base`."""
         com, orientation = self._bullet.getBasePositionAndOrientation(self._body)
         (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self._body)
         x, y, z = rotated(self._from_com, orientation)  # from the centre of mass to the origin
         cx = -x
         cy = -y
         cz = -z
-        return BaseState(
-            (com[0] + x, com[1] + y, com[2] + z),
-            quaternion_product(orientation, self._rotation_from_com),
-            (vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)),
-            angular=(wx, wy, wz),
+        motion[:] = (
+            *quaternion_product(orientation, self._rotation_from_com),
+            com[0] + x,
+            com[1] + y,
+            com[2] + z,
+            vx - (wy * cz - wz * cy),
+            vy - (wz * cx - wx * cz),
+            vz - (wx * cy - wy * cx),
+            wx,
+            wy,
+            wz,
         )

@@ -16,12 +16,10 @@ from solfer.simulation.loading.friction import coefficients
 from solfer.simulation.loading.meshes import MeshReader
 from solfer.simulation.physics import (
     STEP,
-    BaseState,
     ClosestPoint,
     ContactPoint,
     JointGroup,
     RobotInEngine,
-    SimulatedJoints,
     Vector,
 )
 from solfer.simulation.world.records import Friction
@@ -49,7 +47,7 @@ class BulletJoints(JointGroup):
         """See `JointGroup.apply_torques`."""
         self._set(self._body, self._indices, self._torque_control, forces=torques.tolist())
 
-    def hold_speeds(self, speeds: np.ndarray, efforts: Sequence[float]) -> None:
+    def hold_speeds(self, speeds: np.ndarray, efforts: tuple[float, ...]) -> None:
         """See `JointGroup.hold_speeds`."""
         self._set(self._body, self._indices, self._velocity_control, targetVelocities=speeds.tolist(), forces=efforts)
 
@@ -92,15 +90,16 @@ class BulletRobot(RobotInEngine):
         self._set_dynamics(friction, urdf.owner)
         self._base = BulletBase(client, self.number)
 
-    def joint_states(self) -> SimulatedJoints:
-        """See `RobotInEngine.joint_states`."""
+    def read_joints(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray | None = None) -> None:
+        """See `RobotInEngine.read_joints`."""
         states = self._bullet.getJointStates(self.number, self._indices)
-        position, velocity, _, effort = zip(*states, strict=True)
-        return SimulatedJoints(position, velocity, effort)
+        position[:], velocity[:], _, efforts = zip(*states, strict=True)
+        if effort is not None:
+            effort[:] = efforts
 
-    def base_state(self) -> BaseState:
-        """See `RobotInEngine.base_state`."""
-        return self._base.state()
+    def read_base(self, motion: np.ndarray) -> None:
+        """See `RobotInEngine.read_base`."""
+        self._base.read(motion)
 
     def place_joints(self, positions: Sequence[float] | np.ndarray) -> None:
         """See `RobotInEngine.place_joints`."""

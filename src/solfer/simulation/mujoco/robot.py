@@ -11,7 +11,7 @@ import numpy as np
 
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description
-from solfer.numerics.rotations import quaternion_from_rotation, rotated, rotation_onto
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_onto
 from solfer.simulation.loading.body_urdf import body_urdf
 from solfer.simulation.loading.friction import coefficients
 from solfer.simulation.loading.meshes import MeshReader
@@ -22,12 +22,10 @@ from solfer.simulation.mujoco.touching import BODY, LINK, ROBOT, Touching
 from solfer.simulation.mujoco.world import MujocoWorld, Push
 from solfer.simulation.physics import (
     STEP,
-    BaseState,
     ClosestPoint,
     ContactPoint,
     JointGroup,
     RobotInEngine,
-    SimulatedJoints,
 )
 from solfer.simulation.world.records import Friction
 
@@ -45,14 +43,20 @@ class MujocoJoints(JointGroup):
     def __init__(self, world: MujocoWorld, dofs: np.ndarray):
         self._world = world
         self._dofs = dofs
+        self._limited: tuple[object, object] = (None, None)
 
     def apply_torques(self, torques: np.ndarray) -> None:
         """See `JointGroup.apply_torques`."""
         self._world.data.qfrc_applied[self._dofs] = torques
 
-    def hold_speeds(self, speeds: np.ndarray, efforts: Sequence[float]) -> None:
+    def hold_speeds(self, speeds: np.ndarray, efforts: tuple[float, ...]) -> None:
         """See `JointGroup.hold_speeds`."""
-        self._world.motors.hold(self._dofs, speeds, efforts)
+        motors = self._world.motors
+        known, same = self._limited
+        if known is not motors or same is not efforts:
+            motors.limit(self._dofs, efforts)
+            self._limited = motors, efforts
+        motors.hold(self._dofs, speeds)
 
 
 class MujocoRobot(RobotInEngine):
@@ -82,6 +86,10 @@ class MujocoRobot(RobotInEngine):
         wheels: Mapping[str, TorusWheel],
         draws: bool,
     ):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.twist_transport import read_freedom
+
+        self._read_freedom = read_freedom
         self._world = world
         self.number = len(world.bodies)
         with tempfile.TemporaryDirectory() as folder:
@@ -107,25 +115,22 @@ class MujocoRobot(RobotInEngine):
         for link in self.links:
             world.set_friction(BODY + link, of_links[link])
 
-    def joint_states(self) -> SimulatedJoints:
-        """See `RobotInEngine.joint_states`."""
+    def read_joints(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray | None = None) -> None:
+        """See `RobotInEngine.read_joints`."""
         data = self._world.data
-        return SimulatedJoints(
-            tuple(data.qpos[self._positions].tolist()),
-            tuple(data.qvel[self._dofs].tolist()),
-            tuple(self._world.motors.effort[self._dofs].tolist()),
-        )
+        data.qpos.take(self._positions, out=position, mode="clip")
+        data.qvel.take(self._dofs, out=velocity, mode="clip")
+        if effort is not None:
+            self._world.motors.effort.take(self._dofs, out=effort, mode="clip")
 
-    def base_state(self) -> BaseState:
-        """See `RobotInEngine.base_state`."""
+    def read_base(self, motion: np.ndarray) -> None:
+        """See `RobotInEngine.read_base`."""
         data = self._world.data
         if self._floating is None:
-            return BaseState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), angular=(0.0, 0.0, 0.0))
-        place, dof = self._floating
-        x, y, z, w, i, j, k = data.qpos[place : place + 7].tolist()
-        vx, vy, vz, *turn = data.qvel[dof : dof + 6].tolist()
-        angular = rotated(turn, (i, j, k, w))  # MuJoCo's has the axes of the body
-        return BaseState((x, y, z), (i, j, k, w), (vx, vy, vz), angular=angular)
+            motion[:] = 0.0
+            motion[3] = 1.0
+        else:
+            self._read_freedom(data.qpos, data.qvel, *self._floating, motion)
 
     def place_joints(self, positions: Sequence[float] | np.ndarray) -> None:
         """See `RobotInEngine.place_joints`."""

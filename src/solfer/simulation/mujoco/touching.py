@@ -45,6 +45,9 @@ class Frictions:
     Args:
         mujoco: The module.
         model: The model.
+
+    Attributes:
+        are_mixed: Whether a part of the world has another coefficient than 1.
     """
 
     def __init__(self, mujoco: Any, model: Any):
@@ -56,7 +59,7 @@ class Frictions:
         )
         self._model = model
         self._coefficients = np.ones(model.ngeom)
-        self._is_mixed = False
+        self.are_mixed = False
 
     def set(self, body: str, coefficient: float) -> None:
         """Change the coefficient of a body."""
@@ -64,12 +67,12 @@ class Frictions:
         shapes = model.geom_bodyid == model.body(body).id
         self._coefficients[shapes] = model.geom_friction[shapes, 0] = coefficient
         of_world = model.geom_contype == Touching.WORLD
-        self._is_mixed = bool(np.any(self._coefficients[of_world] != 1.0))
+        self.are_mixed = bool(np.any(self._coefficients[of_world] != 1.0))
 
     def mix(self, data: Any) -> None:
         """Correct the constraints of a step, after these are made."""
         contact = data.contact
-        if not self._is_mixed or not len(contact.geom):
+        if not len(contact.geom):
             return
         lowest = 1e-5  # MuJoCo takes nothing smaller
         product = np.maximum(self._coefficients[contact.geom].prod(axis=1), lowest)

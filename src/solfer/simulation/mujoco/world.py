@@ -48,6 +48,7 @@ class MujocoWorld:
 
     def __init__(self) -> None:
         self.mujoco: Any = load_mujoco()
+        self._mj_step = self.mujoco.mj_step
         self.spec = self.mujoco.MjSpec()
         option = self.spec.option
         option.timestep = STEP
@@ -65,19 +66,22 @@ class MujocoWorld:
     @property
     def model(self) -> Any:
         """The compiled model."""
-        self.compile()
+        if self._is_stale:
+            self.compile()
         return self._model
 
     @property
     def data(self) -> Any:
         """The state of the model."""
-        self.compile()
+        if self._is_stale:
+            self.compile()
         return self._data
 
     @property
     def motors(self) -> Motors:
         """The motors of all DoFs."""
-        self.compile()
+        if self._is_stale:
+            self.compile()
         return self._motors
 
     def change(self) -> None:
@@ -99,7 +103,7 @@ class MujocoWorld:
             self._model, self._data = self.spec.recompile(self._model, self._data)
         self._is_stale = False
         self._probe = self.mujoco.MjData(self._model)
-        self._motors = Motors(self._model)
+        self._motors = Motors(self._model, self._data)
         self._frictions = Frictions(self.mujoco, self._model)
         for body, coefficient in self._friction.items():
             self._frictions.set(body, coefficient)
@@ -129,22 +133,32 @@ class MujocoWorld:
 
     def step(self) -> None:
         """Advance by STEP."""
-        model = self.model
+        data = self.data
+        if self._pushes or self._motors.turn or self._frictions.are_mixed:
+            self._step_in_two()
+        else:
+            self._mj_step(self._model, data)
+        self._motors.age()
+        data.qfrc_applied[:] = 0.0
+        self._contacts = None
+
+    def _step_in_two(self) -> None:
+        """Make a step, and change its constraints and wrenches once MuJoCo knows where everything is."""
+        model = self._model
         data = self._data
         self.mujoco.mj_step1(model, data)
-        self._frictions.mix(data)
-        self._motors.move(data)
+        if self._frictions.are_mixed:
+            self._frictions.mix(data)
+        if self._motors.turn:
+            self._motors.move()
         wrench = data.xfrc_applied
         for body, force, torque, position in self._pushes:
             wrench[body, :3] += force
             wrench[body, 3:] += torque + np.cross(position - data.xipos[body], force)
         self.mujoco.mj_step2(model, data)
-        self._motors.read(data)
-        data.qfrc_applied[:] = 0.0
         if self._pushes:
             wrench[:] = 0.0
             self._pushes.clear()
-        self._contacts = None
 
     def contacts(self) -> list[ContactPoint]:
         """List where the world pushed robots in the newest step."""

@@ -24,7 +24,7 @@ class FloatingBase:
     def __init__(self, robot: RobotInEngine, chart: BaseChart | None):
         self._robot = robot
         self.floats = chart is not None
-        motion = np.zeros(13)
+        motion = self._motion = np.zeros(13)
         self.orientation, self.position, self.linear, self.angular = np.split(motion, (4, 7, 10))
         self.orientation[3] = 1.0
         if chart is not None:
@@ -44,6 +44,5 @@ class FloatingBase:
         """Read the base, and write its positions and velocities, the first six; no effect if it does not move."""
         if not self.floats:
             return
-        self.position[:], self.orientation[:], self.linear[:], self.angular[:] = self._robot.base_state()
-        self._in_chart.update(self._whole)
-        q[:6], v[:6] = self._in_chart.base, self._in_chart.rates
+        self._robot.read_base(self._motion)
+        self._in_chart.write(self._whole, q, v)

@@ -67,6 +67,7 @@ class Body:
         of_joints = self._set_losses(description, lossless, kinematics)
         self._motors = BodyMotors(self.robot, len(self.joints), kinematics, motors=motors, friction=of_joints)
         self._followers = Followers(self.joints, description.mimics)
+        self._follows = bool(self._followers)
         self._set_gears()
         self._base = base = FloatingBase(self.robot, kinematics.base)
         self.floating = base.floats
@@ -121,11 +122,13 @@ class Body:
 
     def read(self, q: np.ndarray, v: np.ndarray, motor_torque: np.ndarray) -> None:
         """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
-        q[self._first :], v[self._first :], torques = self.robot.joint_states()
-        if self._followers:
-            self._follow(q[self._first :], v[self._first :])
+        position = q[self._first :]
+        velocity = v[self._first :]
+        self.robot.read_joints(position, velocity, self._motors.measured)
+        if self._follows:
+            self._follow(position, velocity)
         if self._motors.rows:
-            self._motors.read(torques, motor_torque)
+            self._motors.read(motor_torque)
         self._base.read(q, v)
 
     def apply(self, torque: np.ndarray, speed: np.ndarray) -> None:

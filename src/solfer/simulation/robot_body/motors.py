@@ -29,6 +29,8 @@ class BodyMotors:
     Attributes:
         rows: Joints whose motors hold a speed.
         states: What the drives of all joints do.
+        measured: To be written: efforts of the motors of all joints, shape (count,) [Nm, N]; None: no motor holds a
+            speed.
     """
 
     def __init__(
@@ -44,10 +46,11 @@ class BodyMotors:
         self._count = count
         self._first = kinematics.size - count
         self.rows = [int(dof) - self._first for dof in motors]
+        self.measured = np.zeros(count) if self.rows else None
         self._drive_torques([row for row in range(count) if row not in self.rows])
         self._motors = robot.group(self.rows)
-        self._limits = np.minimum(kinematics.effort_limit[motors], 1e6).tolist()  # motors may have no limit
-        self._efforts = self._limits.copy()
+        self._limits = tuple(np.minimum(kinematics.effort_limit[motors], 1e6).tolist())  # motors may have no limit
+        self._efforts = self._limits
         self.states: list[DriveState] = ["sound"] * count
         self._stuck: list[int] = []
         self._free: list[int] = []
@@ -65,9 +68,10 @@ class BodyMotors:
                 speed[self._stuck] = 0.0
             self._motors.hold_speeds(speed, self._efforts)
 
-    def read(self, efforts: Sequence[float], out: np.ndarray) -> None:
-        """Write the efforts of the motors that hold a speed, of those of all joints [Nm, N]."""
-        out[:] = [efforts[row] for row in self.rows]
+    def read(self, out: np.ndarray) -> None:
+        """Write the efforts of the motors that hold a speed, of those `measured` [Nm, N]."""
+        assert self.measured is not None
+        self.measured.take(self.rows, out=out, mode="clip")
         if self._free:
             out[self._free] = 0.0  # an engine may have that of the last step with a motor
 
@@ -76,10 +80,11 @@ class BodyMotors:
         self.states[row] = state
         if row not in self.rows:
             effort = BRAKE if state == "stuck" else self._friction[row]
-            self._robot.group([row]).hold_speeds(np.zeros(1), [effort])
+            self._robot.group([row]).hold_speeds(np.zeros(1), (effort,))
             return
         motor = self.rows.index(row)
-        self._efforts[motor] = {"sound": self._limits[motor], "free": 0.0, "stuck": BRAKE}[state]
+        effort = {"sound": self._limits[motor], "free": 0.0, "stuck": BRAKE}[state]
+        self._efforts = (*self._efforts[:motor], effort, *self._efforts[motor + 1 :])
         self._stuck = [number for number, each in enumerate(self.rows) if self.states[each] == "stuck"]
         self._free = [number for number, each in enumerate(self.rows) if self.states[each] == "free"]
 

@@ -24,6 +24,9 @@ class Publication:
         writers: One for each message.
         sensor: Measures.
         delay: Steps from a measurement to its messages.
+
+    Attributes:
+        next: Number of steps after which it has something to do.
     """
 
     def __init__(self, steps: int, writers: Sequence[Writer], sensor: Sensor, delay: int = 0):
@@ -32,6 +35,7 @@ class Publication:
         self._sensor = sensor
         self._delay = delay
         self._newest: Sequence[Message] = ()
+        self.next = 0.0
         self._forget()
 
     def step(self, done: int) -> None:
@@ -44,6 +48,7 @@ class Publication:
             self._line.put(done, self._newest)
         for messages in self._line.due(done):
             self._write(messages)
+        self.next = min(done - done % self._steps + self._steps, self._line.next)
 
     def repeat(self) -> None:
         """Write the newest measurement at once: simulated time stands still, and no noise goes by."""

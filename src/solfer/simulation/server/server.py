@@ -156,7 +156,8 @@ class SimulationServer:
             self.middleware.publish_time(self.simulation.time)
             done = self.simulation.count
             for publication in self._publications:
-                publication.step(done)
+                if publication.next <= done:
+                    publication.step(done)
             if done % self._health == 0:
                 self._report()
             self._followers.follow(self.simulation.time, self.inbox.apply)

@@ -66,19 +66,23 @@ class ContactSensors(Sensor):
         for link, owner, world, local in zip(self._links, self._owners, self._world, self._local, strict=True):
             world.stamp = local.stamp = time
             x, y, z = before.position(link).tolist()
-            force = np.zeros(3)
-            torque = np.zeros(3)
+            force_x = force_y = force_z = 0.0
+            torque_x = torque_y = torque_z = 0.0
             for point in points:
                 if point.link == owner:
                     (px, py, pz), (fx, fy, fz) = point.position, point.force
                     rx = px - x
                     ry = py - y
                     rz = pz - z
-                    force += fx, fy, fz
-                    torque += ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
+                    force_x += fx
+                    force_y += fy
+                    force_z += fz
+                    torque_x += ry * fz - rz * fy
+                    torque_y += rz * fx - rx * fz
+                    torque_z += rx * fy - ry * fx
             rotation = before.rotation(link)
-            world.force[:] = force
-            world.torque[:] = torque
-            local.force[:], local.torque[:] = force @ rotation, torque @ rotation
+            world.force[:], world.torque[:] = (force_x, force_y, force_z), (torque_x, torque_y, torque_z)
+            np.matmul(world.force, rotation, out=local.force)
+            np.matmul(world.torque, rotation, out=local.torque)
             published += (world, local)
         return published

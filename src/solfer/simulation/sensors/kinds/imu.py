@@ -118,6 +118,7 @@ class Imu(SingleSensor):
         position = record.offset_position
         orientation = record.offset_orientation
         self._position = np.zeros(3) if position is None else position.vector()
+        self._is_away = bool(self._position.any())
         self._rotation = np.eye(3) if orientation is None else orientation.matrix()
         self._deviations = record.noise
         self._angular_bias = np.array(record.bias.angular)
@@ -193,7 +194,8 @@ class Imu(SingleSensor):
     def _velocity(self, moment: Moment) -> np.ndarray:
         """Compute the velocity of the sensor and its angular velocity in world axes, shape (6,)."""
         velocity = moment.velocity(self._link)
-        velocity[:3] += cross(velocity[3:], moment.rotation(self._link) @ self._position)
+        if self._is_away:
+            velocity[:3] += cross(velocity[3:], moment.rotation(self._link) @ self._position)
         return velocity
 
     def _with_noise(self, rotation: np.ndarray) -> np.ndarray:
