@@ -202,7 +202,7 @@ def test_warnings_name_what_the_urdf_lacks(made, caplog):
     expected = (
         "MJCF has no velocity limits, so that 10 rad/s or 1 m/s counts until you correct them: left_hip_roll, left_",
         "no effort limit, so that 100 Nm or N counts until you correct it: left_hip_roll, right_slide, joint_6, finger",
-        "with `reflect_inertia: true`: left_hip_roll 0.02, left_hip_pitch 0.02, left_knee 0.02, right_hip 0.02, right_slide",
+        "with `reflect_inertia: true`: left_hip_roll 0.02, left_hip_pitch 0.02, left_knee 0.02, right_hip 0.02, right_",
         "a world of solfer has grounds and boxes: table, geom floor",
     )
     messages = [record.getMessage() for record in caplog.get_records("setup")]

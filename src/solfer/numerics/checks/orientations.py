@@ -188,7 +188,8 @@ def _compare_rotations(values, last, own_axes, passed, rate, before):
     if contradicts:
         return 2, math.sqrt(rotated)
     # what rotates covers the angle of its rates; an orientation that shakes may cover more
-    return (7, before[COVERED + 1] / before[COVERED]) if before[COVERED + 1] > 0.008 + 2.0 * before[COVERED] else (0, 0.0)
+    is_apart = before[COVERED + 1] > 0.008 + 2.0 * before[COVERED]
+    return (4, before[COVERED + 1] / SHORT) if is_apart else (0, 0.0)
 
 
 @part
@@ -242,7 +243,6 @@ def _check_rotation(values, own_axes, force, arrival, stamp, before):
         1 and an angle: the tilt has leapt by it. 2: it rotates by this angle, and otherwise by its rates. 3: the
         specific force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow.
         0: none. 5: the mean specific force is so large [m/s^2], which refutes nothing. 6: others distrust the link.
-        7: rates are so many times what the orientation rotates by.
     """
     fault, size = _find_fault(values, own_axes, force, arrival, stamp, before)
     if fault == 0 or fault == 5:
