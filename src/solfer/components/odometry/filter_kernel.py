@@ -222,6 +222,7 @@ GROUND = BlockLayout(
     slope=(float, 2),
     rise=(float, "count"),  # of each wheel above the others
     lifted=(bool, "count"),
+    rolled=(float, "count"),  # how far each that is lifted has rolled as the others do [m]
     # slopes in the world that driving explains, how far those of the plane are from them, and the time since then
     followed=(float, 2),
     apart=(float, 1),
@@ -442,6 +443,7 @@ def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
 
     A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
     smaller one counts. How high a wheel is that was lifted is known by its place: no sum of ways would stay right.
+    One that rolls as the others do has come to stand on something higher, and counts again.
     """
     motion = _motion_at(start)
     ground = _ground_at(ground_start)
@@ -455,13 +457,18 @@ def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
     x = normal[0]
     y = normal[1]
     z = normal[2]
-    total = mean_tilting = mean_displacement = 0.0
+    total = mean_tilting = mean_displacement = along = across = 0.0
     for i in range(motion.count):
         total += trusted[i]
+        along += trusted[i] * (displacements[i, 0] + yaw * arms[i, 1])
+        across += trusted[i] * (displacements[i, 1] - yaw * arms[i, 0])
         mean_tilting += trusted[i] * along_normal_by_tilting(arms, i, px, py, x, y, z)
         mean_displacement += trusted[i] * along_normal(displacements, arms, i, yaw, x, y, z)
     mean_tilting /= total
     mean_displacement /= total
+    along /= total
+    across /= total
+    way = math.sqrt(along * along + across * across)
     for i in range(motion.count):
         # a wheel that goes up measures that the base goes down
         up = mean_displacement - along_normal(displacements, arms, i, yaw, x, y, z)
@@ -472,7 +479,16 @@ def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
             above = height_above_others(motion.weights, arms, normal, i, ground.slope)
             lifted[i] = above > (0.5 * clearance if lifted[i] else clearance)
             rise[i] = above if lifted[i] else min(rise[i], clearance)
+        if lifted[i]:
+            u = displacements[i, 0] + yaw * arms[i, 1] - along
+            v = displacements[i, 1] - yaw * arms[i, 0] - across
+            rolls = u * u + v * v < 0.01 * way * way  # within a tenth
+            ground.rolled[i] = max(0.0, ground.rolled[i] + (way if rolls else -3.0 * way))
+            if ground.rolled[i] > 0.03:  # [m]
+                lifted[i] = False
+                rise[i] = 0.0
         if not lifted[i]:
+            ground.rolled[i] = 0.0
             rise[i] *= forget
 
 

@@ -47,6 +47,7 @@ class GroundPlane:
             slope=self.slope,
             rise=self.rise,
             lifted=self.lifted,
+            rolled=np.zeros(count),
             followed=np.zeros(2),
             apart=self.apart,
             since=self._since,

@@ -23,6 +23,7 @@ HEIGHTS = BlockLayout(
     followed=(int, "count", 2),  # track and sample that a wheel follows; -1: none
     leading=(float, "count"),
     places=(float, "count", 3),
+    stood=(float, "count", 4),  # where each wheel has come to rest, and in which cycle
 )
 """What the kernels read and write."""
 
@@ -94,6 +95,20 @@ def leads(arm, x, y, velocity, yaw_rate, before):
     return before
 
 
+@part
+def height_at_rest(stood, wheel, place, cycle):
+    """Return the height at which a wheel has come to rest [m]; NaN: it has not, or is lifted from there."""
+    distance = 0.001  # [m] within which a wheel rests
+    cycles = 250  # in which it has come to rest: half a second of an IMU at 500 Hz
+    off_x = place[0] - stood[wheel, 0]
+    off_y = place[1] - stood[wheel, 1]
+    if not off_x * off_x + off_y * off_y < distance * distance:
+        stood[wheel, :3] = place
+        stood[wheel, 3] = cycle
+    rests = cycle - stood[wheel, 3] > cycles and abs(place[2] - stood[wheel, 2]) <= FLOOR_TOLERANCE
+    return stood[wheel, 2] if rests else math.nan
+
+
 def _missing_height(start, arms, normal, position, heading, weights, velocity, yaw_rate):
     """Write the lowest points of the wheels as `places`; return how far the base is below the map [m], NaN: unknown."""
     heights = _heights_at(start)
@@ -127,7 +142,9 @@ def _missing_height(start, arms, normal, position, heading, weights, velocity, y
         places[i, 2] = position[2] + arms[i, 2] + radii[i] * (normal[2] - 1.0)
         if weights[i] <= 0.0:
             followed[i, 0] = -1
+            heights.stood[i, 0] = math.nan
             continue
+        rest = height_at_rest(heights.stood, i, places[i], heights.cycle[0])
         leading[i] = leads(arms[i], arms[i, 0] - x0, arms[i, 1] - y0, velocity, yaw_rate, leading[i])
         if followed[i, 0] < 0 and heights.cycle[0] % count == i:
             find_track(heights.tracks, heights.heads, i, places[i, 0], places[i, 1], followed)
@@ -136,11 +153,14 @@ def _missing_height(start, arms, normal, position, heading, weights, velocity, y
         if followed[i, 0] >= 0:
             height = height_on_track(heights.tracks, heights.heads, i, places[i, 0], places[i, 1], slope, followed)
         if math.isnan(height):
-            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > FLOOR_TOLERANCE:
+            if abs(places[i, 2] - floor[0]) <= FLOOR_TOLERANCE:
+                height = floor[0]
+                # one that leads may be where the floor ends: it weighs a hundredth of one that follows a track
+                weight = 0.01 + (0.5 - 0.5 * leading[i]) ** 2
+            elif not math.isnan(rest):
+                height = rest
+            else:
                 continue
-            height = floor[0]
-            # one that leads may be where the floor ends: it weighs a hundredth of one that follows a track
-            weight = 0.01 + (0.5 - 0.5 * leading[i]) ** 2
         missing += weight * (height - places[i, 2])
         total_weight += weight
     return missing / total_weight if total_weight > 0.0 else math.nan

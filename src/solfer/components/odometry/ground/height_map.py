@@ -14,7 +14,8 @@ class HeightMap:
     A wheel that rolls where another one has been knows its height, and so that of the base: the wheels that lead find
     an edge between two slopes, and those behind carry the base over it. On a floor all wheels are equally high. A wheel
     that leads may be where the floor ends: the more it does the less it counts, and not at all where it is further than
-    8 mm from the floor.
+    8 mm from the floor. Elsewhere a wheel that has come to rest stays as high as it is: so a base on a step keeps its
+    height while a wheel is lifted.
 
     Args:
         radii: Radii of the wheels, shape (k,) [m].
@@ -31,6 +32,7 @@ class HeightMap:
         self._heads = np.zeros(count, dtype=np.int64)
         self._followed = np.zeros((count, 2), dtype=np.int64)
         self._leading = np.zeros(count)
+        self._stood = np.full((count, 4), math.nan)
         self._floor = np.array((math.nan, 0.0))
         self._block = MemoryBlock(
             kernel.HEIGHTS,
@@ -45,6 +47,7 @@ class HeightMap:
             followed=self._followed,
             leading=self._leading,
             places=np.zeros((count, 3)),
+            stood=self._stood,
         )
         self.level = False
 
@@ -58,6 +61,7 @@ class HeightMap:
         self.forget()
         self._floor[:] = floor, 0.0
         self._leading[:] = 0.0
+        self._stood[:] = math.nan
         self._cycle[:] = 0
         self.level = not math.isnan(floor)
 

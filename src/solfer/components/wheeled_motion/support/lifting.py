@@ -265,7 +265,8 @@ class Lifting:
         is_high = vertex[2] > step.start[2] + 0.02  # [m]: there the ground that it left does not push it
         stays = float(np.linalg.norm(self._wheels.offsets.errors[index]))
         pushed = is_high and forces[index] > 0.15 * float(forces.mean())
-        if not step.failure and (pushed or stays > 0.02):  # [m]
+        # a wheel that leaves the ground springs back, as the load of its leg goes
+        if not step.failure and (pushed or stays > (0.02 if is_high else 0.04)):  # [m]
             self._turn_back(step, "something is in its way")
         velocity = references.vertex_velocity[index]
         # the base moves below the centre of mass, and is where vertices are seen from
