@@ -32,9 +32,11 @@ class CrossingLimits:
         landing: Distance from it behind [m].
         near: Least distance of other wheels from an obstacle [m].
         front: How far front wheels may be ahead of where they were at the beginning, as seen from the base [m].
+        front_down: The same of those that step down: legs of a robot that stands higher do not reach as far [m].
         rear: The same of rear wheels [m].
+        wheel: Radius of a wheel [m].
         beside: How far the wheel beside one that steps may be from where it was at the beginning [m].
-        across: The same of wheels at the other end of the robot [m].
+        across: Range in which wheels at the other end of the robot are then [m].
         clearance: Height of a wheel above an obstacle [m].
         width: Half of the width of a track [m].
         yaw: Largest angle between heading and way [rad].
@@ -47,9 +49,11 @@ class CrossingLimits:
     landing: float = 0.09
     near: float = 0.1
     front: tuple[float, float] = (-0.2, 0.03)
+    front_down: tuple[float, float] = (-0.28, -0.05)
     rear: tuple[float, float] = (-0.03, 0.2)
+    wheel: float = 0.08
     beside: float = 0.05
-    across: float = 0.12
+    across: tuple[float, float] = (-0.2, 0.12)
     clearance: float = 0.02
     width: float = 0.03
     yaw: float = 0.56
@@ -138,7 +142,7 @@ class _Track:
     Attributes:
         index, name: As above.
         nominal: Where the wheel begins [m].
-        range: Range of its offsets [m].
+        is_front: As above.
         behind: How far back it may roll [m].
         next: The next obstacle; None: there is none.
     """
@@ -157,7 +161,7 @@ class _Track:
         self.index = index
         self.name = name
         self.nominal, self._left = wheel
-        self.range = limits.front if is_front else limits.rear
+        self.is_front = is_front
         self._begin = begin
         self._direction = direction
         self._limits = limits
@@ -175,8 +179,6 @@ class _Track:
         for begin, end in _merged(_rough(np.array(sides), limits.rolled), round((limits.landing + limits.gap) / SPACING)):
             if places[end] < self.nominal:
                 continue
-            if places[begin] < self.nominal:
-                raise _Blocked(0.0, f"'{self.name}' stands on an edge", "wheels that stand on even ground")
             before, behind = np.clip(
                 (begin - round(limits.gap / SPACING), end + round(limits.landing / SPACING)), 0, len(places) - 1
             )
@@ -195,10 +197,18 @@ class _Track:
         (x, y), *_ = self._points(np.array([self.next.begin]), 0.0).tolist()
         return f"'{self.name}' at x {x:.2f}, y {y:.2f} m"
 
+    def range(self) -> tuple[float, float]:
+        """Return the range of its offsets before and behind its next obstacle [m]."""
+        assert self.next is not None
+        limits = self._limits
+        if not self.is_front:
+            return limits.rear
+        return limits.front_down if self.next.rise < 0.0 else limits.front
+
     def stand(self) -> float:
         """Return where the base is when the wheel steps over its next obstacle [m]."""
         assert self.next is not None
-        return self.next.end + self._limits.landing - self.nominal - self.range[1]
+        return self.next.end + self._limits.landing - self.nominal - self.range()[1]
 
     @property
     def furthest(self) -> float:
@@ -230,24 +240,43 @@ class CrossingPlanner:
         self._wheels = np.array(wheels, dtype=float)
         self._limits = limits
 
-    def plan(self, begin: tuple[float, float], goal: tuple[float, float]) -> Crossing:
-        """Plan the way of the base from one place to another, x and y [m], with the least turn of the base from it.
+    def plan(self, begin: tuple[float, float], goal: tuple[float, float], heading: float = 0.0) -> Crossing:
+        """Plan a way with the least angle between it and the base.
+
+        Args:
+            begin: Where the base is, x and y [m].
+            goal: Where it goes.
+            heading: Its heading [rad].
 
         Raises:
             ComponentError: The ground cannot be crossed; names the wheel and the place that ends the way which comes
                 farthest.
         """
+        direction = math.atan2(goal[1] - begin[1], goal[0] - begin[0])
         turn = 0.07  # [rad] between two headings that are tried
         angles = np.arange(turn, self._limits.yaw, turn)
         reason: _Blocked | None = None
         for yaw in (0.0, *np.column_stack((angles, -angles)).ravel().tolist()):
             try:
+                self._require_even(begin, heading, math.remainder(direction + yaw - heading, math.tau))
                 return Crossing(yaw, tuple(self._moves(begin, goal, yaw)))
             except _Blocked as error:
                 if reason is None or error.along > reason.along:
                     reason = error
         assert reason is not None
         raise reason
+
+    def _require_even(self, begin: tuple[float, float], heading: float, turn: float) -> None:
+        """Check that wheels stand on even ground, and roll on it while the base turns in place by an angle [rad]."""
+        sides = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+        around = self._limits.wheel * np.array([0.0 * sides, 0.5 * sides, sides])
+        for angle in np.linspace(0.0, turn, 2 + int(abs(turn) / 0.02)).tolist():
+            for name, wheel in zip(self._names, self._wheels.tolist(), strict=True):
+                place = np.add(begin, turned(heading + angle, *wheel))
+                heights = self._terrain.heights((place + around).reshape(-1, 2)).reshape(3, 4)
+                if not np.abs(np.diff(heights, axis=0)).max() <= self._limits.rolled:
+                    what = f"'{name}' stands on an edge" if angle == 0.0 else f"'{name}' comes to an edge as the base turns"
+                    raise _Blocked(-1.0, what, "wheels on even ground")
 
     def _moves(self, begin: tuple[float, float], goal: tuple[float, float], yaw: float) -> Iterator[Roll | StepOver]:
         """Plan the moves with a heading as seen from the way [rad]."""
@@ -290,7 +319,8 @@ class CrossingPlanner:
         obstacle = track.next
         assert obstacle is not None
         length = obstacle.end - obstacle.begin + limits.gap + limits.landing
-        longest = track.range[1] - track.range[0]
+        nearest, furthest = track.range()
+        longest = furthest - nearest
         if length > longest + 1e-6:
             raise _Blocked(base, f"{track.where()} has to step by {length:.2f} m", f"up to {longest:.2f} m")
         if not abs(obstacle.rise) <= limits.rise:
@@ -328,10 +358,11 @@ class CrossingPlanner:
         place = base + track.nominal
         offset = min(max(place, track.behind), track.furthest) - place
         if stepping is not None:
-            most = limits.beside if track.range == stepping.range else limits.across
-            if abs(offset) > most:
+            is_beside = track.is_front == stepping.is_front
+            least, most = (-limits.beside, limits.beside) if is_beside else limits.across
+            if not least <= offset <= most:
                 what = f"'{track.name}' stands {offset:.2f} m from its place while {stepping.where()} steps"
-                raise _Blocked(base, what, f"{most:.2f} m at most")
+                raise _Blocked(base, what, f"{least:.2f} to {most:.2f} m")
         return offset
 
 

@@ -81,6 +81,9 @@ class CrossingCourse(Course):
         odometry: Topic of the odometry.
         ground: Topic of the felt ground.
         limits: What wheels can do.
+
+    Attributes:
+        heading: Heading of the base on its way [rad].
     """
 
     has_dialogue = True
@@ -112,7 +115,7 @@ class CrossingCourse(Course):
         self._moves: tuple[Roll | StepOver, ...] = ()
         self._begin = np.zeros(2)
         self._ahead = np.zeros(2)
-        self._heading = 0.0
+        self.heading = 0.0
         self._offsets = np.zeros(0)
         self._vertices: np.ndarray | None = None
         self._index = -1
@@ -191,6 +194,11 @@ class CrossingCourse(Course):
         way = math.dist((self._pose.x, self._pose.y), (self._goal.x, self._goal.y))
         return 15.0 * steps + way / SPEED
 
+    @property
+    def steps(self) -> int:
+        """How many steps were made."""
+        return sum(isinstance(each, StepOver) for each in self._moves[: max(self._index, 0)])
+
     def _plan(self) -> None:
         """Plan the way from where the robot stands.
 
@@ -213,15 +221,15 @@ class CrossingCourse(Course):
         planner = CrossingPlanner(self._terrain, felt.names, np.array(wheels), self._limits)
         begin = pose.x, pose.y
         goal = self._goal.x, self._goal.y
-        crossing = planner.plan(begin, goal)
+        crossing = planner.plan(begin, goal, pose.heading)
         direction = math.atan2(goal[1] - begin[1], goal[0] - begin[0])
         self._begin[:] = begin
         self._ahead[:] = turned(direction, 1.0, 0.0)
-        self._heading = direction + crossing.yaw
+        self.heading = direction + crossing.yaw
         self._offsets = np.zeros(len(wheels))
         self._moves = Roll(0.0, (0.0,) * len(wheels)), *crossing.moves
         self.count = len(self._moves)
-        logger.info("%d moves with a heading of %.2f rad", self.count, self._heading)
+        logger.info("%d moves with a heading of %.2f rad", self.count, self.heading)
         for number, move in enumerate(self._moves, 1):
             logger.info("%d: %s", number, self._describe(move))
 
@@ -275,7 +283,7 @@ class CrossingCourse(Course):
         """Begin to roll: the base to a place on the way [m], wheels to offsets, shape (n,) [m]."""
         assert self._vertices is not None
         x, y = (self._begin + along * self._ahead).tolist()
-        heading = self._pose.heading + math.remainder(self._heading - self._pose.heading, math.tau)
+        heading = self._pose.heading + math.remainder(self.heading - self._pose.heading, math.tau)
         ahead = seen_from(heading, *self._ahead.tolist())
         change = np.zeros_like(self._vertices)
         change[:, :2] = np.outer(offsets - self._offsets, ahead)
