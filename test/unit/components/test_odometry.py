@@ -136,6 +136,20 @@ def test_a_lifted_wheel_is_left_out(robot):
     assert not made.law.lifted.any() and robot.state.position[2] == pytest.approx(height, abs=0.005)
 
 
+@pytest.mark.parametrize("speed", [0.0, SPEED], ids=["hangs", "rolls"])
+def test_a_wheel_that_has_stepped_up_counts_again_as_it_rolls(robot, speed):
+    """One that hangs in the air does not roll as the base drives."""
+    made, knee = component(robot), robot.dof("knee_pitch_1")
+
+    def lift(_):
+        robot.state.position[knee] += 0.002
+
+    drive(made, 0.5, np.zeros(4), move=lift)
+    assert made.law.lifted[0]
+    drive(made, 0.25, np.array((speed, SPEED, SPEED, SPEED)))
+    assert made.law.lifted.tolist() == [speed == 0.0, False, False, False]
+
+
 def test_a_lifted_wheel_stays_lifted_while_swaying(robot):
     made, knee, phases = component(robot), robot.dof("knee_pitch_1"), ((1, -1), (-1, 0), (0, 1))
 

@@ -83,6 +83,20 @@ def test_a_wheel_that_is_lifted_leaves_no_track():
     assert heights._heads[2] == 0 and np.abs(errors).max() < 2e-3
 
 
+def test_a_wheel_that_leaves_the_floor_takes_no_base_on_a_step_along():
+    """Two wheels on a step have no floor and no track: they have come to rest."""
+    heights, position = HeightMap(np.full(4, RADIUS)), np.array((0.0, 0.0, HEIGHT))
+    heights.start(0.0)
+    for cycle in range(800):
+        lift = 1e-4 * max(0, min(cycle - 400, 300))
+        arms = np.column_stack((PLACES, np.array((0.1, 0.1, 0.0, lift)) - HEIGHT))
+        missing = heights.missing_height(arms, UP, position, 0.0, ALL, velocity=np.zeros(3), yaw_rate=0.0)
+        position[2] += missing
+        heights.note(missing, ALL)
+        assert abs(position[2] - HEIGHT) < 0.3 * FLOOR_TOLERANCE
+    assert position[2] == pytest.approx(HEIGHT, abs=1e-6)
+
+
 def test_tracks_are_forgotten_but_not_the_floor():
     _, heights = drive(lambda x: 0.0 * x, 2.0)
     heights.forget()
