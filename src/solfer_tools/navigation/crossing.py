@@ -176,7 +176,9 @@ class _Track:
         places = np.arange(first, self.nominal + length + 1.0, SPACING)
         sides = [terrain.heights(self._points(places, side)) for side in (0.0, limits.width, -limits.width)]
         obstacles = []
-        for begin, end in _merged(_rough(np.array(sides), limits.rolled), round((limits.landing + limits.gap) / SPACING)):
+        for begin, end in _merged(
+            _rough(np.array(sides), limits.rolled), round((limits.landing + limits.gap) / SPACING)
+        ):
             if places[end] < self.nominal:
                 continue
             before, behind = np.clip(
@@ -188,8 +190,10 @@ class _Track:
         self.next = next(self._obstacles, None)
 
     def _points(self, places: np.ndarray, side: float) -> np.ndarray:
-        x, y = turned(self._direction, places, np.full(len(places), self._left + side))
-        return np.column_stack((x, y)) + self._begin
+        """Return places in the world, some way to the left of the track [m], x and y, shape (n, 2)."""
+        seen = np.column_stack((places, np.full(len(places), self._left + side)))
+        cosine, sine = turned(self._direction, 1.0, 0.0)
+        return seen @ np.array(((cosine, sine), (-sine, cosine))) + self._begin
 
     def where(self) -> str:
         """Name the wheel and its next obstacle."""
@@ -275,7 +279,11 @@ class CrossingPlanner:
                 place = np.add(begin, turned(heading + angle, *wheel))
                 heights = self._terrain.heights((place + around).reshape(-1, 2)).reshape(3, 4)
                 if not np.abs(np.diff(heights, axis=0)).max() <= self._limits.rolled:
-                    what = f"'{name}' stands on an edge" if angle == 0.0 else f"'{name}' comes to an edge as the base turns"
+                    what = (
+                        f"'{name}' stands on an edge"
+                        if angle == 0.0
+                        else f"'{name}' comes to an edge as the base turns"
+                    )
                     raise _Blocked(-1.0, what, "wheels on even ground")
 
     def _moves(self, begin: tuple[float, float], goal: tuple[float, float], yaw: float) -> Iterator[Roll | StepOver]:
@@ -300,8 +308,9 @@ class CrossingPlanner:
             steps = [track for track in tracks if self._has_to_step(track, length)]
             stepping = min(steps, key=_Track.stand, default=None)
             base = length if stepping is None else stepping.stand()
-            for state in self._rolls(tracks, state, base, stepping):
-                yield state
+            rolls = list(self._rolls(tracks, state, base, stepping))
+            yield from rolls
+            state = rolls[-1] if rolls else state
             if stepping is None:
                 return
             step = stepping.step()

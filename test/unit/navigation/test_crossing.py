@@ -13,13 +13,13 @@ from solfer.interfaces.ground import GROUND, GroundEstimate
 from solfer.interfaces.support import LiftReply, StepContact
 from solfer.interfaces.task_references import GetReference, ReferenceReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.numerics.planar_move import about_z, seen_from, turned
+from solfer.numerics.planar_move import about_z, turned
 from solfer.simulation.world.records import WorldRecord
 from solfer.transport import BodyMessage, Inbox
 from solfer.transport.declared.fields import message_of
 from solfer.transport.endpoints import MessageStatus
 from solfer_tools.navigation import CrossingCourse, Navigation, Terrain, Waypoint
-from solfer_tools.navigation.crossing import CrossingLimits, CrossingPlanner, Roll, StepOver
+from solfer_tools.navigation.crossing import CrossingLimits, CrossingPlanner, Roll
 
 NAMES = ("front_left", "front_right", "rear_left", "rear_right")
 WHEELS = np.array([(0.546, 0.318), (0.546, -0.318), (-0.546, 0.318), (-0.546, -0.318)])
@@ -46,9 +46,7 @@ def test_heights_are_those_of_planes_boxes_stairs_and_grids():
     # the top of a box that is turned by -0.2 rad about y rises along x
     top = 0.1 / math.cos(0.2)
     assert_allclose(terrain(boxes={"a": tilted}).heights(places), (0.0, top, top, 0.0, 0.0), atol=1e-12)
-    assert_allclose(
-        terrain(boxes={"a": tilted}).heights(np.array([(1.2, 0.1)])), top + 0.2 * math.tan(0.2), atol=1e-12
-    )
+    assert_allclose(terrain(boxes={"a": tilted}).heights(np.array([(1.2, 0.1)])), top + 0.2 * math.tan(0.2), atol=1e-12)
     stairs = {"position": (0.5, 0.0), "count": 2, "rise": 0.1, "tread": 0.4, "width": 0.5}
     assert_allclose(terrain(stairs={"s": stairs}).heights(places), (0.0, 0.2, 0.0, 0.0, 0.0), atol=1e-12)
     grid = {"position": (1.0, 0.0, 0.5), "spacing": 1.0, "heights": ((0.0, 0.0), (0.2, 0.2))}
@@ -109,7 +107,10 @@ def test_ground_that_can_be_rolled_over_needs_no_step(parts):
             {"ground": {"exists": False}, "boxes": {"a": box(-1.0, 2.0, 0.1), "b": box(1.3, 4.0, 0.1)}},
             ("front", "x 1.0", "by 0.5", "0.23 m"),
         ),
-        ({"stairs": {"s": {"position": (1.2, 0.0), "count": 4, "rise": 0.1, "tread": 0.2, "width": 6.0}}}, ("front_left", "from its place while 'front_right'", "x 1.39")),
+        (
+            {"stairs": {"s": {"position": (1.2, 0.0), "count": 4, "rise": 0.1, "tread": 0.2, "width": 6.0}}},
+            ("front_left", "from its place while 'front_right'", "x 1.39"),
+        ),
         ({"boxes": {"a": box(0.5, 4.0, 0.1)}}, ("front_left", "on an edge")),
         ({"boxes": {"a": box(1.2, 0.5, 0.1, mass=1.0)}}, ("front_left", "x 1.20", "0.23 m")),
     ],
@@ -122,7 +123,7 @@ def test_ground_that_cannot_be_crossed_is_refused_with_wheel_and_place(parts, wo
 
 
 class SteppingRobot:
-    """A robot on a bus that rolls and steps as it is told, and whose wheels are not quite where they should be."""
+    """A robot on a bus that rolls and steps as is requested, and whose wheels are not quite where they should be."""
 
     def __init__(self, bus, ground, wrong=0.0):
         self._node, self._inbox = MemoryMiddleware(bus, "robot"), Inbox()
@@ -145,7 +146,9 @@ class SteppingRobot:
     def places(self):
         """Where the wheels are, shape (4, 2): 3 cm ahead of where the vertices say, as soon as the base moves [m]."""
         lead = np.array((min(0.03, abs(self.pose[0])), 0.0))
-        return np.array([turned(self.pose[2], *each) for each in (self.vertices[:, :2] + lead).tolist()]) + self.pose[:2]
+        return (
+            np.array([turned(self.pose[2], *each) for each in (self.vertices[:, :2] + lead).tolist()]) + self.pose[:2]
+        )
 
     def cycle(self):
         self._inbox.apply()
@@ -157,7 +160,9 @@ class SteppingRobot:
             self.vertices += np.clip(change, -2e-3, 2e-3)  # at 0.1 m/s
         if self.is_silent:
             return
-        self._odometry.write(BodyMessage("odom", "base", np.array((*self.pose[:2], 0.7)), np.array(about_z(self.pose[2]))))
+        self._odometry.write(
+            BodyMessage("odom", "base", np.array((*self.pose[:2], 0.7)), np.array(about_z(self.pose[2])))
+        )
         heights = self._ground.heights(self.places)
         heights[0] += self._wrong
         felt = tuple(Vector(x, y, z) for (x, y), z in zip(self.places.tolist(), heights.tolist(), strict=True))
@@ -179,7 +184,7 @@ class SteppingRobot:
 
 @pytest.fixture
 def begun():
-    """A robot before a platform of 10 cm, and its navigation."""
+    """Make a robot before a platform of 10 cm, and its navigation."""
 
     def begin(goal=3.0, wrong=0.0):
         bus, ground = Bus(), terrain(boxes={"a": box(1.2, 4.0, 0.1)})
@@ -201,11 +206,13 @@ def go(bus, navigation, until=math.inf):
 
 
 def test_a_robot_steps_wheel_by_wheel_and_arrives(begun):
-    """Its wheels are 3 cm ahead of where they should be: each stands at the gap all the same, and lands behind the edge."""
+    """Its wheels are 3 cm ahead of where they should be: each stands before the edge all the same, and lands behind."""
     bus, robot, navigation = begun()
     go(bus, navigation)
     assert navigation.done
-    assert robot.requests == [(name, pytest.approx(0.1)) for name in ("front_right", "front_left", "rear_right", "rear_left")]
+    assert robot.requests == [
+        (name, pytest.approx(0.1)) for name in ("front_right", "front_left", "rear_right", "rear_left")
+    ]
     for before, behind in robot.errors:
         assert 1.2 - before == pytest.approx(0.1, abs=0.02) and behind - 1.2 == pytest.approx(0.09, abs=0.02)
     assert_allclose(robot.pose[:2], (3.0, 0.0), atol=0.015)
