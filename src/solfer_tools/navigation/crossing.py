@@ -39,7 +39,7 @@ class CrossingLimits:
         across: Range in which wheels at the other end of the robot are then [m].
         clearance: Height of a wheel above an obstacle [m].
         width: Half of the width of a track [m].
-        yaw: Largest angle between heading and way [rad].
+        yaw: Largest angle between heading and path [rad].
     """
 
     rolled: float = 0.02
@@ -78,7 +78,7 @@ class Roll:
     """A move of base and wheels on the ground.
 
     Attributes:
-        along: Where the base is at its end, from the beginning of the way [m].
+        along: Where the base is at its end, from the beginning of the path [m].
         offsets: How far each wheel is then ahead of where it was at the beginning, as seen from the base [m].
     """
 
@@ -108,7 +108,7 @@ class Crossing:
     """A plan.
 
     Attributes:
-        yaw: Heading of the base, as seen from the way [rad].
+        yaw: Heading of the base, as seen from the path [rad].
         moves: What is done, in order.
     """
 
@@ -117,7 +117,7 @@ class Crossing:
 
 
 class _Blocked(ComponentError):
-    """A way that cannot be gone on.
+    """A path that ends too early.
 
     Attributes:
         along: How far the base comes [m].
@@ -129,14 +129,14 @@ class _Blocked(ComponentError):
 
 
 class _Track:
-    """The way of a wheel. Places on it are distances ahead of where the base begins.
+    """The track of a wheel. Places on it are distances ahead of where the base begins.
 
     Args:
         index: Index of the wheel.
         name: Its name.
         begin: Where the base begins, x and y [m].
-        direction: Direction of the way [rad].
-        wheel: Where the wheel begins, ahead of the base and to its left, as seen from the way [m].
+        direction: Direction of the path [rad].
+        wheel: Where the wheel begins, ahead of the base and to its left, as seen from the path [m].
         is_front: Whether it is a front wheel.
 
     Attributes:
@@ -170,7 +170,7 @@ class _Track:
         self.next: Obstacle | None = None
 
     def find_obstacles(self, terrain: Terrain, length: float) -> None:
-        """Find what lies on the way of a length [m]."""
+        """Find the obstacles of a path of a length [m]."""
         limits = self._limits
         first = self.nominal - 0.3
         places = np.arange(first, self.nominal + length + 1.0, SPACING)
@@ -190,7 +190,7 @@ class _Track:
         self.next = next(self._obstacles, None)
 
     def _points(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Return places in the world, some way to the left of the track [m], x and y, shape (n, 2)."""
+        """Return places in the world, some distance to the left of the track [m], x and y, shape (n, 2)."""
         seen = np.column_stack((places, np.full(len(places), self._left + side)))
         cosine, sine = turned(self._direction, 1.0, 0.0)
         return seen @ np.array(((cosine, sine), (-sine, cosine))) + self._begin
@@ -229,7 +229,7 @@ class _Track:
 
 
 class CrossingPlanner:
-    """Plans a straight way.
+    """Plans a straight path.
 
     Args:
         terrain: The ground.
@@ -245,7 +245,7 @@ class CrossingPlanner:
         self._limits = limits
 
     def plan(self, begin: tuple[float, float], goal: tuple[float, float], heading: float = 0.0) -> Crossing:
-        """Plan a way with the least angle between it and the base.
+        """Plan a path with the least angle between it and the base.
 
         Args:
             begin: Where the base is, x and y [m].
@@ -253,7 +253,7 @@ class CrossingPlanner:
             heading: Its heading [rad].
 
         Raises:
-            ComponentError: The ground cannot be crossed; names the wheel and the place that ends the way which comes
+            ComponentError: The ground cannot be crossed; names the wheel and the place that ends the path which comes
                 farthest.
         """
         direction = math.atan2(goal[1] - begin[1], goal[0] - begin[0])
@@ -287,7 +287,7 @@ class CrossingPlanner:
                     raise _Blocked(-1.0, what, "wheels on even ground")
 
     def _moves(self, begin: tuple[float, float], goal: tuple[float, float], yaw: float) -> Iterator[Roll | StepOver]:
-        """Plan the moves with a heading as seen from the way [rad]."""
+        """Plan the moves with a heading as seen from the path [rad]."""
         length = math.dist(begin, goal)
         direction = math.atan2(goal[1] - begin[1], goal[0] - begin[0])
         tracks = []

@@ -468,7 +468,7 @@ def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
     mean_displacement /= total
     along /= total
     across /= total
-    way = math.sqrt(along * along + across * across)
+    length = math.sqrt(along * along + across * across)
     for i in range(motion.count):
         # a wheel that goes up measures that the base goes down
         up = mean_displacement - along_normal(displacements, arms, i, yaw, x, y, z)
@@ -482,8 +482,8 @@ def _find_lifted(start, ground_start, yaw, turned, normal, clearance, forget):
         if lifted[i]:
             u = displacements[i, 0] + yaw * arms[i, 1] - along
             v = displacements[i, 1] - yaw * arms[i, 0] - across
-            rolls = u * u + v * v < 0.01 * way * way  # within a tenth
-            ground.rolled[i] = max(0.0, ground.rolled[i] + (way if rolls else -3.0 * way))
+            rolls = u * u + v * v < 0.01 * length * length  # within a tenth
+            ground.rolled[i] = max(0.0, ground.rolled[i] + (length if rolls else -3.0 * length))
             if ground.rolled[i] > 0.03:  # [m]
                 lifted[i] = False
                 rise[i] = 0.0
