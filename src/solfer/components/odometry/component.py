@@ -11,6 +11,7 @@ from solfer.components.base import Component
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.feet import Feet
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.ground.ground_report import report_ground
@@ -162,6 +163,8 @@ class Odometry(Component):
                 self._distrust(law)
             if law.slip.lasts:
                 self._throttle.warning("slip", "%s: %s", self.name, self._common_slip(law))
+            elif law.feet is not None and self._coasts(law.feet):
+                self._throttle.warning("coasting", "%s: %s", self.name, self._coasts(law.feet))
             elif law.slip.contradicted:
                 self._throttle.warning(
                     "slide", "%s: wheels slide, or the accelerometer is wrong: all wheels measure otherwise", self.name
@@ -180,6 +183,14 @@ class Odometry(Component):
         """Return how all wheels slip."""
         speed = math.hypot(*law.slip.slip.tolist())
         return f"all wheels slip by {speed:.2g} m/s, by the accelerometer, which the base follows"
+
+    @staticmethod
+    def _coasts(feet: Feet) -> str:
+        """Return how long no foot has carried the robot; empty: one has lately."""
+        longest_flight = 1.0  # [s]
+        if feet.coasted < longest_flight:
+            return ""
+        return f"no foot has carried the robot for {feet.coasted:.2g} s, and the accelerometer alone moves the base"
 
     def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""
@@ -254,12 +265,15 @@ class Odometry(Component):
         for index, wheel in enumerate(self._wheels.names):
             rolls = law.consensus.inliers[index]
             lifted = law.lifted[index]
-            state = "lifted" if lifted else "rolls" if rolls else "slips"
+            state = "lifted" if lifted else ("rolls" if law.feet is None else "stands") if rolls else "slips"
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
         inconsistency = self._inconsistency()
         common = self._common_slip(law) if law.slip.lasts else ""
         summary = common or inconsistency or ("a wheel slips" if slips else "all wheels that touch roll")
+        if law.feet is not None:
+            slips = bool(self._coasts(law.feet))
+            summary = self._coasts(law.feet) or f"{law.consensus.inliers.sum()} of {len(entries)} feet carry the robot"
         return Statuses(
             status=(
                 Status(
