@@ -334,7 +334,7 @@ def test_a_request_puts_the_base_elsewhere(robot):
 
 
 def test_a_robot_without_wheels_is_refused(robot):
-    with pytest.raises(ComponentError, match="0 wheels in 'base'"):
+    with pytest.raises(ComponentError, match="0 wheels or feet in 'base'"):
         Odometry(robot, OdometryTags(chain="base"))
 
 

@@ -166,6 +166,7 @@ def values(**changed):
         "rows": np.zeros((4, 3, size)),
         "innovations": np.zeros((4, 3)),
         "rolling": np.ones(4),
+        "pushed": np.array((0.01, -0.02, 0.03, 1e-4, 0.05)),
     }
     return kernel.FILTER.tuple(size=size, count=4, **(arrays | changed))
 

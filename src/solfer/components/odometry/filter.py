@@ -25,8 +25,11 @@ SHAKE_RATIO = 2.5e-3
 with the commands."""
 
 
-FOOT_DEVIATION = 0.03
-"""Standard deviation of the velocity of a foot that stands [m/s]: it slips a little, and its sole gives way."""
+FOOT_SLIP = 3e-3
+"""Standard deviation of the velocity of a foot that stands [m/s], as a ratio to the speed of the joints of legs."""
+
+FOOT_TWIST = 0.05
+"""That of the yaw rate by which feet twist on the ground [rad/s], as a ratio to the same."""
 
 STEP = 0.04
 """Height from the floor at which a foot stands elsewhere [m], and the time after which there is no floor [s]."""
@@ -254,7 +257,7 @@ class FilteredOdometry:
         if motion.feet is None:
             self._correct(yaw, imu_time, legs / period)
         else:
-            self._stand(yaw, imu_time, motion.feet)
+            self._stand(yaw, imu_time, legs / period, feet=motion.feet)
         self._integrate(yaw, imu_time, unknown)
         self.ground.update(self._base.fresh, period, self.heading, angular=self.angular)
         motion.remember()
@@ -335,20 +338,19 @@ class FilteredOdometry:
         kalman.push(about_vertical(change, -base.heading) - swing + imu.swing, imu.since + imu.period)
         imu.swing[:] = swing
 
-    def _stand(self, yaw: float, imu_time: float, feet: Feet) -> None:
+    def _stand(self, yaw: float, imu_time: float, leg_speed: float, feet: Feet) -> None:
         """Correct the filter by the feet that stand."""
         motion = self._motion
         kalman = self.kalman
         ground = self.ground
         inliers = self.consensus.inliers
         period = self._imu.period
-        deviation = FOOT_DEVIATION
-        if self._imu.rest > REST_TIME:
-            deviation = 1e-3  # [m/s]: feet do not slip where no joint moves
+        deviation = 1e-3 + FOOT_SLIP * leg_speed  # [m/s]
         filter_kernel.measure_speeds(
             motion.displacements, motion.tilting, period, 0.0, deviation, motion.spreads, motion.variances,
             motion.speeds,
         )  # fmt: skip
+        kalman.allow_scrubbing((FOOT_TWIST * leg_speed) ** 2)
         np.greater(motion.weights, 0.0, out=inliers)
         np.logical_not(inliers, out=ground.lifted)
         floor = ground.map.floor
@@ -492,6 +494,7 @@ class FilteredOdometry:
         ground = self.ground
         imu = self._imu
         motion = self._motion
+        wheels = motion.wheels
         kalman = self.kalman
         base = self._base
         period = self._imu.period
@@ -509,17 +512,8 @@ class FilteredOdometry:
         displacement = (kalman.velocity - 0.5 * kalman.pushed[:3]) * period - motion.tilting
         self.position += about_vertical(displacement, self.heading + 0.5 * yaw)
         self.heading = base.heading + imu.offset if base.fresh else self.heading + yaw
-        if motion.feet is None:
-            self._follow_ground(yaw)
-
-    def _follow_ground(self, yaw: float) -> None:
-        """Come to the height of the map, and find the wheels that are lifted, after a yaw [rad]."""
-        ground = self.ground
-        motion = self._motion
-        kalman = self.kalman
-        base = self._base
-        wheels = motion.wheels
-        period = self._imu.period
+        if motion.feet is not None:
+            return
         missing = ground.map.missing_height(
             wheels.arms,
             wheels.ground.normal,
@@ -552,18 +546,14 @@ class FilteredOdometry:
             self.filter.step(self.angular)
         if self._motion.feet is not None:
             self.velocity[:] = self.kalman.velocity
-            self._smooth()
-            return
-        spread_time = 0.1  # [s] over which wheels are compared
-        filter_kernel.velocity_of_base(
-            wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity,
-            self._spread.each, spread_time / (spread_time + self._imu.period), self._spread.covariance,
-        )  # fmt: skip
+        else:
+            spread_time = 0.1  # [s] over which wheels are compared
+            filter_kernel.velocity_of_base(
+                wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity,
+                self._spread.each, spread_time / (spread_time + self._imu.period), self._spread.covariance,
+            )  # fmt: skip
         if self.slip.lasts:
             self.velocity[:2] -= self.slip.slip
-        self._smooth()
-
-    def _smooth(self) -> None:
         if self.smoothing is not None:
             self._spread.smoothed[:3] = self.velocity
             self._spread.smoothed[3] = self.angular[2]
