@@ -87,7 +87,9 @@ class EstimatedWalk(Walk):
         ]
         self._bound += LOOK * (np.mean(each, axis=0) if each else velocity)
         counts = float(np.count_nonzero(law.consensus.inliers))
-        self.looks.append(np.array((*simulation.body.position, self.heading, *law.position, law.heading, *self._bound, counts)))
+        self.looks.append(
+            np.array((*simulation.body.position, self.heading, *law.position, law.heading, *self._bound, counts))
+        )
 
     def _lowest(self, link: str, sole: list) -> list:
         """Return the lowest sphere of a sole: that on which the robot stands."""

@@ -31,7 +31,8 @@ def urdf():
             link = f"leg{leg}_{axis}"
             place = " ".join(map(str, hip if axis == "x" else np.zeros(3)))
             text += f'<link name="{link}">{body}</link><joint name="{link}_joint" type="prismatic">'
-            text += f'<parent link="{parent}"/><child link="{link}"/><origin xyz="{place}"/><axis xyz="{" ".join(map(str, way))}"/>'
+            text += f'<parent link="{parent}"/><child link="{link}"/><origin xyz="{place}"/>'
+            text += f'<axis xyz="{" ".join(map(str, way))}"/>'
             text += '<limit lower="-1" upper="1" velocity="9" effort="999"/></joint>'
             parent = link
     return f'<robot name="walker">{text}</robot>'

@@ -104,9 +104,9 @@ class FilteredOdometry:
     and the pose is integrated. Ground that rises less than `level` is level and measures the error of the IMU's tilt;
     elsewhere its normal is that of the plane through the contacts. The height is that of `HeightMap`.
 
-    Feet that lift and land are contacts like wheels, with four differences. Those that stand count (`Feet`), each by its
-    probability alone, and none has to. The velocity is that of the base's origin, and between feet the accelerometer
-    predicts it, with the error of the tilt. On a floor each foot that stands measures the height; where feet stand
+    Feet that lift and land are contacts like wheels, with four differences. Those that stand count (`Feet`), each by
+    its probability alone, and none has to. The velocity is that of the base's origin, and between feet the
+    accelerometer predicts it, with the error of the tilt. On a floor each foot that stands measures the height; where feet stand
     elsewhere there is no floor, and the height follows the velocity. A foot that lands is an anchor where it landed.
 
     Args:

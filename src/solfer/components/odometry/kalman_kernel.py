@@ -498,9 +498,7 @@ _M = "float64[:, ::1]"
 _PAIR = "UniTuple(float64, 2)"
 
 predict = cached(f"void(int64, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5))", _predict)
-correct = cached(
-    f"void(int64, {_M}, {_M}, {_F}, {_F}, {_V}, boolean[::1], {_F}, boolean)", _correct, sources=[DENSE]
-)
+correct = cached(f"void(int64, {_M}, {_M}, {_F}, {_F}, {_V}, boolean[::1], {_F}, boolean)", _correct, sources=[DENSE])
 integrate = cached(f"void(int64, {_F}, {_F}, {_F}, UniTuple(float64, 3))", _integrate)
 level = cached(f"boolean(int64, {_F}, {_F}, {_F})", _level)
 measure = cached(f"boolean(int64, int64, {_F}, {_F})", _measure)

@@ -49,7 +49,9 @@ class _Ground:
 
 
 class Wheels:
-    """Contacts of the wheels or feet of a group. They are its own: the ground's normal may change here, unseen by others.
+    """Contacts of the wheels or feet of a group.
+
+    They are its own: the ground's normal may change here, unseen by others.
 
     A foot is a contact of the type `contact_point`: with an offset a ball that rolls on the ground with its link, else
     a point of a sole.

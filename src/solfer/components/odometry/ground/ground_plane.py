@@ -101,8 +101,12 @@ class GroundPlane:
         motion = self._motion
         wheels = motion.wheels
         # feet that lift and land are on no plane until all of them stand
-        found = self._level and (motion.feet is None or motion.weights.all()) and filter_kernel.follow_plane(
-            motion.block.address, self.block.address, heading, self._kalman.velocity, angular, fresh, period
+        found = (
+            self._level
+            and (motion.feet is None or motion.weights.all())
+            and filter_kernel.follow_plane(
+                motion.block.address, self.block.address, heading, self._kalman.velocity, angular, fresh, period
+            )
         )
         self.turns = found == 2 and motion.feet is None
         if found:
