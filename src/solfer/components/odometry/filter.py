@@ -106,8 +106,8 @@ class FilteredOdometry:
 
     Feet that lift and land are contacts like wheels, with four differences. Those that stand count (`Feet`), each by
     its probability alone, and none has to. The velocity is that of the base's origin, and between feet the
-    accelerometer predicts it, with the error of the tilt. On a floor each foot that stands measures the height; where feet stand
-    elsewhere there is no floor, and the height follows the velocity. A foot that lands is an anchor where it landed.
+    accelerometer predicts it, with the error of the tilt. On a floor each foot that stands measures the height; where
+    feet stand elsewhere there is no floor, and the height follows the velocity. What lands measures from where it is.
 
     Args:
         wheels: The wheels or feet.
