@@ -52,6 +52,7 @@ def add_odometry(file: Path, feet: tuple[str, ...], base: str, **tags: Any) -> N
     part = tree["mwoibn"]
     for pipe in ("feedback", "controller"):
         part["ros"][pipe] |= {"odometry": {"source" if pipe == "feedback" else "sink": "base_odometry"}}
+    part["ros"]["source"]["srdf"] = "/robot_semantic_description"
     part["ros"]["source"]["contacts"] = {"file": str(folder / "contacts.yaml")}
     part["ros"]["feedback"]["odometry"]["message"] = "solfer/JointCommand"
     part["ros"]["feedback"]["imu_base"] = {"source": "imu", "message": "sensor_msgs/Imu", "initialize": True}
