@@ -338,6 +338,13 @@ def test_a_robot_without_wheels_is_refused(robot):
         Odometry(robot, OdometryTags(chain="base"))
 
 
+def test_hands_do_not_count_beside_wheels(robot):
+    """CENTAURO's have contacts of the type that feet have."""
+    assert {"left_arm", "right_arm"} <= {each.name for each in robot.contact_records}
+    made = Odometry(robot, OdometryTags(chain="all", method="filter"))
+    assert made.law.feet is None and len(made.law.lifted) == 4
+
+
 def pose_at(x=3.0, y=-2.0, yaw=1.4, frame="odom", variance=0.04):
     covariance = np.diag((variance, variance, 0.0, 0.0, 0.0, 0.01)).ravel()
     turn = Turn(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))

@@ -54,7 +54,7 @@ class Wheels:
     They are its own: the ground's normal may change here, unseen by others.
 
     A foot is a contact of the type `contact_point`: with an offset a ball that rolls on the ground with its link, else
-    a point of a sole.
+    a point of a sole. Where a group has wheels, they count alone: what else may touch are hands.
 
     Args:
         robot: The Robot.
@@ -80,13 +80,12 @@ class Wheels:
         if robot.kinematics.base is None:
             raise ComponentError(f"the base of '{robot.name}' is fixed", where=where, expected="a floating base")
         links = set(robot.links(group))
-        records = [each for each in robot.contact_records if each.end_frame in links]
+        touching = [each for each in robot.contact_records if each.end_frame in links]
+        records = [each for each in touching if each.type == "wheel"]
         if radius is not None:
-            records = [
-                each.model_copy(update={"minor_axis": radius - (each.major_axis or 0.0)})
-                for each in records
-                if each.type == "wheel"
-            ]
+            records = [each.model_copy(update={"minor_axis": radius - (each.major_axis or 0.0)}) for each in records]
+        elif not records:
+            records = touching
         made = [make_contact(each, robot) for each in records]
         self._shared = [robot.contacts[each.name] for each in records]
         self.names = tuple(each.name for each in records)
