@@ -11,7 +11,8 @@ IMU: `method: filter` on the group of the feet. `--estimated` lets the policy ob
 
 Each row is a walk: the error of the position at the end, as a share of the way [%] and without the error of the
 heading, which is beside it [deg]; the largest error of the height [mm]; the standard deviation that the filter has for
-the position [m] and the error by it; and the shares of time in which no foot, and one, has measured the base. `bound`
+the position [m]; the square of the error of x, y and heading by their covariance (`nees`: 1 where that is honest); and
+the shares of time in which no foot, and one, has measured the base. `bound`
 is that of a mean over all feet on which the ground truly pushes, with the true orientation and joints, and the true
 velocity where none touches: what slip and soles that give way leave of any method without such a measurement. The
 exit code is 1 if a walk of a Go2 at 0.5 m/s is more than 1 % off.
@@ -43,6 +44,8 @@ LOOK = 0.005
 """Time from a look at the truth to the next [s]."""
 GOAL = 1.0
 """[%]"""
+PLANAR = (0, 1, 3)
+"""Indices of x, y and heading in the filter's state."""
 
 
 class EstimatedWalk(Walk):
@@ -127,6 +130,14 @@ def errors(looks: np.ndarray) -> dict[str, float]:
     }
 
 
+def normalised_square(looks: np.ndarray, covariance: np.ndarray) -> float:
+    """Compute e^T P^-1 e / 3 of the error e of x, y and heading at the end, with its covariance P."""
+    error = (looks[:, 4:8] - looks[:, :4])[[0, -1]][:, [0, 1, 3]]
+    error[:, 2] = np.unwrap(error[:, 2])
+    moved = error[1] - error[0]
+    return float(moved @ np.linalg.solve(covariance, moved)) / 3.0
+
+
 def seen(vectors: np.ndarray, angles: np.ndarray | float) -> np.ndarray:
     """Turn vectors, shape (T, 2), by angles [rad]."""
     x, y = vectors.T
@@ -152,8 +163,9 @@ def walk(robot: WalkingRobot, file: Path, seed: int, command: Sequence[float] | 
                 fault = fault or "it fell"
     figures: dict[str, float | str] = {**errors(np.array(made.looks))}
     law = made.odometry.law
-    deviation = float(np.sqrt(law.kalman.covariance[0, 0] + law.kalman.covariance[1, 1]))
-    figures["deviation [m]"] = deviation
+    covariance = law.kalman.covariance[np.ix_(PLANAR, PLANAR)]
+    figures["deviation [m]"] = float(np.sqrt(covariance[0, 0] + covariance[1, 1]))
+    figures["nees"] = normalised_square(np.array(made.looks), covariance)
     figures["fault"] = fault or "none"
     return figures
 

@@ -31,6 +31,9 @@ FOOT_SLIP = 3e-3
 FOOT_TWIST = 0.05
 """That of the yaw rate by which feet twist on the ground [rad/s], as a ratio to the same."""
 
+FOOT_SHARE = 0.014
+"""That of what a foot slips on average, and of what its sole gives way, as a share of the way."""
+
 STEP = 0.04
 """Height from the floor at which a foot stands elsewhere [m], and the time after which there is no floor [s]."""
 STEP_TIME = 0.1
@@ -131,6 +134,7 @@ class FilteredOdometry:
     def __init__(self, wheels: Wheels, base: MeasuredBase, tags: OdometryTags):
         count = len(wheels)
         self._base = base
+        base.shakes = wheels.steps
         self._tags = tags
         self.kalman = WheelInertialFilter(
             count,
@@ -138,7 +142,7 @@ class FilteredOdometry:
             tags.gyro_noise,
             bias=tags.gyro_bias,
             walk=tags.gyro_walk,
-            radius=tags.radius_share,
+            radius=FOOT_SHARE if wheels.steps else tags.radius_share,
             tilt=math.radians(tags.tilt_deviation),
         )
         self.consensus = WheelConsensus(count, tags.slip_time)
@@ -304,7 +308,10 @@ class FilteredOdometry:
             imu.rates, kalman.axes,
         )  # fmt: skip
         shaking_time = 0.3  # [s] for which it lasts
-        shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._imu.period
+        if self._motion.feet is None:
+            shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._imu.period
+        elif base.averages:  # a walk shakes so evenly that the mean of its samples misses nothing
+            shaken = 0.0
         sample = NO_SAMPLE
         x, y, _ = base.turned.tolist()
         before_x, before_y = kalman.tilt.tolist()
@@ -345,12 +352,13 @@ class FilteredOdometry:
         ground = self.ground
         inliers = self.consensus.inliers
         period = self._imu.period
-        deviation = 1e-3 + FOOT_SLIP * leg_speed  # [m/s]
+        rests = self._imu.rest > REST_TIME  # then feet show the gyroscope's bias, as wheels do
+        deviation = 1e-5 if rests else 1e-3 + FOOT_SLIP * leg_speed  # [m/s]
         filter_kernel.measure_speeds(
             motion.displacements, motion.tilting, period, 0.0, deviation, motion.spreads, motion.variances,
             motion.speeds,
         )  # fmt: skip
-        kalman.allow_scrubbing((FOOT_TWIST * leg_speed) ** 2)
+        kalman.allow_scrubbing(0.0 if rests else (FOOT_TWIST * leg_speed) ** 2)
         np.greater(motion.weights, 0.0, out=inliers)
         np.logical_not(inliers, out=ground.lifted)
         floor = ground.map.floor
