@@ -317,7 +317,8 @@ class FilteredOdometry:
         before_x, before_y = kalman.tilt.tolist()
         if imu.rest > REST_TIME:  # a robot at rest does not turn
             kalman.follow_tilt(0.0, x, y)
-            kalman.rest(imu.rate @ kalman.axes, time)
+            # wheels measure the bias about z, feet twist
+            kalman.rest((imu.rate @ kalman.axes)[: 2 if self._motion.feet is None else 3], time)
             base.turned[:2] = 0.0
         else:
             rate_x, rate_y, rate_z = (imu.rate - kalman.biases).tolist()
@@ -352,13 +353,12 @@ class FilteredOdometry:
         ground = self.ground
         inliers = self.consensus.inliers
         period = self._imu.period
-        rests = self._imu.rest > REST_TIME  # then feet show the gyroscope's bias, as wheels do
-        deviation = 1e-5 if rests else 1e-3 + FOOT_SLIP * leg_speed  # [m/s]
+        deviation = 1e-3 + FOOT_SLIP * leg_speed  # [m/s]
         filter_kernel.measure_speeds(
             motion.displacements, motion.tilting, period, 0.0, deviation, motion.spreads, motion.variances,
             motion.speeds,
         )  # fmt: skip
-        kalman.allow_scrubbing(0.0 if rests else (FOOT_TWIST * leg_speed) ** 2)
+        kalman.allow_scrubbing((FOOT_TWIST * leg_speed) ** 2)
         np.greater(motion.weights, 0.0, out=inliers)
         np.logical_not(inliers, out=ground.lifted)
         floor = ground.map.floor

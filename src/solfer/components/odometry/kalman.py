@@ -279,9 +279,9 @@ class WheelInertialFilter:
                 kernel.measure(self._address, which, 0.0, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
-        """Measure the bias about the base's x and y by the gyroscope of a robot at rest, in B, shape (3,) [rad/s]."""
+        """Measure the bias about the base's first axes by the gyroscope of a robot at rest, in B, any of three [rad/s]."""
         variance = self._variances.noise / time
-        for axis in range(2):
+        for axis in range(len(angular)):
             kernel.measure(self._address, GYRO_BIAS + axis, float(angular[axis]), variance)
 
     def level(self, x: float, y: float) -> bool:
