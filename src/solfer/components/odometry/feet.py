@@ -9,7 +9,7 @@ from solfer.numerics.blocks import MemoryBlock
 class Feet:
     """Feet that lift and land: which of them stand, and for how long.
 
-    A foot stands while the ground pushes it by more than `touch`. It counts from 0.02 s later on: what lands bounces,
+    A foot stands while the ground pushes it by more than `touch`, or a tenth of the weight. It counts from 0.02 s later on: what lands bounces,
     and slips. Where no pipe brings the forces they are those that explain the torques of the joints, as if legs had
     no mass: sum_i (t + J^T f)_i^2 is the smallest. A leg that swings has some, too, but its foot moves, which the
     filter refuses.
@@ -17,6 +17,7 @@ class Feet:
     Args:
         count: Number of feet k.
         motion: What compiled functions get of their motion; its weights are written.
+        weight: Weight of the robot [N].
 
     Attributes:
         forces: Forces of the ground along the vertical, shape (k,) [N]; live.
@@ -24,7 +25,8 @@ class Feet:
         uneven: For how long a foot has stood elsewhere than on the floor [s].
     """
 
-    def __init__(self, count: int, motion: MemoryBlock):
+    def __init__(self, count: int, motion: MemoryBlock, weight: float):
+        self._lightest = 0.1 * weight  # more would leave out the beginning and the end of a step
         self.forces, self._stood = np.zeros((2, count))
         self._block = MemoryBlock(
             kernel.FEET, count=count, forces=self.forces, stood=self._stood, factor=np.zeros((3 * count + 1,) * 2)
@@ -42,9 +44,9 @@ class Feet:
 
         Args:
             known: Forces that a pipe brings, shape (k,) [N]; None: those of the torques count.
-            touch: Force from which on a foot stands [N].
+            touch: Force from which on a foot stands, if that is less than a tenth of the weight [N].
             period: Time since the last measurement [s].
         """
         if known is not None:
             self.forces[:] = known
-        kernel.weigh(self._block.address, self._motion.address, known is None, touch, period)
+        kernel.weigh(self._block.address, self._motion.address, known is None, min(touch, self._lightest), period)

@@ -60,7 +60,7 @@ class WheelMotion:
             tilting=self.tilting,
             speeds=self.speeds,
         )
-        self.feet = Feet(count, self.block) if wheels.steps else None
+        self.feet = Feet(count, self.block, wheels.weight) if wheels.steps else None
 
     def find_step(self) -> None:
         """Compute the steps of the joints since the last `remember`."""

@@ -146,6 +146,11 @@ class Wheels:
         return len(self.legs)
 
     @property
+    def weight(self) -> float:
+        """Weight of the robot [N]."""
+        return 9.81 * self._robot.kinematics.mass
+
+    @property
     def torque(self) -> np.ndarray:
         """Measured torques of the joints, shape (joints,) [Nm]; live."""
         return self._robot.state.torque[6:]
