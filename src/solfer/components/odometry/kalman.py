@@ -279,7 +279,7 @@ class WheelInertialFilter:
                 kernel.measure(self._address, which, 0.0, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
-        """Measure the bias about the base's first axes by the gyroscope of a robot at rest, in B, any of three [rad/s]."""
+        """Measure the bias about the base's first axes by the gyroscope at rest, in B, shape (2,) or (3,)."""
         variance = self._variances.noise / time
         for axis in range(len(angular)):
             kernel.measure(self._address, GYRO_BIAS + axis, float(angular[axis]), variance)

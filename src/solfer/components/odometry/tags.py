@@ -61,8 +61,8 @@ class OdometryTags(Record):
         ge=0.0,
         le=1e5,
         **LIVE,
-        description="filter: with `forces`, and of feet, normal force below which a wheel or foot does not count; of feet at "
-        "most a tenth of the weight [N]",
+        description="filter: with `forces`, and of feet, normal force below which a wheel or foot does not count; of "
+        "feet at most a tenth of the weight [N]",
     )
     level: float = Field(1.5, ge=0.0, le=90.0, description="filter: slope up to which ground counts as level [deg]")
     settle: float = Field(
