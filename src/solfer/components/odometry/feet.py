@@ -10,9 +10,9 @@ class Feet:
     """Feet that lift and land: which of them stand, and for how long.
 
     A foot stands while the ground pushes it by more than `touch` or a tenth of the weight. It counts from 0.02 s later
-    on: what lands bounces, and slips. Where no pipe brings the forces they are those that explain the torques of the joints, as if legs had
-    no mass: sum_i (t + J^T f)_i^2 is the smallest. A leg that swings has some, too, but its foot moves, which the
-    filter refuses.
+    on: what lands bounces, and slips. Where no pipe brings the forces they are those that explain the torques of the
+    joints, as if legs had no mass: sum_i (t + J^T f)_i^2 is the smallest. A leg that swings has some, too, but its foot
+    moves, which the filter refuses.
 
     Args:
         count: Number of feet k.
