@@ -44,8 +44,9 @@ from solfer.config import load
 from solfer.errors import SolferError
 from solfer.interfaces.geometry import Twist, Vector
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins import Plugin, Registry, generate
+from solfer.plugins import Generator, Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.engines import ENGINE_VARIABLE
 from solfer.simulation.mujoco.library import load_mujoco
 from solfer.simulation.server.publications import robot_parameters
@@ -134,7 +135,7 @@ class World:
 
     def __init__(self, robot: WalkingRobot, file: Path, wrong: Disturbance):
         self.robot = robot
-        self.bundle = read_bundle(file.parent / f"robots/{file.stem}/robot.yaml").with_perfect_sensors()
+        self.bundle = self.equipped(read_bundle(file.parent / f"robots/{file.stem}/robot.yaml"), wrong)
         urdf = scaled(self.bundle.urdf.location.read_text(), wrong.masses)
         self.simulation = Simulation.from_file(self.bundle, description_text=urdf)
         for foot in robot.feet:
@@ -145,6 +146,11 @@ class World:
             self._add_rotors()
         self._rng = None if wrong.seed is None else np.random.default_rng(wrong.seed)
         self._next_push = 0.0
+
+    @staticmethod
+    def equipped(bundle: BundleRecord, wrong: Disturbance) -> BundleRecord:
+        """Return the robot with its sensors: perfect ones."""
+        return bundle.with_perfect_sensors()
 
     def _add_rotors(self) -> None:
         theirs = load_mujoco().MjModel.from_xml_path(str(self.robot.model))
@@ -205,11 +211,19 @@ class Walk(World):
         super().__init__(robot, file, wrong)
         self.bus = Bus(robot_parameters(self.bundle))
         self.bus.every(STEP, SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator")).cycle)
-        found = Registry().find("policy", POLICY)
-        self.plugin: Plugin = generate(load(file, "policy"), MemoryMiddleware(self.bus, "policy"), found)
-        self.bus.every(1.0 / self.plugin.rate, self.plugin.cycle, cycles=True)
+        self.stand(file)
+        self.plugin = self.start(file, "policy", Registry().find("policy", POLICY))
         self.component: Policy = self.plugin.component
-        self.bus.run_until(1.0)
+        self.bus.run_until(self.bus.time + 1.0)
+
+    def start(self, file: Path, name: str, found: type[Generator]) -> Plugin:
+        """Start the plugin of a module."""
+        plugin = generate(load(file, name), MemoryMiddleware(self.bus, name), found)
+        self.bus.every(1.0 / plugin.rate, plugin.cycle, cycles=True)
+        return plugin
+
+    def stand(self, file: Path) -> None:
+        """Do what comes before the policy."""
 
     def advance(self, command: np.ndarray) -> str:
         """See `World.walk`."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support.robots import lower_body
+from support.robots import centauro, lower_body
 from support.unit.golden import golden, rolling_legs
 
 from solfer.components.odometry import Odometry
@@ -348,8 +348,16 @@ def test_a_request_puts_the_base_elsewhere(robot):
 
 
 def test_a_robot_without_wheels_is_refused(robot):
-    with pytest.raises(ComponentError, match="0 wheels in 'base'"):
+    with pytest.raises(ComponentError, match="0 wheels or feet in 'base'"):
         Odometry(robot, OdometryTags(chain="base"))
+
+
+def test_hands_do_not_count_beside_wheels():
+    """CENTAURO's have contacts of the type that feet have."""
+    robot = centauro()
+    assert {"left_arm", "right_arm"} <= {each.name for each in robot.contact_records}
+    made = Odometry(robot, OdometryTags(chain="all", method="filter"))
+    assert made.law.feet is None and len(made.law.lifted) == 4
 
 
 def pose_at(x=3.0, y=-2.0, yaw=1.4, frame="odom", variance=0.04):

@@ -151,6 +151,8 @@ def test_the_noise_of_the_gyroscope_limits_what_is_learned_at_rest():
 
 
 SHARE, RATE = 0.8, 0.3
+PUSH = 0.05
+"""Gravity times the time of an accelerometer [m/s]."""
 AXIS = np.array((0.1, -0.2, math.sqrt(0.95)))
 STATE = np.random.default_rng(11).normal(scale=0.05, size=kernel.RADIUS + 4)
 
@@ -166,6 +168,7 @@ def values(**changed):
         "rows": np.zeros((4, 3, size)),
         "innovations": np.zeros((4, 3)),
         "rolling": np.ones(4),
+        "pushed": np.array((0.01, -0.02, 0.03, 1e-4, PUSH)),
     }
     return kernel.FILTER.tuple(size=size, count=4, **(arrays | changed))
 
@@ -221,7 +224,10 @@ def test_the_jacobian_of_the_pose_is_that_of_its_integral(imu_time):
 
 
 def test_the_jacobian_of_the_process_is_that_of_its_equations():
-    """Axes of velocity, slope and tilt turn; a bias tilts, and moves the ground point by that turn and its arm."""
+    """Axes of velocity, slope and tilt turn; a bias tilts, and moves the ground point by that turn and its arm.
+
+    A tilt that errs lets gravity push the velocity.
+    """
     arm = np.array((0.1, -0.05, -0.6))
     heading, turn = 0.4, 0.02
     keep, slope_keep = 0.9, 0.7
@@ -237,7 +243,7 @@ def test_the_jacobian_of_the_process_is_that_of_its_equations():
         x, y, z = np.cross(tilting, arm)
         after[:2] += rotated(-heading, (x, y))
         after[2] += z
-        after[4:6] = rotated(turn, state[4:6])
+        after[4:6] = rotated(turn, state[4:6]) + PUSH * np.array((-state[TILT + 1], state[TILT]))
         after[kernel.GYRO_NOISE] = 0.0
         after[kernel.SCRUB] *= keep
         after[TILT : TILT + 2] = rotated(turn, state[TILT : TILT + 2]) + tilting[:2]

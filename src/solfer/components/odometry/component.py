@@ -11,6 +11,7 @@ from solfer.components.base import Component
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.feet import Feet
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.ground.ground_report import report_ground
@@ -68,6 +69,9 @@ class Odometry(Component):
     _INCONSISTENCY_TIME = 0.5
     """Time after which a contradiction of wheels and gyroscope is reported [s]: they slip together, or it is wrong."""
 
+    _LONGEST_FLIGHT = 1.0
+    """Time after which it is reported that no foot measures the base [s]."""
+
     def __init__(self, robot: Robot, tags: OdometryTags | None = None, name: str = "odometry"):
         super().__init__(robot, tags or OdometryTags(), name)
         self.modify = True
@@ -79,6 +83,7 @@ class Odometry(Component):
             self.law = GeometricOdometry(robot, wheels, self._base)
         else:
             self.law = FilteredOdometry(wheels, self._base, self.tags)
+        self._feet = self.law.feet if isinstance(self.law, FilteredOdometry) else None
         self._pose, self._rates = np.zeros((2, 6))
         self._rotation = np.eye(3)
         self._position = np.zeros(3)
@@ -160,7 +165,10 @@ class Odometry(Component):
                 self._throttle.warning("inconsistency", "%s: %s", self.name, self._inconsistency())
             if law.ground.turns:
                 self._distrust(law)
-            if law.slip.lasts:
+            feet = self._feet
+            if feet is not None and feet.coasted > self._LONGEST_FLIGHT:
+                self._throttle.warning("coasting", "%s: %s", self.name, self._coasting(feet))
+            elif law.slip.lasts:
                 self._throttle.warning("slip", "%s: %s", self.name, self._common_slip(law))
             elif law.slip.contradicted:
                 self._throttle.warning(
@@ -180,6 +188,11 @@ class Odometry(Component):
         """Return how all wheels slip."""
         speed = math.hypot(*law.slip.slip.tolist())
         return f"all wheels slip by {speed:.2g} m/s, by the accelerometer, which the base follows"
+
+    @staticmethod
+    def _coasting(feet: Feet) -> str:
+        """Return for how long no foot has measured the base."""
+        return f"no foot has carried the robot for {feet.coasted:.2g} s: the accelerometer alone moves the base"
 
     def _inconsistency(self) -> str:
         """Return how wheels and gyroscope contradict each other; empty: they do not."""
@@ -254,12 +267,17 @@ class Odometry(Component):
         for index, wheel in enumerate(self._wheels.names):
             rolls = law.consensus.inliers[index]
             lifted = law.lifted[index]
-            state = "lifted" if lifted else "rolls" if rolls else "slips"
+            state = "lifted" if lifted else ("rolls" if self._feet is None else "stands") if rolls else "slips"
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
         inconsistency = self._inconsistency()
         common = self._common_slip(law) if law.slip.lasts else ""
         summary = common or inconsistency or ("a wheel slips" if slips else "all wheels that touch roll")
+        feet = self._feet
+        if feet is not None:  # which slip where they land
+            slips = feet.coasted > self._LONGEST_FLIGHT
+            carry = f"{law.consensus.inliers.sum()} of {len(entries)} contacts of feet carry the robot"
+            summary = self._coasting(feet) if slips else carry
         return Statuses(
             status=(
                 Status(

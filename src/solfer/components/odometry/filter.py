@@ -7,6 +7,7 @@ import numpy as np
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.common_slip import CommonSlip
 from solfer.components.odometry.consensus import COMPARISON_TIME, WheelConsensus, yaw_of
+from solfer.components.odometry.feet import Feet
 from solfer.components.odometry.ground.ground_plane import GroundPlane
 from solfer.components.odometry.kalman import HEADING, NO_SAMPLE, TILT, ImuSample, WheelInertialFilter
 from solfer.components.odometry.sensing.measured_base import MeasuredBase, about_vertical
@@ -23,6 +24,19 @@ SHAKE_RATIO = 2.5e-3
 """What samples of a gyroscope miss while legs move, as a ratio to the speed of their joints: the base shakes in time
 with the commands."""
 
+
+FOOT_SLIP = 3e-3
+"""Standard deviation of the velocity of a foot that stands [m/s], as a ratio to the speed of the joints of legs."""
+
+FOOT_TWIST = 0.05
+"""That of the yaw rate by which feet twist on the ground [rad/s], as a ratio to the same."""
+
+FOOT_SHARE = 0.014
+"""That of what a foot slips on average, and of what its sole gives way, as a share of the way."""
+
+STEP = 0.04
+"""Height from the floor at which a foot stands elsewhere [m], and the time after which there is no floor [s]."""
+STEP_TIME = 0.1
 
 SLIP_DEVIATION = 0.03
 """Standard deviation of the velocity where all wheels begin to slip [m/s]."""
@@ -44,12 +58,14 @@ class ImuProgress:
         period: Time since the measurement of the joints before [s].
         rest: Time for which the robot has stood still [s].
         sway: Mean motion of each joint, shape (n,).
+        swing: Velocity of the IMU by the rotation of the base in the heading frame, shape (3,) [m/s].
     """
 
     def __init__(self, joints: int):
         self.rates = np.zeros((2, 3))
         self.rate, self.rate_before = self.rates
         self.assumed = np.zeros(2)
+        self.swing = np.zeros(3)
         self.sway = np.zeros(joints)
         self.period = 1.0
         self.start()
@@ -57,7 +73,7 @@ class ImuProgress:
     def start(self) -> None:
         """Begin with the heading of the IMU."""
         self.offset = self.pending = self.since = self.rest = 0.0
-        self.sway[:] = 0.0
+        self.sway[:] = self.swing[:] = 0.0
         self.assumed[:] = 0.0
 
 
@@ -91,8 +107,13 @@ class FilteredOdometry:
     and the pose is integrated. Ground that rises less than `level` is level and measures the error of the IMU's tilt;
     elsewhere its normal is that of the plane through the contacts. The height is that of `HeightMap`.
 
+    Feet that lift and land are contacts like wheels, with four differences. Those that stand count (`Feet`), each by
+    its probability alone, and none has to. The velocity is that of the base's origin, and between feet the
+    accelerometer predicts it, with the error of the tilt. On a floor each foot that stands measures the height; where
+    feet stand elsewhere there is no floor, and the height follows the velocity. What lands measures from where it is.
+
     Args:
-        wheels: The wheels.
+        wheels: The wheels or feet.
         base: What the IMU measures.
         tags: Tags of the configuration.
 
@@ -113,6 +134,7 @@ class FilteredOdometry:
     def __init__(self, wheels: Wheels, base: MeasuredBase, tags: OdometryTags):
         count = len(wheels)
         self._base = base
+        base.shakes = wheels.steps
         self._tags = tags
         self.kalman = WheelInertialFilter(
             count,
@@ -120,7 +142,7 @@ class FilteredOdometry:
             tags.gyro_noise,
             bias=tags.gyro_bias,
             walk=tags.gyro_walk,
-            radius=tags.radius_share,
+            radius=FOOT_SHARE if wheels.steps else tags.radius_share,
             tilt=math.radians(tags.tilt_deviation),
         )
         self.consensus = WheelConsensus(count, tags.slip_time)
@@ -138,6 +160,11 @@ class FilteredOdometry:
     def lifted(self) -> np.ndarray:
         """Which wheels are lifted, shape (k,); live."""
         return self.ground.lifted
+
+    @property
+    def feet(self) -> Feet | None:
+        """Which contacts stand, if they are feet; None: they are wheels."""
+        return self._motion.feet
 
     def take(self, tags: OdometryTags) -> None:
         """Go on with the numbers of other tags by which wheels and ground are classified."""
@@ -162,6 +189,8 @@ class FilteredOdometry:
         self._imu.start()
         self.ground.start()
         motion.spreads[:] = 0.0
+        if motion.feet is not None:
+            motion.feet.start()
         self._spread.covariance[:] = 0.0
         self._weigh()
         motion.trusted[:] = motion.weights
@@ -214,6 +243,8 @@ class FilteredOdometry:
         keep = REST_TIME / (REST_TIME + period)
         moved, legs, sway = filter_kernel.joint_motion(motion.step, motion.wheels.legs, self._imu.sway, keep)
         shaken, sample = self._follow_imu(legs / period)
+        if motion.feet is not None:
+            self._push()
         self._weigh()
         motion.measure(self._base.turned)
         yaw, imu_time, unknown = self._measure_yaw()
@@ -227,7 +258,10 @@ class FilteredOdometry:
             heading=self.heading,
             sample=sample,
         )
-        self._correct(yaw, imu_time, legs / period)
+        if motion.feet is None:
+            self._correct(yaw, imu_time, legs / period)
+        else:
+            self._stand(yaw, imu_time, legs / period, feet=motion.feet)
         self._integrate(yaw, imu_time, unknown)
         self.ground.update(self._base.fresh, period, self.heading, angular=self.angular)
         motion.remember()
@@ -246,7 +280,7 @@ class FilteredOdometry:
             pose: Of position and rotations, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        slips = bool(self.slip.lasts)  # then the velocity is that of the filter
+        slips = bool(self.slip.lasts) or self._motion.feet is not None  # then the velocity is that of the filter
         known = self.kalman.velocity_covariance if slips else self._spread.covariance
         self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose=pose, twist=twist)
 
@@ -274,13 +308,17 @@ class FilteredOdometry:
             imu.rates, kalman.axes,
         )  # fmt: skip
         shaking_time = 0.3  # [s] for which it lasts
-        shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._imu.period
+        if self._motion.feet is None:
+            shaken += (SHAKE_RATIO * leg_speed) ** 2 * 2.0 * shaking_time / self._imu.period
+        elif base.averages:  # a walk shakes so evenly that the mean of its samples misses nothing
+            shaken = 0.0
         sample = NO_SAMPLE
         x, y, _ = base.turned.tolist()
         before_x, before_y = kalman.tilt.tolist()
         if imu.rest > REST_TIME:  # a robot at rest does not turn
             kalman.follow_tilt(0.0, x, y)
-            kalman.rest(imu.rate @ kalman.axes, time)
+            # wheels measure the bias about z, feet twist
+            kalman.rest((imu.rate @ kalman.axes)[: 2 if self._motion.feet is None else 3], time)
             base.turned[:2] = 0.0
         else:
             rate_x, rate_y, rate_z = (imu.rate - kalman.biases).tolist()
@@ -295,8 +333,58 @@ class FilteredOdometry:
         self._motion.wheels.subtract_tilt(*kalman.tilt.tolist())
         return shaken, sample
 
+    def _push(self) -> None:
+        """Let the velocity follow what the accelerometer has measured since it was read the last time."""
+        base = self._base
+        imu = self._imu
+        kalman = self.kalman
+        if not base.fresh:
+            kalman.pushed[:] = 0.0
+            return
+        change, place = base.velocity_change
+        swing = np.cross(base.angular, kalman.axes @ place)
+        kalman.push(about_vertical(change, -base.heading) - swing + imu.swing, imu.since + imu.period)
+        imu.swing[:] = swing
+
+    def _stand(self, yaw: float, imu_time: float, leg_speed: float, feet: Feet) -> None:
+        """Correct the filter by the feet that stand."""
+        motion = self._motion
+        kalman = self.kalman
+        ground = self.ground
+        inliers = self.consensus.inliers
+        period = self._imu.period
+        deviation = 1e-3 + FOOT_SLIP * leg_speed  # [m/s]
+        filter_kernel.measure_speeds(
+            motion.displacements, motion.tilting, period, 0.0, deviation, motion.spreads, motion.variances,
+            motion.speeds,
+        )  # fmt: skip
+        kalman.allow_scrubbing((FOOT_TWIST * leg_speed) ** 2)
+        np.greater(motion.weights, 0.0, out=inliers)
+        np.logical_not(inliers, out=ground.lifted)
+        floor = ground.map.floor
+        kalman.correct(
+            motion.speeds,
+            motion.arms,
+            yaw / period,
+            imu_time / period,
+            variances=motion.variances,
+            inliers=inliers,
+            height=float(self.position[2]) - floor,
+        )
+        np.multiply(motion.weights, inliers, out=motion.trusted)
+        feet.coasted = 0.0 if inliers.any() else feet.coasted + period
+        off = np.abs(motion.wheels.arms[:, 2] + float(self.position[2]) - floor)[inliers]
+        feet.uneven = feet.uneven + period if (off > STEP).any() else 0.0
+        if feet.uneven > STEP_TIME:
+            ground.map.start(math.nan)
+
     def _weigh(self) -> None:
-        self._motion.weigh(self.ground.lifted, self._tags.touch if self._tags.forces else None)
+        motion = self._motion
+        tags = self._tags
+        if motion.feet is None:
+            motion.weigh(self.ground.lifted, tags.touch if tags.forces else None)
+        else:
+            motion.feet.weigh(motion.wheels.forces if tags.forces else None, tags.touch, self._imu.period)
 
     def _measure_yaw(self) -> tuple[float, float, float]:
         """Return the yaw [rad], the time that the gyroscope measures [s], and a variance [rad^2].
@@ -308,6 +396,8 @@ class FilteredOdometry:
         imu.since += self._imu.period
         if self._base.fresh:
             return float(imu.rate[2]) * imu.since - imu.pending, imu.since, 0.0
+        if motion.feet is not None:  # as many as stand: it turns on
+            return float(imu.rate[2]) * imu.period, 0.0, (0.5 * imu.period) ** 2  # at up to 0.5 rad/s else
         yaw, spread = yaw_of(motion.displacements, motion.arms, motion.trusted)
         # 2 % of the largest displacement
         deviation = 0.02 * float(np.abs(motion.displacements).max()) + 1e-6
@@ -408,17 +498,18 @@ class FilteredOdometry:
         return noise * noise + (self._tags.radius_share * speed) ** 2 + sloped * sloped
 
     def _integrate(self, measured: float, imu_time: float, unknown: float) -> None:
-        """Integrate the pose, in the middle of the yaw, and come to the height of the map."""
+        """Integrate the pose, in the middle of the yaw; wheels come to the height of the map."""
         ground = self.ground
         imu = self._imu
         motion = self._motion
+        wheels = motion.wheels
         kalman = self.kalman
         base = self._base
-        wheels = motion.wheels
         period = self._imu.period
         yaw = measured - kalman.excess * imu_time
         kalman.integrate(self.heading + 0.5 * yaw, period, imu_time, unknown)
-        ground.settle(self._tags.settle, period)
+        if motion.feet is None:
+            ground.settle(self._tags.settle, period)
         self.position += kalman.correction[:3]
         yaw += float(kalman.correction[3])
         kalman.correction[:] = 0.0
@@ -426,9 +517,11 @@ class FilteredOdometry:
         if base.fresh:
             imu.offset += imu.pending - float(base.turned[2])
             imu.pending = imu.since = 0.0
-        displacement = kalman.velocity * period - motion.tilting
+        displacement = (kalman.velocity - 0.5 * kalman.pushed[:3]) * period - motion.tilting
         self.position += about_vertical(displacement, self.heading + 0.5 * yaw)
         self.heading = base.heading + imu.offset if base.fresh else self.heading + yaw
+        if motion.feet is not None:
+            return
         missing = ground.map.missing_height(
             wheels.arms,
             wheels.ground.normal,
@@ -459,11 +552,14 @@ class FilteredOdometry:
         self.angular[2] -= self.kalman.bias
         if self.filter is not None:
             self.filter.step(self.angular)
-        spread_time = 0.1  # [s] over which wheels are compared
-        filter_kernel.velocity_of_base(
-            wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity,
-            self._spread.each, spread_time / (spread_time + self._imu.period), self._spread.covariance,
-        )  # fmt: skip
+        if self._motion.feet is not None:
+            self.velocity[:] = self.kalman.velocity
+        else:
+            spread_time = 0.1  # [s] over which wheels are compared
+            filter_kernel.velocity_of_base(
+                wheels.jacobian, wheels.velocity, self.angular, wheels.arms, self._motion.trusted, self.velocity,
+                self._spread.each, spread_time / (spread_time + self._imu.period), self._spread.covariance,
+            )  # fmt: skip
         if self.slip.lasts:
             self.velocity[:2] -= self.slip.slip
         if self.smoothing is not None:

@@ -194,6 +194,7 @@ MOTION = BlockLayout(
     "Motion",
     count=int,  # number of wheels
     joint_count=int,
+    steps=bool,  # whether they are feet, of which all may be in the air: the base's origin stands for their mean
     # Jacobians and arms, now and at the measurement before; steps of the joints
     jacobian=(float, "3 * count", "joint_count"),
     jacobian_before=(float, "3 * count", "joint_count"),
@@ -258,7 +259,7 @@ def _measure_displacements(start, turned):
         displacements[i, 1] += px * mean[i, 2]
         displacements[i, 2] -= px * mean[i, 1] - py * mean[i, 0]
     for axis in range(3):
-        arm[axis] /= total
+        arm[axis] = 0.0 if motion.steps else arm[axis] / total
     motion.tilting[0], motion.tilting[1], motion.tilting[2] = py * arm[2], -px * arm[2], px * arm[1] - py * arm[0]
 
 
@@ -310,6 +311,8 @@ def fit_plane(weights, arms, without, slope):
             x0 += arms[i, 0]
             y0 += arms[i, 1]
             z0 += arms[i, 2]
+    if total == 0.0:
+        return False, 0.0, 0.0, 0.0
     x0 = x0 / total
     y0 = y0 / total
     z0 = z0 / total

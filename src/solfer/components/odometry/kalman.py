@@ -21,6 +21,12 @@ FLOOR_LENGTH = 0.1
 SCRUB_TIME = 1.0
 """Time constant of the yaw rate by which wheels scrub [s]."""
 
+SHAKING = 0.45
+"""Density of what samples of an accelerometer miss of the impacts of feet [m/s^2/sqrt(Hz)]."""
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+
 PLANE_DEVIATION = 3e-4
 """Standard deviation of the tilt of the plane through contacts, by encoders [rad]."""
 
@@ -97,6 +103,7 @@ class WheelInertialFilter:
         rolling: Probability that each wheel rolls and does not slip, shape (k,); live.
         innovations: Innovation of each wheel's velocity, shape (k, 3) [m/s]; live.
         slide: Variance of the position after a metre by wheels that slide [m^2/m].
+        pushed: What an accelerometer measures in the interval, see `push`, shape (5,); live.
     """
 
     def __init__(
@@ -120,8 +127,8 @@ class WheelInertialFilter:
         self.velocity = self.state[VELOCITY:GYRO_BIAS]
         self.tilt = self.state[TILT:SLOPE]
         self.axes = np.eye(3)
-        self._vertical = self.axes[2]
         self._bias_of_base = self.state[GYRO_BIAS : GYRO_BIAS + 3]
+        self.pushed = np.zeros(5)
         self.rolling = np.ones(count)
         self.innovations = np.zeros((count, 3))
         transition, noise_covariance, half = np.zeros((3, size, size))
@@ -138,6 +145,7 @@ class WheelInertialFilter:
             transition=transition,
             noise=noise_covariance,
             half=half,
+            pushed=self.pushed,
         )
         self._address = self._block.address
         self._velocity_noise = 0.0
@@ -147,6 +155,7 @@ class WheelInertialFilter:
         """Begin at rest, at a pose that is known but for its tilt."""
         self.state[:] = 0.0
         self.rolling[:] = 1.0
+        self.pushed[:] = 0.0
         self.slide = 3e-3**2  # before slip that lasts is estimated
         given = self._variances
         variances = np.zeros(len(self.state))
@@ -174,17 +183,31 @@ class WheelInertialFilter:
     @property
     def bias(self) -> float:
         """Bias of the gyroscope about the vertical [rad/s]."""
-        return float(self._vertical @ self._bias_of_base)
+        return float(self.axes[2] @ self._bias_of_base)
 
     @property
     def excess(self) -> float:
         """What the gyroscope measures too much about the vertical in this interval: bias and noise [rad/s]."""
-        return float(self._vertical @ self._bias_of_base) + float(self.state[kernel.GYRO_NOISE])
+        return float(self.axes[2] @ self._bias_of_base) + float(self.state[kernel.GYRO_NOISE])
 
     @property
     def bias_variance(self) -> float:
         """Variance of the bias about the base's z axis [rad^2/s^2]."""
         return float(self.covariance[GYRO_BIAS + 2, GYRO_BIAS + 2])
+
+    def push(self, change: np.ndarray, time: float) -> None:
+        """Let the next prediction change the velocity by what an accelerometer measures, and not walk at random.
+
+        Args:
+            change: Change of the velocity of the base's origin in H, shape (3,) [m/s]; NaN: nothing is known of it.
+            time: Time of that [s].
+        """
+        if math.isnan(float(change.sum())):
+            self.pushed[:] = 0.0
+            return
+        self.pushed[:3] = change
+        self.pushed[3] = SHAKING**2 * time
+        self.pushed[4] = GRAVITY * time
 
     def predict(
         self,
@@ -256,9 +279,9 @@ class WheelInertialFilter:
                 kernel.measure(self._address, which, 0.0, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
-        """Measure the bias about the base's x and y by the gyroscope of a robot at rest, in B, shape (3,) [rad/s]."""
+        """Measure the bias about the base's first axes by the gyroscope at rest, in B, shape (2,) or (3,)."""
         variance = self._variances.noise / time
-        for axis in range(2):
+        for axis in range(len(angular)):
             kernel.measure(self._address, GYRO_BIAS + axis, float(angular[axis]), variance)
 
     def level(self, x: float, y: float) -> bool:
@@ -282,6 +305,7 @@ class WheelInertialFilter:
         *,
         variances: np.ndarray,
         inliers: np.ndarray,
+        height: float | None = None,
     ) -> None:
         """Correct the state by the velocities that wheels measure.
 
@@ -292,8 +316,13 @@ class WheelInertialFilter:
             covered: s / T.
             variances: Variances of w, shape (k,) [m^2/s^2].
             inliers: Which wheels count, shape (k,); those that more likely slip are taken out.
+            height: Of feet: the height of the base's origin above a floor [m]; NaN: there is none. None: these are
+                wheels, two of which count in any case.
         """
-        kernel.correct(self._address, speeds, arms, rate, covered, variances, inliers)
+        steps = height is not None
+        kernel.correct(
+            self._address, speeds, arms, rate, covered, variances, inliers, height if steps else math.nan, steps
+        )
 
     def lose_velocity(self, variance: float) -> None:
         """Know the velocity by another measurement from now on, with a variance [m^2/s^2]."""

@@ -42,6 +42,9 @@ SLIP_PRIOR = 0.02
 SLIP_DENSITY = 1.0 / 4.0**3
 """Density of the velocity of a wheel that slips [s^3/m^3]."""
 
+FOOT_HEIGHT = 0.02
+"""Standard deviation of the height of a foot on a floor [m]: soles give way, and floors are uneven."""
+
 
 FILTER = BlockLayout(
     "Filter",
@@ -58,6 +61,8 @@ FILTER = BlockLayout(
     transition=(float, "size", "size"),
     noise=(float, "size", "size"),
     half=(float, "size", "size"),
+    # change of the velocity by the accelerometer [m/s], its variance [m^2/s^2], and gravity times its time [m/s]
+    pushed=(float, 5),
 )
 """What the kernels read and write."""
 
@@ -113,6 +118,9 @@ def set_process(kalman, arm, heading, angles, imu_time, keeps):
             transition[SLOPE + row, SLOPE + column] *= slope_keep
     transition[GYRO_NOISE, GYRO_NOISE] = 0.0
     transition[SCRUB, SCRUB] = scrub_keep
+    # where the tilt errs, gravity accelerates
+    transition[VELOCITY, TILT + 1] = -kalman.pushed[4]
+    transition[VELOCITY + 1, TILT] = kalman.pushed[4]
     if imu_time == 0.0:
         return
     set_rotation(transition, TILT, tilt_yaw)
@@ -319,8 +327,9 @@ def _predict(start, arm, heading, angles, imu_time, keeps, variances):
     moves = kalman.half[0]
     set_process(kalman, arm, heading, angles, imu_time, keeps)
     noise[:] = 0.0
+    pushed = kalman.pushed
     for axis in range(3):
-        noise[VELOCITY + axis, VELOCITY + axis] = variances[0]
+        noise[VELOCITY + axis, VELOCITY + axis] = pushed[3] if pushed[3] > 0.0 else variances[0]
     noise[SCRUB, SCRUB] = variances[1]
     noise[GYRO_NOISE, GYRO_NOISE] = variances[2]
     for axis in range(2):
@@ -338,13 +347,30 @@ def _predict(start, arm, heading, angles, imu_time, keeps, variances):
         b = state[first + 1]
         state[first] = transition[first, first] * a + transition[first, first + 1] * b
         state[first + 1] = transition[first + 1, first] * a + transition[first + 1, first + 1] * b
+    for axis in range(3):
+        state[VELOCITY + axis] += pushed[axis]
+    state[VELOCITY] -= pushed[4] * state[TILT + 1]
+    state[VELOCITY + 1] += pushed[4] * state[TILT]
     state[SCRUB] *= keeps[0]
     state[GYRO_NOISE] = 0.0
     propagate(kalman)
 
 
-def _correct(start, speeds, arms, rate, covered, variances, inliers):
-    """Correct the state by the velocities that wheels measure [m/s], of inliers that more likely roll than slip."""
+@part
+def update_height(kalman, arm, height):
+    """Correct the state by the height of a foot on a floor, above which the base is [m]; x and y are not corrected."""
+    row = kalman.half[7]
+    row[:] = 0.0
+    row[POSITION + 2] = 1.0
+    innovation = -arm[2] - height - kalman.state[POSITION + 2]
+    update(kalman, row, innovation, FOOT_HEIGHT * FOOT_HEIGHT, POSITION + 2)
+
+
+def _correct(start, speeds, arms, rate, covered, variances, inliers, height, steps):
+    """Correct the state by the velocities that wheels measure [m/s], of inliers that more likely roll than slip.
+
+    With feet (`steps`) all may slip, and those that stand measure the `height` above a floor, unless it is NaN [m].
+    """
     kalman = _filter_at(start)
     innovations = kalman.innovations
     rolling = kalman.rolling
@@ -353,20 +379,23 @@ def _correct(start, speeds, arms, rate, covered, variances, inliers):
     for wheel in range(kalman.count):
         wheel_velocity(kalman, wheel, arms[wheel], rate, covered, expected)
         set_wheel_rows(kalman, wheel, arms[wheel], covered, expected)
-        for i in range(3):
-            innovations[wheel, i] = speeds[wheel, i] - expected[i]
+        for i in range(3):  # speeds are means over the interval, in whose middle half of the push is still to come
+            innovations[wheel, i] = speeds[wheel, i] - expected[i] + 0.5 * kalman.pushed[i]
         rolls = (1.0 - SLIP_PRIOR) * likelihood(kalman, wheel, variances[wheel])
         rolling[wheel] = rolls / (rolls + SLIP_PRIOR * SLIP_DENSITY)
         likely += inliers[wheel] and rolling[wheel] > 0.5
     for wheel in range(kalman.count):
-        if likely > 1 and rolling[wheel] <= 0.5:  # where all contradict, the prediction is wrong
+        # where all wheels contradict, the prediction is wrong; feet slip, or are in the air
+        if (likely > 1 or steps) and rolling[wheel] <= 0.5:
             inliers[wheel] = False
         if inliers[wheel]:
             for i in range(3):
                 wheel_velocity(kalman, wheel, arms[wheel], rate, covered, expected)
-                innovation = speeds[wheel, i] - expected[i]
+                innovation = speeds[wheel, i] - expected[i] + 0.5 * kalman.pushed[i]
                 # what wheels contradict each other by is more than radii: no position follows from it
                 update(kalman, kalman.rows[wheel, i], innovation, variances[wheel], HEADING)
+            if not math.isnan(height):
+                update_height(kalman, arms[wheel], height)
         elif rolling[wheel] > 0.5:
             rolling[wheel] = 0.5
 
@@ -469,7 +498,7 @@ _M = "float64[:, ::1]"
 _PAIR = "UniTuple(float64, 2)"
 
 predict = cached(f"void(int64, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(float64, 5))", _predict)
-correct = cached(f"void(int64, {_M}, {_M}, {_F}, {_F}, {_V}, boolean[::1])", _correct, sources=[DENSE])
+correct = cached(f"void(int64, {_M}, {_M}, {_F}, {_F}, {_V}, boolean[::1], {_F}, boolean)", _correct, sources=[DENSE])
 integrate = cached(f"void(int64, {_F}, {_F}, {_F}, UniTuple(float64, 3))", _integrate)
 level = cached(f"boolean(int64, {_F}, {_F}, {_F})", _level)
 measure = cached(f"boolean(int64, int64, {_F}, {_F})", _measure)

@@ -27,7 +27,7 @@ def _replaced(method: object) -> object:
 class OdometryTags(Record):
     """Tags of `Odometry`."""
 
-    chain: Annotated[str, NameOf("group")] = Field("wheels", description="SRDF group of the wheels")
+    chain: Annotated[str, NameOf("group")] = Field("wheels", description="SRDF group of the wheels or feet")
     method: Annotated[Literal["geometric", "filter"], BeforeValidator(_replaced)] = Field(
         "geometric",
         description="`geometric`: all wheels roll on flat ground, as in the paper; `filter`: a Kalman filter with "
@@ -52,14 +52,17 @@ class OdometryTags(Record):
         0.01, **LENGTH, **LIVE, description="filter: a wheel is lifted that has risen this much above the ground [m]"
     )
     forces: bool = Field(
-        False, description="filter: whether wheels count by the forces on their contacts, which a pipe has to bring"
+        False,
+        description="filter: whether wheels count by the forces on their contacts, which a pipe has to bring; of feet "
+        "they are else those of the joints' torques",
     )
     touch: float = Field(
         30.0,
         ge=0.0,
         le=1e5,
         **LIVE,
-        description="filter: with `forces`, normal force below which a wheel does not count [N]",
+        description="filter: with `forces`, and of feet, normal force below which a wheel or foot does not count; of "
+        "feet at most a tenth of the weight [N]",
     )
     level: float = Field(1.5, ge=0.0, le=90.0, description="filter: slope up to which ground counts as level [deg]")
     settle: float = Field(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.feet import Feet
 from solfer.components.odometry.wheels import Wheels
 from solfer.numerics.blocks import MemoryBlock
 
@@ -25,6 +26,7 @@ class WheelMotion:
         trusted: The same if it also rolls, shape (k,).
         spreads: Spread of each wheel's innovations, shape (k,).
         variances: Variance of each wheel's speed, shape (k,) [m^2/s^2].
+        feet: Which of them stand, if they are feet; None: they are wheels.
         block: What compiled functions get of these.
     """
 
@@ -32,18 +34,20 @@ class WheelMotion:
         count = len(wheels)
         self.wheels = wheels
         self.weights, self.trusted, self.spreads, self.variances = np.zeros((4, count))
-        self.displacements, self.speeds, self.arms, self._arms_before = np.zeros((4, count, 3))
-        self._jacobian_before = np.zeros_like(wheels.jacobian)
-        self.step, self._joints_before = np.zeros((2, wheels.joints))
+        self.displacements, self.speeds, self.arms, arms_before = np.zeros((4, count, 3))
+        jacobian_before = np.zeros_like(wheels.jacobian)
+        self.step, joints_before = np.zeros((2, wheels.joints))
+        self._before = joints_before, jacobian_before, arms_before
         self.arm, self.tilting = np.zeros((2, 3))
         self.block = MemoryBlock(
             filter_kernel.MOTION,
             count=count,
             joint_count=wheels.joints,
+            steps=wheels.steps,
             jacobian=wheels.jacobian,
-            jacobian_before=self._jacobian_before,
+            jacobian_before=jacobian_before,
             arms=wheels.arms,
-            arms_before=self._arms_before,
+            arms_before=arms_before,
             step=self.step,
             torques=wheels.torque,
             legs=wheels.legs,
@@ -56,10 +60,11 @@ class WheelMotion:
             tilting=self.tilting,
             speeds=self.speeds,
         )
+        self.feet = Feet(count, self.block, wheels.weight) if wheels.steps else None
 
     def find_step(self) -> None:
         """Compute the steps of the joints since the last `remember`."""
-        np.subtract(self.wheels.position, self._joints_before, out=self.step)
+        np.subtract(self.wheels.position, self._before[0], out=self.step)
 
     def weigh(self, lifted: np.ndarray, touch: float | None) -> None:
         """Weigh the wheels: those that are lifted do not count, unless fewer than two would be left.
@@ -81,11 +86,17 @@ class WheelMotion:
         filter_kernel.measure_displacements(self.block.address, turned)
 
     def mean_height(self) -> float:
-        """Return the height of the contacts above the base's origin, mean of the wheels that touch [m]."""
+        """Return the height of the contacts above the base's origin, mean of the wheels that touch [m].
+
+        Where all feet are in the air it is that of the lowest one.
+        """
+        if not self.weights.any():
+            return float(self.wheels.arms[:, 2].min())
         return float(self.weights @ self.wheels.arms[:, 2]) / float(self.weights.sum())
 
     def remember(self) -> None:
         """Let the next step begin here."""
-        self._joints_before[:] = self.wheels.position
-        self._jacobian_before[:] = self.wheels.jacobian
-        self._arms_before[:] = self.wheels.arms
+        joints, jacobian, arms = self._before
+        joints[:] = self.wheels.position
+        jacobian[:] = self.wheels.jacobian
+        arms[:] = self.wheels.arms

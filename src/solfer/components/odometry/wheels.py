@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from solfer.components.odometry import filter_kernel
 from solfer.errors import ComponentError
 from solfer.points import Handler, make_contact
-from solfer.points.contact.contacts import RollingContact
+from solfer.points.contact.contacts import BallContact, PointContact, RollingContact
 from solfer.robot import Robot
 
 
@@ -23,7 +23,7 @@ class _Ground:
         is_level: Whether that is vertical.
     """
 
-    def __init__(self, contacts: Handler[RollingContact]):
+    def __init__(self, contacts: list[RollingContact]):
         self._contacts = contacts
         self.normal = np.array((0.0, 0.0, 1.0))
         self.is_level = True
@@ -49,7 +49,12 @@ class _Ground:
 
 
 class Wheels:
-    """Contacts of the wheels of a group. They are its own: the ground's normal may change here, unseen by others.
+    """Contacts of the wheels or feet of a group.
+
+    They are its own: the ground's normal may change here, unseen by others.
+
+    A foot is a contact of the type `contact_point`: with an offset a ball that rolls on the ground with its link, else
+    a point of a sole. Where a group has wheels, they count alone: what else may touch are hands.
 
     Args:
         robot: The Robot.
@@ -75,9 +80,12 @@ class Wheels:
         if robot.kinematics.base is None:
             raise ComponentError(f"the base of '{robot.name}' is fixed", where=where, expected="a floating base")
         links = set(robot.links(group))
-        records = [each for each in robot.contact_records if each.type == "wheel" and each.end_frame in links]
+        touching = [each for each in robot.contact_records if each.end_frame in links]
+        records = [each for each in touching if each.type == "wheel"]
         if radius is not None:
             records = [each.model_copy(update={"minor_axis": radius - (each.major_axis or 0.0)}) for each in records]
+        elif not records:
+            records = touching
         made = [make_contact(each, robot) for each in records]
         self._shared = [robot.contacts[each.name] for each in records]
         self.names = tuple(each.name for each in records)
@@ -89,12 +97,12 @@ class Wheels:
             made = [RollingContact(link, robot, 0.0, tube=radius) for link in self.names]
         if not made:
             raise ComponentError(
-                f"'{robot.name}' has {len(made)} wheels in '{group}' that touch the ground",
+                f"'{robot.name}' has {len(made)} wheels or feet in '{group}' that touch the ground",
                 where=where,
                 expected="at least one, and a robot configuration with `contacts: {read: true}`",
             )
         self._robot = robot
-        self._contacts = Handler(contact for contact in made if isinstance(contact, RollingContact))
+        self._contacts = Handler(made)
         self.links = tuple(contact.link for contact in self._contacts)
         radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records)
         self.radii = radii or (radius or 0.0,) * len(made)
@@ -103,10 +111,11 @@ class Wheels:
         self.arms = np.zeros((count, 3))
         self.jacobian = np.zeros((3 * count, joints))
         self.legs = np.ones(joints, dtype=bool)
-        self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
+        rolling = [each.link for each in made if not _is_foot(each)]
+        self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in rolling]] = False
         self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
-        self.ground = _Ground(self._contacts)
+        self.ground = _Ground([each for each in made if isinstance(each, RollingContact)])
         self._forces = np.zeros(count)
         self.position = robot.state.position[6:]
         self.velocity = robot.state.velocity[6:]
@@ -117,6 +126,11 @@ class Wheels:
     def set_normal(self, x: float, y: float, z: float) -> None:
         """Set the normal of the ground, any length."""
         self.ground.set_normal(x, y, z)
+
+    @property
+    def steps(self) -> bool:
+        """Whether some of them are feet, which lift and land."""
+        return any(map(_is_foot, self._contacts))
 
     @property
     def carrying(self) -> np.ndarray:
@@ -130,6 +144,11 @@ class Wheels:
     def joints(self) -> int:
         """Number of DoFs without the base."""
         return len(self.legs)
+
+    @property
+    def weight(self) -> float:
+        """Weight of the robot [N]."""
+        return 9.81 * self._robot.kinematics.mass
 
     @property
     def torque(self) -> np.ndarray:
@@ -157,3 +176,7 @@ class Wheels:
         for index, contact in enumerate(self._shared):
             self._forces[index] = contact.force @ self.ground.normal
         return self._forces
+
+
+def _is_foot(contact: PointContact | RollingContact) -> bool:
+    return isinstance(contact, BallContact | PointContact)

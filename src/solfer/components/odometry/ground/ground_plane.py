@@ -101,10 +101,15 @@ class GroundPlane:
         """
         motion = self._motion
         wheels = motion.wheels
-        found = self._level and filter_kernel.follow_plane(
-            motion.block.address, self.block.address, heading, self._kalman.velocity, angular, fresh, period
+        # feet that lift and land are on no plane until all of them stand
+        found = (
+            self._level
+            and (motion.feet is None or motion.weights.all())
+            and filter_kernel.follow_plane(
+                motion.block.address, self.block.address, heading, self._kalman.velocity, angular, fresh, period
+            )
         )
-        self.turns = found == 2
+        self.turns = found == 2 and motion.feet is None
         if found:
             a, b = self.slope.tolist()
             if math.hypot(a, b) > self._level * (1.0 if wheels.ground.is_level else 0.7):

@@ -33,6 +33,8 @@ class MeasuredBase:
 
     Attributes:
         averages: Whether `angular` is the mean since the measurement before, and not that of one moment.
+        shakes: Whether the base tilts to and fro so fast that a mean of rates belongs to the middle of its interval;
+            wheels are too calm for that.
         fresh: Whether the IMU has a new sample.
         velocity_change: What its accelerometer measures; to be set before `start`.
         rotation: Rotation from the base to the State's world, shape (3, 3).
@@ -43,11 +45,11 @@ class MeasuredBase:
     """
 
     def __init__(self, robot: Robot):
-        self.averages = False
+        self.averages = self.shakes = False
         chart = robot.kinematics.base
         self._motion = BaseKinematics(chart if chart is not None else BaseChart())
         self._state = robot.state
-        self._rates = np.zeros(6)
+        self._rates, self._middle, self._pose = np.zeros((3, 6))
         self.fresh = True
         self.velocity_change = VelocityChange(np.full(3, math.nan), np.zeros(3))
         self.rotation = self._known = np.eye(3)
@@ -56,6 +58,7 @@ class MeasuredBase:
 
     def start(self) -> None:
         """Begin with the orientation of now."""
+        self._pose[:] = self._state.position[:6]
         self._read()
         self._measure()
         self._known = self.rotation
@@ -80,6 +83,13 @@ class MeasuredBase:
         self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
     def _measure(self) -> None:
+        if self.averages and self.shakes:
+            # half an interval late, the product of two rates that go together would turn the heading
+            turned = self._state.position[:6] - self._pose
+            self._pose += turned
+            turned -= math.tau * np.round(turned / math.tau)
+            np.subtract(self._pose, 0.5 * turned, out=self._middle)
+            self._motion.update(self._middle, self._rates)
         self.angular[:] = about_vertical(self._motion.velocity[3:], -self.heading)
 
     def subtract_tilt(self, x: float, y: float) -> None:
