@@ -346,7 +346,7 @@ class CrossingCourse(Course):
         return True
 
     def _roll(self, along: float, offsets: np.ndarray) -> None:
-        """Begin to roll: the base to a place on the way [m], wheels to offsets, shape (n,) [m]."""
+        """Begin to roll: the base to a place ahead [m], wheels to offsets, shape (n,) [m]."""
         pose = self._pose
         vertices = self._target.vertices
         assert vertices is not None
