@@ -3,6 +3,8 @@
 Nothing spins for topics: whoever reads a topic takes what the middleware of ROS 2 has kept for it, as packed bytes.
 """
 
+from collections.abc import Sequence
+
 from solfer.errors import MissingDependency
 
 try:
@@ -14,6 +16,13 @@ except ModuleNotFoundError as error:
     ) from error
 
 from solfer.middleware.ros2.middleware import Ros2Middleware
-from solfer.middleware.ros2.node import Ros2Node, arguments
+from solfer.middleware.ros2.node import Ros2Node, argument, arguments, run_main, setting
+from solfer.process import switch
 
-__all__ = ["Ros2Middleware", "Ros2Node", "arguments"]
+
+def connect(name: str, argv: Sequence[str] | None = None, publishes_time: bool = False) -> Ros2Middleware:
+    """Start the node of this process, see `Ros2Node`."""
+    return Ros2Middleware(Ros2Node(name, argv, publishes_time))
+
+
+__all__ = ["Ros2Middleware", "Ros2Node", "argument", "arguments", "connect", "run_main", "setting", "switch"]

@@ -36,8 +36,14 @@ from solfer.transport.wire_numbers import BODY_NUMBERS, IMU_NUMBERS, body_of, im
 
 NANOSECONDS = 1_000_000_000
 
-Present = Callable[[], int]
-"""Returns ROS time [ns]."""
+StampOf = Callable[[float], int]
+"""Returns the stamp [ns] of what was measured at a time of this process [s]; of zero, which is unknown, the present."""
+
+
+def wall_stamp(_: float) -> int:
+    """Return the present of the wall clock [ns]."""
+    return time.time_ns()
+
 
 
 def interface(name: str, kind: str = "msg") -> Any:
@@ -65,7 +71,7 @@ class Codec:
 
     Args:
         message: Canonical name of the message.
-        present: ROS time, with which messages without a stamp are stamped.
+        stamp_of: Stamps what is encoded.
 
     Attributes:
         ros_class: Its class.
@@ -75,10 +81,10 @@ class Codec:
         UnknownName: The package has no such message.
     """
 
-    def __init__(self, message: str, present: Present = time.time_ns):
+    def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
         self.ros_class = interface(message)
         self._message = message
-        self._present = present
+        self._stamp_of = stamp_of
         self._has_header = "header" in self.ros_class.get_fields_and_field_types()
 
     def encode(self, message: Any) -> bytes:
@@ -115,16 +121,16 @@ class Codec:
     def _stamp(self, message: Any) -> None:
         """Stamp a message, and those without a stamp in its lists, as tf has them."""
         if self._has_header:
-            message.header.stamp = to_time(self._present())
+            message.header.stamp = to_time(self._stamp_of(0.0))
         for name, kind in message.get_fields_and_field_types().items():
             if kind.startswith("sequence<") and "/" in kind:
                 for each in getattr(message, name):
                     if hasattr(each, "header") and not (each.header.stamp.sec or each.header.stamp.nanosec):
-                        each.header.stamp = to_time(self._present())
+                        each.header.stamp = to_time(self._stamp_of(0.0))
 
-    def _header(self, frame: str = "") -> CdrWriter:
+    def _header(self, message: Any, frame: str = "") -> CdrWriter:
         writer = CdrWriter()
-        writer.time(*divmod(self._present(), NANOSECONDS))
+        writer.time(*divmod(self._stamp_of(message.stamp), NANOSECONDS))
         writer.text(frame)
         return writer
 
@@ -132,8 +138,8 @@ class Codec:
 class JointCodec(Codec):
     """sensor_msgs/JointState and solfer/JointCommand: names, and arrays that are empty or as long as the names."""
 
-    def __init__(self, message: str, present: Present = time.time_ns):
-        super().__init__(message, present)
+    def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
+        super().__init__(message, stamp_of)
         self._fields = JOINT_MESSAGES[message]
         self._open = message == ANY_INTERFACE
         self._names: tuple[str, ...] = ()
@@ -141,7 +147,7 @@ class JointCodec(Codec):
 
     def encode(self, message: JointMessage) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header()
+        writer = self._header(message)
         writer.texts(message.names)
         for name in self._fields:
             writer.array(getattr(message, name))
@@ -181,14 +187,14 @@ class JointCodec(Codec):
 class BodyCodec(Codec):
     """nav_msgs/Odometry."""
 
-    def __init__(self, message: str, present: Present = time.time_ns):
-        super().__init__(message, present)
+    def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
+        super().__init__(message, stamp_of)
         self._inexact = InexactOrientations()
         self._numbers = np.zeros(BODY_NUMBERS)
 
     def encode(self, message: Any) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header(message.frame)
+        writer = self._header(message, message.frame)
         writer.text(message.child)
         put_body(message, self._numbers)
         writer.numbers(self._numbers)
@@ -203,13 +209,13 @@ class BodyCodec(Codec):
 class ImuCodec(Codec):
     """sensor_msgs/Imu."""
 
-    def __init__(self, message: str, present: Present = time.time_ns):
-        super().__init__(message, present)
+    def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
+        super().__init__(message, stamp_of)
         self._inexact = InexactOrientations()
 
     def encode(self, message: Any) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header(message.frame)
+        writer = self._header(message, message.frame)
         numbers = np.zeros(IMU_NUMBERS)
         put_imu(message, numbers)
         writer.numbers(numbers)
@@ -226,7 +232,7 @@ class WrenchCodec(Codec):
 
     def encode(self, message: Any) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header(message.frame)
+        writer = self._header(message, message.frame)
         writer.numbers(message.force)
         writer.numbers(message.torque)
         return bytes(writer.bytes)
@@ -240,13 +246,13 @@ class WrenchCodec(Codec):
 class VectorCodec(Codec):
     """A header and a fixed count of numbers."""
 
-    def __init__(self, message: str, present: Present = time.time_ns):
-        super().__init__(message, present)
+    def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
+        super().__init__(message, stamp_of)
         self._count = VECTOR_MESSAGES[message]
 
     def encode(self, message: Any) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header(message.frame)
+        writer = self._header(message, message.frame)
         writer.numbers(message.values)
         return bytes(writer.bytes)
 
@@ -261,7 +267,7 @@ class PointsCodec(Codec):
 
     def encode(self, message: Any) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header(message.frame)
+        writer = self._header(message, message.frame)
         writer.texts(tuple(message.names))
         writer.count(len(message.values))
         writer.array(message.values.ravel())
@@ -284,7 +290,7 @@ class RefusalCodec(Codec):
 
     def encode(self, message: Any) -> bytes:
         """See `Codec.encode`."""
-        writer = self._header()
+        writer = self._header(message)
         writer.texts(message.owners)
         writer.flags(message.claims)
         writer.texts(message.reasons)
@@ -307,14 +313,14 @@ _KINDS: dict[str, type[Codec]] = {
 }
 
 
-def codec(message: str, present: Present = time.time_ns) -> Codec:
+def codec(message: str, stamp_of: StampOf = wall_stamp) -> Codec:
     """Make the codec of a message by its canonical name; one that no pipe carries travels by its fields.
 
     Raises:
         MissingDependency: The package of the message is not there, or not built.
         UnknownName: The package has no such message.
     """
-    return _KINDS.get(message, Codec)(message, present)
+    return _KINDS.get(message, Codec)(message, stamp_of)
 
 
 def to_time(nanoseconds: int) -> Any:

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from solfer.errors import MiddlewareError, PipeError
-from solfer.middleware.ros2.codecs import Codec, Present, codec
+from solfer.middleware.ros2.codecs import Codec, StampOf, codec
 from solfer.throttle import Throttle
 from solfer.transport.backlog import SENDERS, Backlog
 from solfer.transport.endpoints import NEW, NONE, OLD, PUBLISHER_TIMEOUT, MessageStatus, Publisher, Queue, Reader, Writer
@@ -366,15 +366,15 @@ class Ros2Writer(Writer):
         node: The node.
         topic: Name of the topic.
         message: Canonical name of its message.
-        present: ROS time, with which messages are stamped.
+        stamp_of: Stamps what is written.
 
     Raises:
         MiddlewareError: There can be no such topic.
     """
 
-    def __init__(self, node: Node, topic: str, message: str, present: Present):
+    def __init__(self, node: Node, topic: str, message: str, stamp_of: StampOf):
         self._node = node
-        self._codec = codec(message, present)
+        self._codec = codec(message, stamp_of)
         self.carries = message
         try:
             self._publisher = node.create_publisher(self._codec.ros_class, topic, quality(DEPTH, reliable=True))

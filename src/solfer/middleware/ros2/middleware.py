@@ -103,8 +103,24 @@ class Ros2Middleware(Middleware):
             time.sleep(0.01)
         return None if reader.message is None else reader.message.fields["data"]
 
-    def provide(self, name: str, text: str) -> None:
-        """Publish a text for all nodes that ask for the parameter `name`, as long as this node lives."""
+    def stamp_measurements(self, now: float) -> None:
+        """Stamp messages from now on with when they were measured, by a clock that shows `now` [s] at present.
+
+        Without it they are stamped with when they are sent. To be called by a node that does nothing but measure.
+        """
+        self._node.clock.epoch = self.stamp_time() - now
+
+    def lockstep_server(self) -> None:
+        """Return None: no node follows a simulation in lock-step here."""
+
+    def provide(self, name: str, text: str, original: str = "") -> None:
+        """Publish a text for all nodes that ask for the parameter `name`, as long as this node lives.
+
+        Args:
+            name: The parameter, also the name of the topic.
+            text: Its value.
+            original: What the text was made of; not needed here.
+        """
         publisher = self._ros.create_publisher(String, name, quality(1, reliable=True, latched=True))
         publisher.publish(String(data=text))
         self._provided.append(publisher)
@@ -132,7 +148,7 @@ class Ros2Middleware(Middleware):
 
     def writer(self, topic: str, message: str) -> Ros2Writer:
         """See `Middleware.writer`."""
-        return self._keep(Ros2Writer(self._ros, topic, message, self._node.clock.present))
+        return self._keep(Ros2Writer(self._ros, topic, message, self._node.clock.stamp_of))
 
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
         """See `Middleware._first_order`."""

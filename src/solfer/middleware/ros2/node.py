@@ -5,6 +5,7 @@ import os
 import sys
 import threading
 import time
+from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -19,7 +20,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from solfer.errors import ConfigError, MiddlewareError
 from solfer.middleware.ros2.endpoints import quality
-from solfer.process import ProcessEnd
+from solfer.process import ProcessEnd, run_process
 
 logger = logging.getLogger(__name__)
 
@@ -32,18 +33,51 @@ def arguments(argv: Sequence[str]) -> list[str]:
     return remove_ros_args(list(argv))[1:]
 
 
+def argument(argv: Sequence[str], name: str) -> str | None:
+    """Return the value of `name:=value` behind the command, such as `--ros-args -p name:=value`; None: there is none."""
+    return next((each.partition(":=")[2] for each in argv if each.startswith(f"{name}:=")), None)
+
+
+def setting(argv: Sequence[str], name: str, default: Any, kind: Callable[[str], Any] = str) -> Any:
+    """Return the value of a setting, see `argument`; `kind` converts its text, and raises ValueError for other texts.
+
+    Raises:
+        ConfigError: The text is not a value of that kind.
+    """
+    value = argument(argv, name)
+    if not value:
+        return default
+    try:
+        return kind(value)
+    except (ValueError, ArgumentTypeError) as error:
+        raise ConfigError(f"'{value}' is not a value of '{name}'", where=f"{name}:=", expected=str(error)) from error
+
+
+def run_main(main: Callable[[list[str]], int]) -> None:
+    """Run a node's `main` on the process' arguments and exit with its code; an error is printed in one block."""
+    run_process(main, sys.argv)
+
+
 class Ros2Clock:
     """The machine's monotonic clock; ROS time is the wall clock's.
 
     Attributes:
         rewinds: How often the time that it follows has gone back.
+        epoch: ROS time at which the clock of what this process measures was zero [s]; None: there is no such clock.
     """
 
     rewinds: int = 0
+    epoch: float | None = None
 
     def now(self) -> float:
         """See `Middleware.now`."""
         return time.monotonic()
+
+    def stamp_of(self, measured: float) -> int:
+        """Return the stamp of what was measured at a time of this process [ns], or the present if that is unknown."""
+        if self.epoch is None or measured <= 0.0:
+            return self.present()
+        return round(1e9 * (self.epoch + measured))
 
     def present(self) -> int:
         """Return ROS time [ns]."""
