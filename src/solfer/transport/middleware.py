@@ -108,11 +108,13 @@ class Middleware(abc.ABC):
         name: Name of this node: the sender of its messages.
         rewinds: How often the simulated time that this node follows has gone back; `now` never does.
         loss: Why this node has to end without a request to, in one line; empty while it need not.
+        offers_actions: Whether the topics of actions, in the protocol of actionlib, have their messages here.
     """
 
     name: str
     rewinds: int = 0
     loss: str = ""
+    offers_actions: bool = True
 
     @abc.abstractmethod
     def now(self) -> float:

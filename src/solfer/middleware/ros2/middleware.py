@@ -15,10 +15,12 @@ from solfer.interfaces.declaration import Service
 from solfer.middleware.ros2.codecs import require_fields, to_time
 from solfer.middleware.ros2.endpoints import Ros2Queue, Ros2Reader, Ros2Writer, quality
 from solfer.middleware.ros2.node import Ros2Node
+from solfer.middleware.ros2.parameters import NativeParameters
 from solfer.middleware.ros2.services import Ros2Service, call, replied
 from solfer.transport.endpoints import NEW, JointOrder
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
+from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
 from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
@@ -29,7 +31,7 @@ REPORT_PERIOD = 1.0
 """Shortest time between two reports of one part while its level stays the same [s]."""
 
 LATCHED_TIMEOUT = 0.5
-"""Longest wait for the first message of a latched topic [s]."""
+"""Longest wait for the first message of a latched topic, and until a new node knows which topics there are [s]."""
 
 
 class Ros2Middleware(Middleware):
@@ -39,8 +41,11 @@ class Ros2Middleware(Middleware):
         node: The process' node; it is closed with the middleware.
     """
 
+    offers_actions = False
+
     def __init__(self, node: Ros2Node):
         self._node = node
+        self._known = time.monotonic() + LATCHED_TIMEOUT
         self._ros = node.ros
         self.name = node.name
         self._endpoints: list[Ros2Reader | Ros2Queue | Ros2Writer] = []
@@ -99,7 +104,10 @@ class Ros2Middleware(Middleware):
         if reader is None:
             reader = self._texts[topic] = Ros2Reader(self._ros, topic, "std_msgs/String", latched=True)
         end = time.monotonic() + LATCHED_TIMEOUT
-        while reader.read() is not NEW and reader.message is None and time.monotonic() < end:
+        while reader.read() is not NEW and reader.message is None:
+            now = time.monotonic()
+            if now > end or now > self._known and not self._ros.count_publishers(topic):
+                break
             time.sleep(0.01)
         return None if reader.message is None else reader.message.fields["data"]
 
@@ -177,13 +185,19 @@ class Ros2Middleware(Middleware):
         return answer
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
-        """See `Middleware.serve`.
+        """See `Middleware.serve`; services of live parameters become parameters of the node, which has their names.
 
         Raises:
             ComponentError: A declaration does not fit its interface.
             MiddlewareError: Another node offers a service of that name.
         """
+        live = {each.name: each for each in services if each.name in (GET_PARAMETERS, SET_PARAMETERS)}
+        if len(live) == 2:
+            prefix = "" if owner.strip("/") == self._ros.get_name() else f"{owner.strip('/').replace('/', '.')}."
+            NativeParameters(self._ros, prefix, live[GET_PARAMETERS], live[SET_PARAMETERS], submit=submit)
         for service in services:
+            if service.name in live:
+                continue
             self._services.append(Ros2Service(self._ros, owner, service, submit, running=self.running))
 
     def topics(self) -> "Future[Topics]":
