@@ -50,6 +50,7 @@ class Ros2Middleware(Middleware):
         self.name = node.name
         self._endpoints: list[Ros2Reader | Ros2Queue | Ros2Writer] = []
         self._services: list[Ros2Service] = []
+        self._live: dict[str, dict[str, Service]] = {}
         self._requests: list[Future[Any]] = []
         self._texts: dict[str, Ros2Reader] = {}
         self._provided: list[Any] = []
@@ -191,14 +192,15 @@ class Ros2Middleware(Middleware):
             ComponentError: A declaration does not fit its interface.
             MiddlewareError: Another node offers a service of that name.
         """
-        live = {each.name: each for each in services if each.name in (GET_PARAMETERS, SET_PARAMETERS)}
-        if len(live) == 2:
-            prefix = "" if owner.strip("/") == self._ros.get_name() else f"{owner.strip('/').replace('/', '.')}."
-            NativeParameters(self._ros, prefix, live[GET_PARAMETERS], live[SET_PARAMETERS], submit=submit)
         for service in services:
-            if service.name in live:
+            if service.name not in (GET_PARAMETERS, SET_PARAMETERS):
+                self._services.append(Ros2Service(self._ros, owner, service, submit, running=self.running))
                 continue
-            self._services.append(Ros2Service(self._ros, owner, service, submit, running=self.running))
+            pair = self._live.setdefault(owner, {})
+            pair[service.name] = service
+            if len(pair) == 2:
+                prefix = "" if owner.strip("/") == self._ros.get_name() else f"{owner.strip('/').replace('/', '.')}."
+                NativeParameters(self._ros, prefix, pair[GET_PARAMETERS], pair[SET_PARAMETERS], submit=submit)
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the node knows them, so that the answer is there at once."""

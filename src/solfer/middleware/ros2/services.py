@@ -51,7 +51,7 @@ class Ros2Service:
         self._match(service.request, kind.Request, more=frozenset())
         self._match(service.reply, kind.Response, more=frozenset(("success", "message")))
         name = node.resolve_service_name(f"{owner}/{service.name}")
-        if name in dict(node.get_service_names_and_types()):
+        if node.count_services(name):
             raise MiddlewareError(
                 f"service {name} is offered by another node already",
                 expected="one node of that name: end the other, or start this one with --ros-args -r __node:=another_name",
