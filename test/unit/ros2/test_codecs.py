@@ -46,13 +46,15 @@ MESSAGES = {
 
 @pytest.mark.parametrize("name", MESSAGES)
 def test_messages_are_those_of_ros(name):
-    """rclpy reads every field of what is packed here, and packs what is read here to the same numbers and names."""
+    """Rclpy reads every field of what is packed here, and packs what is read here to the same numbers and names."""
     message, made = MESSAGES[name], codec(name)
     published = deserialize_message(made.encode(message), interface(name))
     if isinstance(message, JointMessage):
         assert tuple(published.name) == message.names
         for field in ("position", "velocity", "effort"):
-            np.testing.assert_array_equal(getattr(published, field), getattr(message, field) if getattr(message, field) is not None else [])
+            np.testing.assert_array_equal(
+                getattr(published, field), getattr(message, field) if getattr(message, field) is not None else []
+            )
     received = made.decode(bytes(serialize_message(published)), "sender")
     assert received.sender == "sender" and abs(received.stamp - published.header.stamp.sec) < 1.0
     for before, after in zip(arrays(message), arrays(received), strict=True):
@@ -73,11 +75,18 @@ def test_a_message_that_ends_too_early_is_refused(name):
 def test_messages_of_any_type_travel_by_their_fields():
     fields = {
         "level": 1,
-        "nested": {"header": {"frame_id": "world", "stamp": 2.5}, "poses": ({"position": {"x": 1.0, "y": 2.0, "z": 3.0}},)},
+        "nested": {
+            "header": {"frame_id": "world", "stamp": 2.5},
+            "poses": ({"position": {"x": 1.0, "y": 2.0, "z": 3.0}},),
+        },
     }
     made = codec("geometry_msgs/PoseArray")
     packed = made.encode(FieldsMessage(fields["nested"]))
     received = made.decode(packed, "sender").fields
-    assert received["header"]["frame_id"] == "world" and received["poses"][0]["position"] == {"x": 1.0, "y": 2.0, "z": 3.0}
+    assert received["header"]["frame_id"] == "world" and received["poses"][0]["position"] == {
+        "x": 1.0,
+        "y": 2.0,
+        "z": 3.0,
+    }
     with pytest.raises(PipeError, match="PoseArray"):
         made.encode(FieldsMessage({"poses": ({"position": {"x": "far"}},)}))

@@ -13,8 +13,6 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="needs ./run ros2")
 
-from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.parameter_client import AsyncParameterClient  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -60,7 +58,9 @@ class Foreign:
 
 def start(stack, *command):
     """Start a node, which ends by Ctrl-C."""
-    process = subprocess.Popen([sys.executable, *command], cwd=REPOSITORY, stderr=subprocess.STDOUT, stdout=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, *command], cwd=REPOSITORY, stderr=subprocess.STDOUT, stdout=subprocess.PIPE
+    )
 
     def end():
         process.send_signal(signal.SIGINT)
@@ -74,7 +74,9 @@ def start(stack, *command):
 def test_a_node_that_is_not_ours_moves_the_neck(tmp_path, monkeypatch):
     """It reads the joints, requests a motion, is refused a joint that there is not, and changes a parameter's value."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    text, count = re.subn(r"^  middleware: ROS\b", "  middleware: ROS2", (REPOSITORY / "config/centauro.yaml").read_text(), flags=re.M)
+    text, count = re.subn(
+        r"^  middleware: ROS\b", "  middleware: ROS2", (REPOSITORY / "config/centauro.yaml").read_text(), flags=re.M
+    )
     assert count == 1
     file = REPOSITORY / "config" / f"centauro_ros2_{os.getpid()}.yaml"
     file.write_text(text)

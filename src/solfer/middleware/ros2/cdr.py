@@ -1,4 +1,4 @@
-"""CDR, the format of messages on the wire, little endian: every number is aligned to its size behind the first 4 bytes."""
+"""CDR, the format of messages, little endian: numbers are aligned to their size behind the first 4 bytes."""
 
 import functools
 import struct

@@ -45,7 +45,6 @@ def wall_stamp(_: float) -> int:
     return time.time_ns()
 
 
-
 def interface(name: str, kind: str = "msg") -> Any:
     """Import the class of the message (`msg`) or service type (`srv`) `package/Type`.
 
@@ -58,7 +57,8 @@ def interface(name: str, kind: str = "msg") -> Any:
         module = importlib.import_module(f"{package}.{kind}")
     except ImportError as error:
         raise MissingDependency(
-            f"no Python module {package}.{kind} for {name}", expected=f"ROS 2 package '{package}', built and on the path"
+            f"no Python module {package}.{kind} for {name}",
+            expected=f"ROS 2 package '{package}', built and on the path",
         ) from error
     found = getattr(module, type_name, None)
     if found is None:

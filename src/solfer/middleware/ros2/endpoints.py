@@ -1,7 +1,7 @@
 """Topics: the newest message, every message, and their writers.
 
-Messages wait in the middleware of ROS 2 until they are read: bytes of a bounded count, which the thread that reads takes
-and decodes. Without an executor a message costs neither a thread's wake-up nor a callback.
+Messages wait in the middleware of ROS 2 until they are read: bytes of a bounded count, which the thread that reads
+takes and decodes. Without an executor a message costs neither a thread's wake-up nor a callback.
 """
 
 import logging
@@ -19,7 +19,17 @@ from solfer.errors import MiddlewareError, PipeError
 from solfer.middleware.ros2.codecs import Codec, StampOf, codec
 from solfer.throttle import Throttle
 from solfer.transport.backlog import SENDERS, Backlog
-from solfer.transport.endpoints import NEW, NONE, OLD, PUBLISHER_TIMEOUT, MessageStatus, Publisher, Queue, Reader, Writer
+from solfer.transport.endpoints import (
+    NEW,
+    NONE,
+    OLD,
+    PUBLISHER_TIMEOUT,
+    MessageStatus,
+    Publisher,
+    Queue,
+    Reader,
+    Writer,
+)
 from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
@@ -35,9 +45,7 @@ NAMING_TIMEOUT = 1.0
 
 
 def quality(depth: int, reliable: bool, latched: bool = False) -> QoSProfile:
-    """Make the quality of service of a topic: measurements may be lost, commands may not, and a late joiner gets what
-    is latched.
-    """  # noqa: D205
+    """Make the quality of service of a topic: measurements may be lost, and who is late gets what is latched."""
     return QoSProfile(
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
@@ -172,7 +180,7 @@ class Subscription:
 
     def _refuse_size(self, info: dict[str, Any], size: int) -> None:
         self.oversized += 1
-        sender = self._sender(info, NAMING_TIMEOUT)
+        sender = self._sender(info, NAMING_TIMEOUT) or ""
         self._throttle.warning(
             sender,
             "topic %s: a message of %s with %d bytes is dropped: %d bytes at most",
@@ -237,6 +245,7 @@ class Ros2Reader(Reader):
         topic: str,
         message: str,
         now: Callable[[], float] = time.monotonic,
+        *,
         kept: int = 0,
         latched: bool = False,
     ):
@@ -287,7 +296,7 @@ class Ros2Reader(Reader):
     def read_from(self, publisher: Ros2Publisher) -> MessageStatus:
         """See `Reader.read_from`."""
         newest = publisher.newest
-        if newest is not publisher.taken:
+        if newest is not None and newest is not publisher.taken:
             publisher.taken = newest
             return self._receive(newest)
         return NONE if self.message is None else OLD

@@ -56,7 +56,8 @@ class Ros2Middleware(Middleware):
         self._provided: list[Any] = []
         self._diagnostics = self._ros.create_publisher(DiagnosticArray, "/diagnostics", quality(10, reliable=True))
         self._last: dict[str, tuple[float, Health]] = {}
-        self._reports: dict[str, HealthReport] | None = None
+        self._reports: dict[str, HealthReport] = {}
+        self._watches = False
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -178,9 +179,7 @@ class Ros2Middleware(Middleware):
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; it is sent also when the node has to end."""
         answer = _in_thread(
-            lambda: replied(
-                call(self._ros, name, interface, request, timeout=timeout, running=lambda: True), reply
-            )
+            lambda: replied(call(self._ros, name, interface, request, timeout=timeout, running=lambda: True), reply)
         )
         self._requests = [*(each for each in self._requests if not each.done()), answer]
         return answer
@@ -204,7 +203,8 @@ class Ros2Middleware(Middleware):
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the node knows them, so that the answer is there at once."""
-        published, received = {}, {}
+        published: dict[str, str] = {}
+        received: dict[str, str] = {}
         for topic, kinds in self._ros.get_topic_names_and_types():
             for found, ends in (
                 (published, self._ros.get_publishers_info_by_topic),
@@ -239,8 +239,8 @@ class Ros2Middleware(Middleware):
 
     def reports(self) -> Mapping[str, HealthReport]:
         """See `Middleware.reports`."""
-        if self._reports is None:
-            self._reports = {}
+        if not self._watches:
+            self._watches = True
             self._ros.create_subscription(DiagnosticArray, "/diagnostics", self._on_report, quality(64, reliable=True))
         return self._reports
 

@@ -34,7 +34,7 @@ def arguments(argv: Sequence[str]) -> list[str]:
 
 
 def argument(argv: Sequence[str], name: str) -> str | None:
-    """Return the value of `name:=value` behind the command, such as `--ros-args -p name:=value`; None: there is none."""
+    """Return the value of `name:=value`, such as in `--ros-args -p name:=value`; None: there is none."""
     return next((each.partition(":=")[2] for each in argv if each.startswith(f"{name}:=")), None)
 
 
@@ -215,7 +215,9 @@ class Ros2Node:
             self.ros = Node(name, context=self._context, automatically_declare_parameters_from_overrides=True)
         except Exception as error:  # rclpy has one class for each mistake in an argument
             self._context.try_shutdown()
-            raise ConfigError(f"node '{name}' cannot start: {error}", expected="a name and arguments of ROS 2") from error
+            raise ConfigError(
+                f"node '{name}' cannot start: {error}", expected="a name and arguments of ROS 2"
+            ) from error
         self.name = self.ros.get_fully_qualified_name()
         self._ends = threading.Event()
         main = threading.current_thread() is threading.main_thread()
@@ -257,5 +259,3 @@ class Ros2Node:
             self._executor.spin()
         except ExternalShutdownException:
             pass
-
-

@@ -46,10 +46,10 @@ class NativeParameters:
     def _declare(self) -> None:
         try:
             found = self._ask(self._getting, GetParameters())
-            for row in zip(
-                found.names, found.types, found.values, found.minimums, found.maximums, found.descriptions, strict=True
-            ):
-                self._declare_one(*row[:3], limits=row[3:5], description=row[5])
+            limits = zip(found.minimums, found.maximums, strict=True)
+            rows = zip(found.names, found.types, found.values, limits, found.descriptions, strict=True)
+            for name, kind, text, ends, description in rows:
+                self._declare_one(name, kind, text, limits=ends, description=description)
             self._node.add_on_set_parameters_callback(self._change)
         except (SolferError, FutureTimeout, ParameterException, RuntimeError) as error:  # such as the end of the node
             logger.warning("%s offers no parameters: %s", self._node.get_name(), error)

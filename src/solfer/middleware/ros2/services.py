@@ -11,8 +11,16 @@ from typing import Any
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
-from solfer.errors import ComponentError, MiddlewareError, Overtaken, ServiceUnavailable, SolferError
-from solfer.errors import described, located, nearest
+from solfer.errors import (
+    ComponentError,
+    MiddlewareError,
+    Overtaken,
+    ServiceUnavailable,
+    SolferError,
+    described,
+    located,
+    nearest,
+)
 from solfer.interfaces.declaration import Service
 from solfer.middleware.ros2.codecs import filled, interface, plain
 from solfer.transport.middleware import Submit
@@ -54,7 +62,7 @@ class Ros2Service:
         if node.count_services(name):
             raise MiddlewareError(
                 f"service {name} is offered by another node already",
-                expected="one node of that name: end the other, or start this one with --ros-args -r __node:=another_name",
+                expected="one node of that name: end the other, or add `--ros-args -r __node:=another_name`",
             )
         self._server = node.create_service(kind, name, self.answer, callback_group=ReentrantCallbackGroup())
 
@@ -66,8 +74,9 @@ class Ros2Service:
         fields = {field.name for field in dataclasses.fields(declared)}
         expected = _fields(ros_class) | more
         if fields != expected:
+            name = f"{self._owner}/{self._service.name}"
             raise ComponentError(
-                f"{declared.__name__} of service {self._owner}/{self._service.name} has fields {', '.join(sorted(fields))}",
+                f"{declared.__name__} of service {name} has fields {', '.join(sorted(fields))}",
                 expected=f"those of {self._service.interface}: {', '.join(sorted(expected))}",
             )
 
@@ -106,7 +115,7 @@ class Ros2Service:
         return response
 
 
-def call(node: Node, name: str, kind: str, request: Any, timeout: float, running: Callable[[], bool]) -> Any:
+def call(node: Node, name: str, kind: str, request: Any, *, timeout: float, running: Callable[[], bool]) -> Any:
     """Call a service as soon as it is there, and return its response.
 
     Raises:
@@ -144,9 +153,7 @@ def _fields(ros_class: Any) -> set[str]:
     return {name for name in ros_class.get_fields_and_field_types() if name != "structure_needs_at_least_one_member"}
 
 
-def _wait(
-    condition: Callable[[], bool], end: float, running: Callable[[], bool], period: float = CHECK_PERIOD
-) -> bool:
+def _wait(condition: Callable[[], bool], end: float, running: Callable[[], bool], period: float = CHECK_PERIOD) -> bool:
     while not condition():
         if time.monotonic() >= end or not running():
             return False

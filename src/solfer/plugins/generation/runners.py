@@ -44,7 +44,7 @@ def require_ros(
         middleware: That of the node.
 
     Raises:
-        ConfigError: Its `middleware` is not the node's, or its `layer` is not NRT; the error names the command that runs it.
+        ConfigError: Its `middleware` is not the node's, or its `layer` not NRT; the error names what runs it.
     """
     name = configuration.name
     foreign = _foreign(configuration, middleware)
@@ -142,11 +142,11 @@ def _command(configuration: Configuration, default: Naming) -> str:
     """Return the command that runs a configuration in an RT layer, with the layer's file if one beside it lists it."""
     name = configuration.name
     main = Path(configuration.file)
-    middleware = configuration.tree.get("middleware")
-    kind = MIDDLEWARES.get(middleware.value) if middleware is not None else None
-    if kind is not None and kind.layer != RT.layer:
-        prefix = "" if kind.name == DEFAULT_MIDDLEWARE else f"./run {kind.name.lower()} "
-        return f"`{prefix}plugin -n {shlex.quote(name)} -c {shlex.quote(configuration.file)}` with its -p"
+    middleware, layer = (configuration.tree.get(*path) for path in (("middleware",), ("modules", name, "layer")))
+    kind = None if middleware is None else MIDDLEWARES.get(str(middleware.value))
+    if kind is not None and kind.layer != RT.layer and (layer is None or layer.value != RT.layer):
+        program = "rosrun plugins plugin" if kind.name == DEFAULT_MIDDLEWARE else f"./run {kind.name.lower()} plugin"
+        return f"`{program} -p ID -n {shlex.quote(name)} -c {shlex.quote(configuration.file)}`"
     for path in sorted(main.parent.glob("*.yaml")):
         if path.is_file() and is_layer(path) and _lists(path, main, name, default=default):
             return f"`rosrun solfer xbot {shlex.quote(os.fspath(path))}`"

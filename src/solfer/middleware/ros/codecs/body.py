@@ -19,6 +19,7 @@ from solfer.transport.messages import (
 )
 from solfer.transport.wire_numbers import BODY_NUMBERS, IMU_NUMBERS, body_of, imu_of, put_body, put_imu
 
+
 class NumbersBuffer:
     """A packed message with a body of a fixed count of numbers, perhaps behind the name of a child frame.
 
