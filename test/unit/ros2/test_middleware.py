@@ -1,4 +1,4 @@
-"""Nodes of `middleware: ROS2` in one process: clock, texts, services, reports; needs the environment of `./run ros2`."""
+"""Nodes of `middleware: ROS2` in one process: clock, texts, services, reports."""
 
 import os
 import threading

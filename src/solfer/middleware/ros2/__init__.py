@@ -1,6 +1,6 @@
 """ROS 2: topics, services, parameters and diagnostics on rclpy.
 
-Nothing spins for topics: whoever reads a topic takes what the middleware of ROS 2 has kept for it, as packed bytes.
+Nothing spins for topics: the thread that reads one takes what the middleware of ROS 2 has kept for it, as packed bytes.
 """
 
 from collections.abc import Sequence

@@ -45,7 +45,7 @@ NAMING_TIMEOUT = 1.0
 
 
 def quality(depth: int, reliable: bool, latched: bool = False) -> QoSProfile:
-    """Make the quality of service of a topic: measurements may be lost, and who is late gets what is latched."""
+    """Make the quality of service of a topic: measurements may be lost; a late reader receives latched messages."""
     return QoSProfile(
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,

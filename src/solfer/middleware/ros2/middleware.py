@@ -124,7 +124,7 @@ class Ros2Middleware(Middleware):
         """Return None: no node follows a simulation in lock-step here."""
 
     def provide(self, name: str, text: str, original: str = "") -> None:
-        """Publish a text for all nodes that ask for the parameter `name`, as long as this node lives.
+        """Publish a text for all nodes that read the parameter `name`, as long as this node lives.
 
         Args:
             name: The parameter, also the name of the topic.

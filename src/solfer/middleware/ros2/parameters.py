@@ -40,12 +40,12 @@ class NativeParameters:
         self._submit = submit
         threading.Thread(target=self._declare, daemon=True).start()  # the loop that answers has yet to start
 
-    def _ask(self, service: Service, request: Any) -> Any:
+    def _request(self, service: Service, request: Any) -> Any:
         return self._submit(service.prepared(request)).result(service.timeout)
 
     def _declare(self) -> None:
         try:
-            found = self._ask(self._getting, GetParameters())
+            found = self._request(self._getting, GetParameters())
             limits = zip(found.minimums, found.maximums, strict=True)
             rows = zip(found.names, found.types, found.values, limits, found.descriptions, strict=True)
             for name, kind, text, ends, description in rows:
@@ -74,7 +74,7 @@ class NativeParameters:
         names = tuple(each.name.removeprefix(self._prefix) for each in ours)
         texts = tuple(each.value if isinstance(each.value, str) else json.dumps(_plain(each.value)) for each in ours)
         try:
-            reply = self._ask(self._setting, SetParameters(names, texts))
+            reply = self._request(self._setting, SetParameters(names, texts))
             return SetParametersResult(successful=reply.success, reason=reply.message)
         except SolferError as error:
             return SetParametersResult(successful=False, reason=described(error, lines=True))

@@ -80,7 +80,7 @@ class ImuCodec(Codec):
     """sensor_msgs/Imu: orientation of the sensor, angular velocity and specific force in its axes.
 
     Covariances are diagonal with equal entries, those of one sample. All zeros: nothing is known. A first entry of
-    NOT_MEASURED: the sensor does not measure the quantity, whose numbers are NaN then.
+    minus one: the sensor does not measure the quantity, whose numbers are NaN then.
     """
 
     messages = IMU_MESSAGES
