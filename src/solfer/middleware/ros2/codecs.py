@@ -66,7 +66,7 @@ def interface(name: str, kind: str = "msg") -> Any:
     return found
 
 
-class Codec:
+class CdrCodec:
     """Translates one type of message. This one is of any type, by the names of its fields.
 
     Args:
@@ -135,7 +135,7 @@ class Codec:
         return writer
 
 
-class JointCodec(Codec):
+class CdrJointCodec(CdrCodec):
     """sensor_msgs/JointState and solfer/JointCommand: names, and arrays that are empty or as long as the names."""
 
     def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
@@ -146,7 +146,7 @@ class JointCodec(Codec):
         self._interfaces: tuple[str, ...] = ()
 
     def encode(self, message: JointMessage) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message)
         writer.texts(message.names)
         for name in self._fields:
@@ -184,7 +184,7 @@ class JointCodec(Codec):
         return message
 
 
-class BodyCodec(Codec):
+class CdrBodyCodec(CdrCodec):
     """nav_msgs/Odometry."""
 
     def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
@@ -193,7 +193,7 @@ class BodyCodec(Codec):
         self._numbers = np.zeros(BODY_NUMBERS)
 
     def encode(self, message: Any) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message, message.frame)
         writer.text(message.child)
         put_body(message, self._numbers)
@@ -206,7 +206,7 @@ class BodyCodec(Codec):
         return body_of(reader.numbers(BODY_NUMBERS), self._inexact, frame, child, stamp=stamp, sender=sender)
 
 
-class ImuCodec(Codec):
+class CdrImuCodec(CdrCodec):
     """sensor_msgs/Imu."""
 
     def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
@@ -214,7 +214,7 @@ class ImuCodec(Codec):
         self._inexact = InexactOrientations()
 
     def encode(self, message: Any) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message, message.frame)
         numbers = np.zeros(IMU_NUMBERS)
         put_imu(message, numbers)
@@ -227,11 +227,11 @@ class ImuCodec(Codec):
         return imu_of(reader.numbers(IMU_NUMBERS), self._inexact, frame, stamp=stamp, sender=sender)
 
 
-class WrenchCodec(Codec):
+class CdrWrenchCodec(CdrCodec):
     """geometry_msgs/WrenchStamped."""
 
     def encode(self, message: Any) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message, message.frame)
         writer.numbers(message.force)
         writer.numbers(message.torque)
@@ -243,7 +243,7 @@ class WrenchCodec(Codec):
         return WrenchMessage(frame, reader.numbers(3), reader.numbers(3), stamp=stamp, sender=sender)
 
 
-class VectorCodec(Codec):
+class CdrVectorCodec(CdrCodec):
     """A header and a fixed count of numbers."""
 
     def __init__(self, message: str, stamp_of: StampOf = wall_stamp):
@@ -251,7 +251,7 @@ class VectorCodec(Codec):
         self._count = VECTOR_MESSAGES[message]
 
     def encode(self, message: Any) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message, message.frame)
         writer.numbers(message.values)
         return bytes(writer.bytes)
@@ -262,11 +262,11 @@ class VectorCodec(Codec):
         return VectorMessage(frame, reader.numbers(self._count), stamp, sender)
 
 
-class PointsCodec(Codec):
+class CdrPointsCodec(CdrCodec):
     """solfer/RobotPoints."""
 
     def encode(self, message: Any) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message, message.frame)
         writer.texts(tuple(message.names))
         writer.count(len(message.values))
@@ -285,11 +285,11 @@ class PointsCodec(Codec):
         return PointsMessage(frame, names, values.reshape(count, -1), stamp, sender)
 
 
-class RefusalCodec(Codec):
+class CdrRefusalCodec(CdrCodec):
     """solfer/Refusals."""
 
     def encode(self, message: Any) -> bytes:
-        """See `Codec.encode`."""
+        """See `CdrCodec.encode`."""
         writer = self._header(message)
         writer.texts(message.owners)
         writer.flags(message.claims)
@@ -302,25 +302,25 @@ class RefusalCodec(Codec):
         return RefusalMessage(reader.texts(()), reader.flags(), reader.texts(()), stamp, sender)
 
 
-_KINDS: dict[str, type[Codec]] = {
-    **dict.fromkeys(JOINT_MESSAGES, JointCodec),
-    **dict.fromkeys(BODY_MESSAGES, BodyCodec),
-    **dict.fromkeys(VECTOR_MESSAGES, VectorCodec),
-    ROBOT_POINTS: PointsCodec,
-    **dict.fromkeys(IMU_MESSAGES, ImuCodec),
-    **dict.fromkeys(WRENCH_MESSAGES, WrenchCodec),
-    REFUSALS: RefusalCodec,
+_KINDS: dict[str, type[CdrCodec]] = {
+    **dict.fromkeys(JOINT_MESSAGES, CdrJointCodec),
+    **dict.fromkeys(BODY_MESSAGES, CdrBodyCodec),
+    **dict.fromkeys(VECTOR_MESSAGES, CdrVectorCodec),
+    ROBOT_POINTS: CdrPointsCodec,
+    **dict.fromkeys(IMU_MESSAGES, CdrImuCodec),
+    **dict.fromkeys(WRENCH_MESSAGES, CdrWrenchCodec),
+    REFUSALS: CdrRefusalCodec,
 }
 
 
-def codec(message: str, stamp_of: StampOf = wall_stamp) -> Codec:
+def codec(message: str, stamp_of: StampOf = wall_stamp) -> CdrCodec:
     """Make the codec of a message by its canonical name; one that no pipe carries travels by its fields.
 
     Raises:
         MissingDependency: The package of the message is not there, or not built.
         UnknownName: The package has no such message.
     """
-    return _KINDS.get(message, Codec)(message, stamp_of)
+    return _KINDS.get(message, CdrCodec)(message, stamp_of)
 
 
 def to_time(nanoseconds: int) -> Any:

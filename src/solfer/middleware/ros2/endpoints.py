@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from solfer.errors import MiddlewareError, PipeError
-from solfer.middleware.ros2.codecs import Codec, StampOf, codec
+from solfer.middleware.ros2.codecs import CdrCodec, StampOf, codec
 from solfer.throttle import Throttle
 from solfer.transport.backlog import SENDERS, Backlog
 from solfer.transport.endpoints import (
@@ -68,7 +68,7 @@ class Polled(CallbackGroup):
         """Do nothing, as above."""
 
 
-class Arrival(NamedTuple):
+class PackedArrival(NamedTuple):
     """A message as it came in, and when by the reader's clock [s]."""
 
     packed: bytes
@@ -76,7 +76,7 @@ class Arrival(NamedTuple):
     time: float
 
 
-class Subscription:
+class Ros2Subscription:
     """The messages of a topic, as bytes.
 
     Args:
@@ -106,7 +106,7 @@ class Subscription:
         *,
         largest: int | None = None,
     ):
-        self.codec: Codec = codec(message)
+        self.codec: CdrCodec = codec(message)
         self.oversized = 0
         self._node = node
         self._now = now
@@ -127,9 +127,9 @@ class Subscription:
         self._depth = quality.depth
         self._take = self._subscription.handle.take_message
 
-    def take(self) -> list[Arrival]:
+    def take(self) -> list[PackedArrival]:
         """Take what has come since the last call, at most as many messages as may wait."""
-        arrivals: list[Arrival] = []
+        arrivals: list[PackedArrival] = []
         self._time = self._now()
         self._wall = time.time_ns()
         while self._unnamed:  # in their order: what comes behind them waits
@@ -153,14 +153,14 @@ class Subscription:
                 self._unnamed.append((packed, info))
         return arrivals
 
-    def _arrival(self, packed: bytes, info: dict[str, Any]) -> Arrival | None:
+    def _arrival(self, packed: bytes, info: dict[str, Any]) -> PackedArrival | None:
         """Make the arrival of a message; None while the name of its sender is not known."""
         late = max(0.0, 1e-9 * (self._wall - info["received_timestamp"]))
         sender = self._sender(info, late)
         if sender is None:
             return None
         self._newest = max(self._newest, self._time - late)  # threads of the middleware may pass each other
-        return Arrival(packed, sender, self._newest)
+        return PackedArrival(packed, sender, self._newest)
 
     def _sender(self, info: dict[str, Any], waited: float) -> str | None:
         """Return the name of a message's sender; None: it is not known yet."""
@@ -194,7 +194,7 @@ class Subscription:
         """Return how many publishers are connected."""
         return self._subscription.handle.get_publisher_count()
 
-    def decode(self, arrival: Arrival) -> Message | None:
+    def decode(self, arrival: PackedArrival) -> Message | None:
         """Decode a message; None if it is refused, which is logged once a second for each sender."""
         try:
             return self.codec.decode(arrival.packed, arrival.sender)
@@ -223,8 +223,8 @@ class Ros2Publisher(Publisher):
 
     def __init__(self, name: str):
         super().__init__(name)
-        self.newest: Arrival | None = None
-        self.taken: Arrival | None = None
+        self.newest: PackedArrival | None = None
+        self.taken: PackedArrival | None = None
 
 
 class Ros2Reader(Reader):
@@ -252,10 +252,10 @@ class Ros2Reader(Reader):
         self._all = Ros2Publisher("")
         self._now = now
         self._by_name: dict[str, Ros2Publisher] = {}
-        self._backlog: Backlog[tuple[Arrival, Ros2Publisher]] | None = Backlog(kept) if kept else None
-        self._waiting = deque[tuple[Arrival, Ros2Publisher]]()
+        self._backlog: Backlog[tuple[PackedArrival, Ros2Publisher]] | None = Backlog(kept) if kept else None
+        self._waiting = deque[tuple[PackedArrival, Ros2Publisher]]()
         required = quality(max(4 * kept, DEPTH), reliable=latched, latched=latched)
-        self.subscription = Subscription(node, topic, message, required, now=now)
+        self.subscription = Ros2Subscription(node, topic, message, required, now=now)
         self.topic = self.subscription.topic
         self.carries = message
 
@@ -313,7 +313,7 @@ class Ros2Reader(Reader):
                 return publisher
         return None
 
-    def _receive(self, arrival: Arrival) -> MessageStatus:
+    def _receive(self, arrival: PackedArrival) -> MessageStatus:
         message = self.subscription.decode(arrival)
         if message is None:
             self.refused += 1
@@ -335,9 +335,9 @@ class Ros2Queue(Queue):
     """Every message of a topic."""
 
     def __init__(self, node: Node, topic: str, message: str, size: int, largest: int | None = None):
-        self._backlog: Backlog[Arrival] = Backlog(size)
+        self._backlog: Backlog[PackedArrival] = Backlog(size)
         required = quality(max(4 * size, DEPTH), reliable=True)
-        self.subscription = Subscription(node, topic, message, required, largest=largest)
+        self.subscription = Ros2Subscription(node, topic, message, required, largest=largest)
         self.topic = self.subscription.topic
 
     @property
@@ -359,7 +359,7 @@ class Ros2Queue(Queue):
         for arrival in self.subscription.take():
             self._backlog.put(arrival.sender, arrival)
 
-    def _decoded(self, arrivals: list[Arrival]) -> list[Message]:
+    def _decoded(self, arrivals: list[PackedArrival]) -> list[Message]:
         decoded = (self.subscription.decode(arrival) for arrival in arrivals)
         return [message for message in decoded if message is not None]
 

@@ -93,7 +93,7 @@ class Ros2Clock:
         """See `Middleware.publish_time`; no effect here."""
 
 
-class PublishingClock(Ros2Clock):
+class Ros2PublishingClock(Ros2Clock):
     """Publishes the simulated time on /clock; ROS time in this process is the simulated time.
 
     Args:
@@ -122,7 +122,7 @@ class PublishingClock(Ros2Clock):
             self._publisher.publish(self._message)
 
 
-class SubscribingClock(Ros2Clock):
+class Ros2SubscribingClock(Ros2Clock):
     """Follows /clock; it stands still with it, and never goes back.
 
     Args:
@@ -233,9 +233,9 @@ class Ros2Node:
             if not follows:
                 self.clock = Ros2Clock()
             elif publishes_time:
-                self.clock = PublishingClock(self.ros)
+                self.clock = Ros2PublishingClock(self.ros)
             else:
-                self.clock = SubscribingClock(self.ros, self.running)
+                self.clock = Ros2SubscribingClock(self.ros, self.running)
         except BaseException:
             self.close()
             raise

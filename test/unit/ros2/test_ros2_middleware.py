@@ -76,7 +76,7 @@ def test_a_node_follows_the_simulated_time():
 
 
 def test_without_a_time_to_follow_there_is_one_error(monkeypatch):
-    monkeypatch.setattr("solfer.middleware.ros2.node.SubscribingClock.FIRST_TIME", 0.2)
+    monkeypatch.setattr("solfer.middleware.ros2.node.Ros2SubscribingClock.FIRST_TIME", 0.2)
     with pytest.raises(MiddlewareError, match="no node publishes the time on /clock"):
         connect("follower", SIMULATED)
 
