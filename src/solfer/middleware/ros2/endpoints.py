@@ -117,7 +117,7 @@ class Ros2Subscription:
         self._unnamed: deque[tuple[bytes, dict[str, Any]]] = deque()
         try:
             self._subscription = node.create_subscription(
-                self.codec.ros_class, topic, _ignore, quality, callback_group=Polled(), raw=True
+                self.codec.ros_class, topic, ignore, quality, callback_group=Polled(), raw=True
             )
         except Exception as error:  # rclpy has one class for each mistake in a name
             raise MiddlewareError(
@@ -209,7 +209,7 @@ class Ros2Subscription:
         self._node.destroy_subscription(self._subscription)
 
 
-def _ignore(_: Any) -> None:
+def ignore(_: Any) -> None:
     """Stand in for a callback that never runs."""
 
 

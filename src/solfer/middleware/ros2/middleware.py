@@ -70,6 +70,7 @@ class Ros2Middleware(Middleware):
     @property
     def rewinds(self) -> int:
         """See `Middleware.rewinds`."""
+        self.now()  # takes the times that have come
         return self._node.clock.rewinds
 
     def sleep_until(self, deadline: float) -> None:

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import struct
 import sys
 import threading
 import time
@@ -12,6 +13,7 @@ from typing import Any
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -19,7 +21,7 @@ from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from solfer.errors import ConfigError, MiddlewareError
-from solfer.middleware.ros2.endpoints import quality
+from solfer.middleware.ros2.endpoints import Polled, ignore, quality
 from solfer.process import ProcessEnd, run_process
 
 logger = logging.getLogger(__name__)
@@ -125,6 +127,8 @@ class Ros2PublishingClock(Ros2Clock):
 class Ros2SubscribingClock(Ros2Clock):
     """Follows /clock; it stands still with it, and never goes back.
 
+    Whoever asks for the time takes what has come: a callback of an executor would cost more than the cycle itself.
+
     Args:
         node: The node.
         running: False as soon as the end was requested.
@@ -136,18 +140,26 @@ class Ros2SubscribingClock(Ros2Clock):
     FIRST_TIME = 10.0
     """Longest wait for the first time [s]."""
 
+    DEPTH = 64
+    """Times that wait until somebody asks: one that was lost could be the one that went back."""
+
+    STAMP = struct.Struct("<4xiI")
+    """A packed rosgraph_msgs/Clock: seconds and nanoseconds behind the four bytes that begin each message."""
+
     def __init__(self, node: Node, running: Callable[[], bool]):
         self._running = running
-        self._moved = threading.Condition()
+        self._lock = threading.Lock()
+        self._context = node.context
+        self._waits = threading.local()
         self._passed = 0.0
         self._newest: int | None = None
         self._subscription = node.create_subscription(
-            ClockMessage, "/clock", self._receive, quality(1, reliable=False), raw=False
+            ClockMessage, "/clock", ignore, quality(self.DEPTH, reliable=False), callback_group=Polled(), raw=True
         )
+        self._handle = self._subscription.handle
         end = time.monotonic() + self.FIRST_TIME
-        with self._moved:
-            while self._newest is None and running() and time.monotonic() < end:
-                self._moved.wait(POLL_PERIOD)
+        while self._take() is None and running() and time.monotonic() < end:
+            self._wait()
         if self._newest is None and running():
             raise MiddlewareError(
                 "use_sim_time is true, and no node publishes the time on /clock",
@@ -156,27 +168,41 @@ class Ros2SubscribingClock(Ros2Clock):
 
     def now(self) -> float:
         """See `Middleware.now`."""
+        self._take()
         return self._passed
 
     def present(self) -> int:
         """Return ROS time [ns]."""
-        return self._newest or 0
+        return self._take() or 0
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`; returns as well when the end was requested."""
-        with self._moved:
-            while self._passed < deadline - 1e-9 and self._running():
-                self._moved.wait(POLL_PERIOD)
+        while self.now() < deadline - 1e-9 and self._running():
+            self._wait()
 
-    def _receive(self, message: Any) -> None:
-        published = message.clock.sec * 1_000_000_000 + message.clock.nanosec
-        with self._moved:
-            if self._newest is not None and published > self._newest:
-                self._passed += 1e-9 * (published - self._newest)
-            elif self._newest is not None and published < self._newest:
-                self.rewinds += 1
-            self._newest = published
-            self._moved.notify_all()
+    def _take(self) -> int | None:
+        """Take the times that have come, and return the newest [ns]; None before the first."""
+        with self._lock:
+            while (taken := self._handle.take_message(ClockMessage, True)) is not None:
+                seconds, nanoseconds = self.STAMP.unpack(taken[0])
+                self._receive(seconds * 1_000_000_000 + nanoseconds)
+            return self._newest
+
+    def _receive(self, published: int) -> None:
+        if self._newest is not None and published > self._newest:
+            self._passed += 1e-9 * (published - self._newest)
+        elif self._newest is not None and published < self._newest:
+            self.rewinds += 1
+        self._newest = published
+
+    def _wait(self) -> None:
+        """Wait for a time that comes, at most `POLL_PERIOD`."""
+        waits = getattr(self._waits, "set", None)
+        if waits is None:
+            waits = self._waits.set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, self._context.handle)
+        waits.clear_entities()
+        waits.add_subscription(self._handle)
+        waits.wait(round(1e9 * POLL_PERIOD))
 
 
 class Ros2Node:
