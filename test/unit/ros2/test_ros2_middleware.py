@@ -91,6 +91,8 @@ def test_texts_reach_nodes_that_come_later(nodes):
     first.provide("/robot_description", "<robot/>")
     until(lambda: "/robot_description" in second.topics().result().published)
     assert second.parameter("/robot_description") == "<robot/>"
+    with closing(connect("late", ["node"])) as late:
+        assert late.parameter("/robot_description") == "<robot/>"
     with pytest.raises(UnknownName, match="robot_descriptoin") as error:
         second.parameter("/robot_descriptoin")
     assert "/robot_description" in error.value.names

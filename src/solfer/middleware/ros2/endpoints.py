@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 from solfer.errors import MiddlewareError, PipeError
 from solfer.middleware.ros2.codecs import CdrCodec, StampOf, codec
+from solfer.middleware.ros2.quality import quality
 from solfer.throttle import Throttle
 from solfer.transport.backlog import SENDERS, Backlog
 from solfer.transport.endpoints import (
@@ -42,15 +43,6 @@ UNNAMED = "_NODE_NAME_UNKNOWN_"
 
 NAMING_TIMEOUT = 1.0
 """Longest time that a message waits for the name of its sender, which comes on another way [s]."""
-
-
-def quality(depth: int, reliable: bool, latched: bool = False) -> QoSProfile:
-    """Make the quality of service of a topic: measurements may be lost; a late reader receives latched messages."""
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
 
 
 class Polled(CallbackGroup):
@@ -239,6 +231,8 @@ class Ros2Reader(Reader):
         latched: Whether the newest message of before counts.
     """
 
+    receives = True
+
     def __init__(
         self,
         node: Node,
@@ -254,8 +248,8 @@ class Ros2Reader(Reader):
         self._by_name: dict[str, Ros2Publisher] = {}
         self._backlog: Backlog[tuple[PackedArrival, Ros2Publisher]] | None = Backlog(kept) if kept else None
         self._waiting = deque[tuple[PackedArrival, Ros2Publisher]]()
-        required = quality(max(4 * kept, DEPTH), reliable=latched, latched=latched)
-        self.subscription = Ros2Subscription(node, topic, message, required, now=now)
+        self.requires = quality(max(4 * kept, DEPTH), reliable=latched, latched=latched)
+        self.subscription = Ros2Subscription(node, topic, message, self.requires, now=now)
         self.topic = self.subscription.topic
         self.carries = message
 
@@ -334,10 +328,12 @@ class Ros2Reader(Reader):
 class Ros2Queue(Queue):
     """Every message of a topic."""
 
+    receives = True
+
     def __init__(self, node: Node, topic: str, message: str, size: int, largest: int | None = None):
         self._backlog: Backlog[PackedArrival] = Backlog(size)
-        required = quality(max(4 * size, DEPTH), reliable=True)
-        self.subscription = Ros2Subscription(node, topic, message, required, largest=largest)
+        self.requires = quality(max(4 * size, DEPTH), reliable=True)
+        self.subscription = Ros2Subscription(node, topic, message, self.requires, largest=largest)
         self.topic = self.subscription.topic
 
     @property
@@ -381,12 +377,15 @@ class Ros2Writer(Writer):
         MiddlewareError: There can be no such topic.
     """
 
+    receives = False
+
     def __init__(self, node: Node, topic: str, message: str, stamp_of: StampOf):
         self._node = node
         self._codec = codec(message, stamp_of)
         self.carries = message
+        self.requires = quality(DEPTH, reliable=True)
         try:
-            self._publisher = node.create_publisher(self._codec.ros_class, topic, quality(DEPTH, reliable=True))
+            self._publisher = node.create_publisher(self._codec.ros_class, topic, self.requires)
         except Exception as error:  # rclpy has one class for each mistake in a name
             raise MiddlewareError(
                 f"topic '{topic}' cannot be written as {message}: {error}", expected="the name of a topic"

@@ -13,9 +13,10 @@ from std_msgs.msg import String
 from solfer.errors import UnknownName
 from solfer.interfaces.declaration import Service
 from solfer.middleware.ros2.codecs import require_fields, to_time
-from solfer.middleware.ros2.endpoints import Ros2Queue, Ros2Reader, Ros2Writer, quality
+from solfer.middleware.ros2.endpoints import Ros2Queue, Ros2Reader, Ros2Writer
 from solfer.middleware.ros2.node import Ros2Node
 from solfer.middleware.ros2.parameters import NativeParameters
+from solfer.middleware.ros2.quality import MismatchWatch, quality
 from solfer.middleware.ros2.services import Ros2Service, call, replied
 from solfer.transport.endpoints import NEW, JointOrder
 from solfer.transport.health import Health
@@ -49,6 +50,7 @@ class Ros2Middleware(Middleware):
         self._ros = node.ros
         self.name = node.name
         self._endpoints: list[Ros2Reader | Ros2Queue | Ros2Writer] = []
+        self._mismatches = MismatchWatch(self._ros, lambda: self._endpoints)
         self._services: list[Ros2Service] = []
         self._live: dict[str, dict[str, Service]] = {}
         self._requests: list[Future[Any]] = []

@@ -21,7 +21,8 @@ from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from solfer.errors import ConfigError, MiddlewareError
-from solfer.middleware.ros2.endpoints import Polled, ignore, quality
+from solfer.middleware.ros2.endpoints import Polled, ignore
+from solfer.middleware.ros2.quality import quality
 from solfer.process import ProcessEnd, run_process
 
 logger = logging.getLogger(__name__)
