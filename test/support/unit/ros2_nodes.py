@@ -1,6 +1,5 @@
 """Nodes of ROS 2 in processes of their own, and one that is not ours; needs the environment of `./run ros2`."""
 
-import re
 import signal
 import subprocess
 import sys
@@ -99,13 +98,26 @@ def start(stack: ExitStack, *command: str) -> subprocess.Popen[bytes]:
 
 
 def configured(folder: Path) -> str:
-    """Write the configuration of CENTAURO with the one word changed, and return its file."""
-    text, count = re.subn(
-        r"^  middleware: ROS\b", "  middleware: ROS2", (REPOSITORY / "config/centauro.yaml").read_text(), flags=re.M
-    )
-    assert count == 1
+    """Write the configuration of CENTAURO by the first command of the page, and return its file."""
+    (folder / "config").mkdir()
     for each in (REPOSITORY / "config").iterdir():
-        (folder / each.name).symlink_to(each)
-    (folder / "centauro.yaml").unlink()
-    (folder / "centauro.yaml").write_text(text)
-    return str(folder / "centauro.yaml")
+        (folder / "config" / each.name).symlink_to(each)
+    subprocess.run(page("sh").splitlines()[0], shell=True, cwd=folder, check=True)
+    return str(folder / "config/ros2.yaml")
+
+
+def page(language: str) -> str:
+    """Return the block of docs/how-to/ros2.md in a language."""
+    text = (REPOSITORY / "docs/how-to/ros2.md").read_text()
+    return text.partition(f"```{language}\n")[2].partition("```")[0]
+
+
+def start_both(stack: ExitStack, folder: Path) -> subprocess.Popen[bytes]:
+    """Start the simulator and a plugin by the commands of the page; return the simulator."""
+    file = configured(folder)
+    commands = [line.partition("#")[0].split()[2:] for line in page("sh").splitlines()[1:3]]
+    nodes = [
+        start(stack, f"nodes/{name}", *words[:-1], words[-1].replace("config/ros2.yaml", file))
+        for name, *words in commands
+    ]
+    return nodes[0]

@@ -11,7 +11,7 @@ pytest.importorskip("rclpy", reason="needs ./run ros2")
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from std_msgs.msg import Float64  # noqa: E402
-from support.unit.ros2_nodes import REPOSITORY, Foreign, configured, start  # noqa: E402
+from support.unit.ros2_nodes import REPOSITORY, Foreign, start, start_both  # noqa: E402
 
 from solfer.middleware.ros2 import connect  # noqa: E402
 
@@ -53,8 +53,7 @@ def test_qualities_that_do_not_fit_are_one_warning(foreign, caplog):
 def test_a_plugin_survives_a_killed_simulator_and_floods(tmp_path, foreign):
     """It holds with its reason while nobody publishes, goes on when somebody does, and keeps its rate in floods."""
     with ExitStack() as stack:
-        simulator = start(stack, "nodes/simulator", "--engine", "mujoco")
-        start(stack, "nodes/plugin", "-p", "joint_states", "-c", configured(tmp_path))
+        simulator = start_both(stack, tmp_path)
         foreign.until(lambda: foreign.text(PLUGIN) == "running")
         simulator.kill()
         foreign.until(lambda: "holds and waits for feedback 'link_side_online'" in foreign.text(PLUGIN))
