@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any
 
 from solfer.errors import MiddlewareError
-from solfer.interfaces.declaration import Service
+from solfer.interfaces.declaration import Action, Service
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import canonical
@@ -108,13 +108,11 @@ class Middleware(abc.ABC):
         name: Name of this node: the sender of its messages.
         rewinds: How often the simulated time that this node follows has gone back; `now` never does.
         loss: Why this node has to end without a request to, in one line; empty while it need not.
-        offers_actions: Whether the topics of actions, in the protocol of actionlib, have their messages here.
     """
 
     name: str
     rewinds: int = 0
     loss: str = ""
-    offers_actions: bool = True
 
     @abc.abstractmethod
     def now(self) -> float:
@@ -191,6 +189,13 @@ class Middleware(abc.ABC):
         Raises:
             SolferError: One is not, or there is no such interface.
         """
+
+    def action(self, owner: str, action: Action) -> Any:
+        """Return the server of an action in a protocol of the middleware's own; None: it travels by topics.
+
+        The server has the methods of `transport.declared.action_server.ActionServer`.
+        """
+        return None
 
     @abc.abstractmethod
     def writer(self, topic: str, message: str) -> Writer:

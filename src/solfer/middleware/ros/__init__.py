@@ -15,7 +15,7 @@ except ModuleNotFoundError as error:
 from solfer.middleware.ros.middleware import RosMiddleware
 from solfer.middleware.ros.node.node import RosNode, arguments, run_main
 from solfer.middleware.ros.node.options import argument, setting
-from solfer.middleware.ros.tf import BaseTransform, tf_prefix
+from solfer.middleware.ros.tf import BaseTransform, base_transform, tf_prefix
 from solfer.process import switch
 
 
@@ -30,6 +30,7 @@ __all__ = [
     "RosMiddleware",
     "argument",
     "arguments",
+    "base_transform",
     "connect",
     "run_main",
     "setting",

@@ -17,6 +17,7 @@ except ModuleNotFoundError as error:
 
 from solfer.middleware.ros2.middleware import Ros2Middleware
 from solfer.middleware.ros2.node import Ros2Node, argument, arguments, run_main, setting
+from solfer.middleware.ros2.tf import base_transform
 from solfer.process import switch
 
 
@@ -25,4 +26,14 @@ def connect(name: str, argv: Sequence[str] | None = None, publishes_time: bool =
     return Ros2Middleware(Ros2Node(name, argv, publishes_time))
 
 
-__all__ = ["Ros2Middleware", "Ros2Node", "argument", "arguments", "connect", "run_main", "setting", "switch"]
+__all__ = [
+    "Ros2Middleware",
+    "Ros2Node",
+    "argument",
+    "arguments",
+    "base_transform",
+    "connect",
+    "run_main",
+    "setting",
+    "switch",
+]

@@ -11,7 +11,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import String
 
 from solfer.errors import UnknownName
-from solfer.interfaces.declaration import Service
+from solfer.interfaces.declaration import Action, Service
+from solfer.middleware.ros2.actions import Ros2Action
 from solfer.middleware.ros2.codecs import require_fields, to_time
 from solfer.middleware.ros2.endpoints import Ros2Queue, Ros2Reader, Ros2Writer
 from solfer.middleware.ros2.node import Ros2Node
@@ -40,18 +41,19 @@ class Ros2Middleware(Middleware):
 
     Args:
         node: The process' node; it is closed with the middleware.
+
+    Attributes:
+        node: The node.
     """
 
-    offers_actions = False
-
     def __init__(self, node: Ros2Node):
-        self._node = node
+        self.node = node
         self._known = time.monotonic() + LATCHED_TIMEOUT
         self._ros = node.ros
         self.name = node.name
         self._endpoints: list[Ros2Reader | Ros2Queue | Ros2Writer] = []
         self._mismatches = MismatchWatch(self._ros, lambda: self._endpoints)
-        self._services: list[Ros2Service] = []
+        self._services: list[Ros2Service | Ros2Action] = []
         self._live: dict[str, dict[str, Service]] = {}
         self._requests: list[Future[Any]] = []
         self._texts: dict[str, Ros2Reader] = {}
@@ -63,29 +65,29 @@ class Ros2Middleware(Middleware):
 
     def now(self) -> float:
         """See `Middleware.now`."""
-        return self._node.clock.now()
+        return self.node.clock.now()
 
     def stamp_time(self) -> float:
         """See `Middleware.stamp_time`: ROS time."""
-        return 1e-9 * self._node.clock.present()
+        return 1e-9 * self.node.clock.present()
 
     @property
     def rewinds(self) -> int:
         """See `Middleware.rewinds`."""
         self.now()  # takes the times that have come
-        return self._node.clock.rewinds
+        return self.node.clock.rewinds
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`."""
-        self._node.clock.sleep_until(deadline)
+        self.node.clock.sleep_until(deadline)
 
     def publish_time(self, simulated: float) -> None:
         """See `Middleware.publish_time`."""
-        self._node.clock.publish(simulated)
+        self.node.clock.publish(simulated)
 
     def running(self) -> bool:
         """See `Middleware.running`."""
-        return self._node.running()
+        return self.node.running()
 
     def parameter(self, name: str, where: str = "") -> Any:
         """See `Middleware.parameter`: one of this node, else a text on a latched topic, such as /robot_description.
@@ -121,7 +123,7 @@ class Ros2Middleware(Middleware):
 
         Without it they are stamped with when they are sent. To be called by a node that does nothing but measure.
         """
-        self._node.clock.epoch = self.stamp_time() - now
+        self.node.clock.epoch = self.stamp_time() - now
 
     def lockstep_server(self) -> None:
         """Return None: no node follows a simulation in lock-step here."""
@@ -161,7 +163,13 @@ class Ros2Middleware(Middleware):
 
     def writer(self, topic: str, message: str) -> Ros2Writer:
         """See `Middleware.writer`."""
-        return self._keep(Ros2Writer(self._ros, topic, message, self._node.clock.stamp_of))
+        return self._keep(Ros2Writer(self._ros, topic, message, self.node.clock.stamp_of))
+
+    def action(self, owner: str, action: Action) -> Ros2Action:
+        """See `Middleware.action`: the protocol of ROS 2."""
+        server = Ros2Action(owner, action, self._ros, self)
+        self._services.append(server)
+        return server
 
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
         """See `Middleware._first_order`."""
@@ -237,7 +245,7 @@ class Ros2Middleware(Middleware):
             level=bytes([level]), name=f"{node}: {name}", message=summary, hardware_id=node, values=pairs
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = to_time(self._node.clock.present())
+        message.header.stamp = to_time(self.node.clock.present())
         self._diagnostics.publish(message)
 
     def reports(self) -> Mapping[str, HealthReport]:
@@ -261,7 +269,7 @@ class Ros2Middleware(Middleware):
         self._services.clear()
         self._endpoints.clear()
         self._texts.clear()
-        self._node.close()
+        self.node.close()
 
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)

@@ -128,7 +128,7 @@ class Ros2PublishingClock(Ros2Clock):
 class Ros2SubscribingClock(Ros2Clock):
     """Follows /clock; it stands still with it, and never goes back.
 
-    Whoever asks for the time takes what has come: a callback of an executor would cost more than the cycle itself.
+    Each call takes the times that have come: a callback of an executor would cost more than a cycle.
 
     Args:
         node: The node.

@@ -1,6 +1,5 @@
 """Binds what a component declares to a middleware."""
 
-import logging
 import math
 from collections.abc import Sequence
 
@@ -13,8 +12,6 @@ from solfer.transport.declared.topics import DeclaredIn, DeclaredOut, SoleSender
 from solfer.transport.endpoints import Queue
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
-
-logger = logging.getLogger(__name__)
 
 
 def bind(
@@ -55,10 +52,8 @@ def bind(
             publications.add(out.publish, cycles=1 if each.rate is None else max(1, round(rate / each.rate)))
             if each.rest is not None:
                 inbox.sources.append(out.rest)
-        elif isinstance(each, Action) and not middleware.offers_actions:
-            logger.warning("action %s is not offered: this middleware has no actions yet", full_name(owner, each.name))
         elif isinstance(each, Action):
-            server = ActionServer(owner, each, middleware)
+            server = middleware.action(owner, each) or ActionServer(owner, each, middleware)
             inbox.sources.append(server.receive)
             queues += server.queues
             publications.add(server.publish)
