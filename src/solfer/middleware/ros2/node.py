@@ -31,6 +31,10 @@ POLL_PERIOD = 0.1
 """Time between two checks for a requested end, while simulated time stands still [s]."""
 
 
+ONE_SUBSCRIPTION = (1, 0, 0, 0, 0, 0)
+"""What a wait is for: subscriptions, guard conditions, timers, clients, services, events."""
+
+
 def arguments(argv: Sequence[str]) -> list[str]:
     """Return the command line without the program's name, and without `--ros-args` and what belongs to it."""
     return remove_ros_args(list(argv))[1:]
@@ -142,7 +146,7 @@ class Ros2SubscribingClock(Ros2Clock):
     """Longest wait for the first time [s]."""
 
     DEPTH = 64
-    """Times that wait until somebody asks: one that was lost could be the one that went back."""
+    """Times that wait for the next call: a lost one could be that which went back."""
 
     STAMP = struct.Struct("<4xiI")
     """A packed rosgraph_msgs/Clock: seconds and nanoseconds behind the four bytes that begin each message."""
@@ -200,7 +204,7 @@ class Ros2SubscribingClock(Ros2Clock):
         """Wait for a time that comes, at most `POLL_PERIOD`."""
         waits = getattr(self._waits, "set", None)
         if waits is None:
-            waits = self._waits.set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, self._context.handle)
+            waits = self._waits.set = rclpy_implementation.WaitSet(*ONE_SUBSCRIPTION, self._context.handle)
         waits.clear_entities()
         waits.add_subscription(self._handle)
         waits.wait(round(1e9 * POLL_PERIOD))

@@ -68,7 +68,7 @@ class MismatchWatch:
                     self._warn(end, f"{other.node_namespace.rstrip('/')}/{other.node_name}", policy, ours, theirs)
 
     def _warn(self, end: Ended, other: str, policy: str, ours: Any, theirs: Any) -> None:
-        way, verbs, kind = (
+        fact, verbs, kind = (
             (f"nothing of {other} arrives", ("publishes", "requires"), "publisher")
             if end.receives
             else (f"nothing arrives at {other}", ("requires", "publishes"), "subscription")
@@ -76,7 +76,7 @@ class MismatchWatch:
         logger.warning(
             "topic %s: %s, which %s %s where %s %s %s; expected: a %s with %s %s in %s",
             end.topic,
-            way,
+            fact,
             verbs[0],
             _words(theirs),
             self._name,

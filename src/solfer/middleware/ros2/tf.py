@@ -9,7 +9,7 @@ from solfer.middleware.ros2.quality import quality
 from solfer.transport import BodyMessage
 
 
-class BaseTransform:
+class Ros2BaseTransform:
     """Broadcasts poses of a body at whole multiples of a period, at which other measurements have been made, too.
 
     Args:
@@ -40,6 +40,6 @@ class BaseTransform:
             self._publisher.publish(bytes(writer.bytes))
 
 
-def base_transform(middleware: Ros2Middleware) -> BaseTransform:
+def base_transform(middleware: Ros2Middleware) -> Ros2BaseTransform:
     """Make the transform of the simulator's base."""
-    return BaseTransform(middleware)
+    return Ros2BaseTransform(middleware)
