@@ -97,11 +97,11 @@ class World:
         configuration = load(file, name)
         known = name if name in Registry() else "joint_states"
         generator = Registry().find(known, target or configuration.module.class_)
-        plugin = generate(configuration, self.node(name), generator)
+        plugin = generate(configuration, self.connect(name), generator)
         self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle(), cycles=True)
         return plugin
 
-    def node(self, name: str) -> Middleware:
+    def connect(self, name: str) -> Middleware:
         """Make the middleware of a node."""
         return MemoryMiddleware(self.bus, name)
 

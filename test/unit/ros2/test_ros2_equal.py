@@ -70,13 +70,13 @@ class Ros2World(World):
     def offer(self, _):
         """See `World.offer`."""
         self._nodes = []
-        middleware = self.node("simulator")
+        middleware = self.connect("simulator")
         for name, text in parameters().items():
             middleware.provide(name, text)
         return super().offer(middleware)
 
-    def node(self, name):
-        """See `World.node`."""
+    def connect(self, name):
+        """See `World.connect`."""
         node = Ros2Node(name, ["test"])
         node.clock = VirtualClock(self.bus)
         self._nodes.append(SteppedMiddleware(node))
