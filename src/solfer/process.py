@@ -79,9 +79,26 @@ def run_main(main: Callable[[list[str]], int]) -> None:
 
     Arguments that roslaunch adds, `__name:=xbot` and remappings of topics, are left out.
     """
+    run_process(main, [argument for argument in sys.argv[1:] if ":=" not in argument])
+
+
+def switch(text: str) -> bool:
+    """Convert 'true' or 'false', as launch files write them.
+
+    Raises:
+        ValueError: The text is something else.
+    """
+    values = {"true": True, "1": True, "false": False, "0": False}
+    if text.lower() not in values:
+        raise ValueError("true or false")
+    return values[text.lower()]
+
+
+def run_process(main: Callable[[list[str]], int], argv: list[str]) -> None:
+    """Run a node's `main` on arguments and exit with its code; an error is printed in one block."""
     logging.basicConfig(level=logging.INFO, format="[%(levelname)s] [%(name)s]: %(message)s", stream=sys.stdout)
     try:
-        code = main([argument for argument in sys.argv[1:] if ":=" not in argument])
+        code = main(argv)
     except KeyboardInterrupt:  # before the process set its signal handlers
         code = 128 + signal.SIGINT
     except SolferError as error:

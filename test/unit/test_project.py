@@ -14,7 +14,12 @@ else:
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / "src"
-ROS = {SOURCES / "solfer/middleware/ros", SOURCES / "solfer_tools/ros_view", SOURCES / "solfer/ros_statistics.py"}
+ROS = {
+    SOURCES / "solfer/middleware/ros",
+    SOURCES / "solfer/middleware/ros2",
+    SOURCES / "solfer_tools/ros_view",
+    SOURCES / "solfer/ros_statistics.py",
+}
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 NAMES = {

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any
 
 from solfer.errors import MiddlewareError
-from solfer.interfaces.declaration import Service
+from solfer.interfaces.declaration import Action, Service
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
 from solfer.transport.messages import canonical
@@ -189,6 +189,13 @@ class Middleware(abc.ABC):
         Raises:
             SolferError: One is not, or there is no such interface.
         """
+
+    def action(self, owner: str, action: Action) -> Any:
+        """Return the server of an action in a protocol of the middleware's own; None: it travels by topics.
+
+        The server has the methods of `transport.declared.action_server.ActionServer`.
+        """
+        return None
 
     @abc.abstractmethod
     def writer(self, topic: str, message: str) -> Writer:

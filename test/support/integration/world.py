@@ -13,6 +13,7 @@ from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.bullet import robot as bullet_robot
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
+from solfer.transport import Middleware
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = CONFIG / "robots" / "centauro"
@@ -76,7 +77,7 @@ class World:
         self.received, self.asleep = True, set()
         self.bus.every(STEP, self._step)
 
-    def offer(self, middleware: MemoryMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
+    def offer(self, middleware: Middleware) -> tuple[Simulation, SimulationServer | MockHardware]:
         """Make the robot, and what offers it on the bus."""
         simulation = Simulation.from_file(perfect() if self.is_perfect else ROBOT / "robot.yaml")
         return simulation, SimulationServer(simulation, middleware)
@@ -96,9 +97,13 @@ class World:
         configuration = load(file, name)
         known = name if name in Registry() else "joint_states"
         generator = Registry().find(known, target or configuration.module.class_)
-        plugin = generate(configuration, MemoryMiddleware(self.bus, name), generator)
+        plugin = generate(configuration, self.connect(name), generator)
         self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle(), cycles=True)
         return plugin
+
+    def connect(self, name: str) -> Middleware:
+        """Make the middleware of a node."""
+        return MemoryMiddleware(self.bus, name)
 
     def together(self, listed: Sequence) -> PluginSet:
         """Make plugins that share what they can in one loop, with a node each, not yet started."""

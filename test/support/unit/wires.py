@@ -1,7 +1,11 @@
 """Middlewares as the tests that hold for every middleware see them."""
 
+import functools
 import itertools
+import os
 import tempfile
+import time
+from importlib.util import find_spec
 from pathlib import Path
 
 from support.bus_clock import BusClock
@@ -101,3 +105,56 @@ class XbotWire(Wire):
     def node(self, name) -> XbotMiddleware:
         """See `Wire.node`."""
         return XbotMiddleware(Namespace("contract", self.folder), name, clock=BusClock(self._bus))
+
+
+@functools.cache
+def ros2_middleware(name):
+    """Make a node of ROS 2, once in this process: a test waits 0.1 s for each that it makes."""
+    from solfer.middleware.ros2 import Ros2Middleware, Ros2Node
+
+    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)  # other tests on this machine stay outside
+    return Ros2Middleware(Ros2Node(name, ["test"]))
+
+
+class Ros2Wire(Wire):
+    """All nodes are in this process, each with a DDS participant of its own; time is real."""
+
+    def __init__(self):
+        self.middleware = ros2_middleware("listener")
+        self._senders = {}
+
+    def say(self, sender, topic, kind, *messages) -> None:
+        """See `MemoryWire.say`."""
+        known = self._senders.setdefault(sender, {})
+        writer = known.get(topic) or known.setdefault(topic, self.node(sender).writer(topic, kind))
+        ends = [end.subscription for end in self.middleware._endpoints if end.topic == writer.topic]
+        senders = self.middleware._ros.count_publishers
+        self.until(lambda: writer.receivers() == len(ends))
+        self.until(lambda: all(end.senders() == senders(writer.topic) for end in ends))  # each end finds the other one
+        for message in messages:
+            writer.write(message)
+
+    def kill(self, sender) -> None:
+        """Withdraw a node's publishers."""
+        for writer in self._senders.pop(sender).values():
+            writer.close()
+
+    def node(self, name):
+        """See `Wire.node`."""
+        return ros2_middleware(name)
+
+    def pass_time(self, duration) -> None:
+        """See `MemoryWire.pass_time`."""
+        time.sleep(duration)
+
+    def close(self) -> None:
+        """See `Wire.close`; the nodes stay for the next test."""
+        for name in ("listener", "first", "second", "stranger"):
+            ends = ros2_middleware(name)._endpoints
+            for end in ends:
+                end.close()
+            ends.clear()
+
+
+ROS2 = {"ros2": Ros2Wire} if find_spec("rclpy") else {}
+"""Where ROS 2 is: in the environment of `./run ros2`."""

@@ -119,6 +119,7 @@ ELSEWHERE = {
     r"rosservice call /left/.*": ("test/ros/namespaces_test.py", "rosservice call /left/"),
     r"rosservice call /lower_level/.*": ("test/ros/refused_test.py", "emergency_stop"),
     r"rosservice call /NAME/get_config .*": ("test/ros/config_test.py", "get_config"),
+    r"(\./run ros2 .*|sed .* config/ros2.yaml)": ("test/unit/ros2/test_ros2_plugin.py", "docs/how-to/ros2.md"),
     r"pip install \..*": ("test/integration/package/test_pip_install.py", "install"),
     r'pip install "\.\[.*': ("test/integration/package/test_pip_install.py", "install"),
     r"pytest test/unit --without ros": ("test/integration/package/test_pip_install.py", "without"),

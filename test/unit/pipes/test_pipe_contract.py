@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.unit.contract import ALL, MEASURED, NAMED, keeping
-from support.unit.wires import MemoryWire, XbotWire
+from support.unit.wires import ROS2, MemoryWire, XbotWire
 
 from solfer.transport import MessageStatus
 
@@ -14,7 +14,7 @@ every_pipe = pytest.mark.parametrize("case", ALL.values(), ids=ALL)
 pipes_with_names = pytest.mark.parametrize("case", NAMED.values(), ids=NAMED)
 
 
-WIRES = {"memory": MemoryWire, "xbot": XbotWire}
+WIRES = {"memory": MemoryWire, "xbot": XbotWire, **ROS2}
 
 
 def pytest_generate_tests(metafunc):

@@ -49,6 +49,7 @@ def node(name, *arguments):
 IN_RT = ("      layer: NRT\n", "      layer: RT\n")  # the first one in the file: of joint_states
 SHARED_IN_RT = "layer: NRT\n      plugins:", "layer: RT\n      plugins:"
 ON_XBOT = ("middleware: ROS", "middleware: XBOT")
+ON_ROS2 = ("middleware: ROS", "middleware: ROS2")
 
 
 @pytest.mark.parametrize(
@@ -64,6 +65,13 @@ def test_a_node_refuses_what_runs_elsewhere(write, change, place, words):
         node("plugin", "plugin", "-p", "joint_states", "-c", file)
     assert error.value.where == place and words[1] in error.value.expected
     assert "a file LAYER that lists 'joint_states'" in error.value.expected and error.value.exit_code == 2
+
+
+def test_a_node_under_ros_names_the_command_for_ros_2(write):
+    file = write(ON_ROS2)
+    with pytest.raises(ConfigError, match="middleware ROS2, and this node runs the layer NRT on ROS") as error:
+        node("plugin", "plugin", "-p", "joint_states", "-c", file)
+    assert f"`./run ros2 plugin -p ID -n joint_states -c {file}`" in error.value.expected
 
 
 def test_the_layer_that_lists_it_is_named(write):

@@ -129,9 +129,12 @@ def _check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
     parse(tree, MainRecord, problems)
     named_records(tree.get("calibration"), CalibrationRecord, problems)
     chosen = tree.get("middleware")
+    name = None if chosen is None else chosen.value
     for middleware, kind in MIDDLEWARES.items():
+        is_chosen = name == middleware
+        if not is_chosen and (kind.block or name in MIDDLEWARES and MIDDLEWARES[name].section == kind.section):
+            continue  # another middleware has the same section
         section = tree.get(kind.section)
-        is_chosen = chosen is not None and chosen.value == middleware
         if is_chosen:
             _check_lists(tree, middleware, problems)
         named_records(section and section.get("mapping"), MappingRecord, problems)

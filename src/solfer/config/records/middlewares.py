@@ -30,6 +30,7 @@ class MiddlewareKind:
         map: Map of every Robot in the order in which the lower level publishes its joints; None: there is none.
         named: Whether each pipe names its topic, its message and its type; else the layer of the other end may show it.
         keys: Record of its section.
+        block: Name of its section, if that is another middleware's; empty: its own.
     """
 
     name: str
@@ -38,23 +39,25 @@ class MiddlewareKind:
     map: str | None = None
     named: bool = True
     keys: type[Record] = MiddlewareRecord
+    block: str = ""
 
     @property
     def section(self) -> str:
-        """Name of the section of its own keys."""
-        return self.name.lower()
+        """Name of the section of its keys."""
+        return self.block or self.name.lower()
 
 
 _ALL = (
     MiddlewareKind("ROS", "NRT", "ROS"),
     MiddlewareKind("XBOT", "RT", "XBotCore", map="XBOT", named=False),
+    MiddlewareKind("ROS2", "NRT", "ROS 2", block="ros"),  # one word selects ROS 2 for the pipes of ROS
 )
 """Registered middlewares; of each layer the first one counts where the layer alone is known."""
 
 MIDDLEWARES = {kind.name: kind for kind in _ALL}
 """All of them, by name."""
 
-SECTIONS = tuple(kind.section for kind in _ALL)
+SECTIONS = tuple(kind.section for kind in _ALL if not kind.block)
 """Names of their sections."""
 
 PREDEFINED_MAPS = tuple(kind.map for kind in _ALL if kind.map is not None)

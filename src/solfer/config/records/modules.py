@@ -35,6 +35,7 @@ class MainKeys(Record):
 _sections: dict[str, Any] = {
     kind.section: (kind.keys, Field(default_factory=kind.keys, description=f"keys for {kind.title} only"))
     for kind in MIDDLEWARES.values()
+    if not kind.block
 }
 MainRecord: type[MainKeys] = create_model("MainRecord", __base__=MainKeys, __doc__=MainKeys.__doc__, **_sections)
 """The skeleton with a section for each middleware."""

@@ -1,5 +1,7 @@
 """ROS 1: rospy's topics and services, tf and diagnostics."""
 
+from collections.abc import Sequence
+
 from solfer.errors import MissingDependency
 
 try:
@@ -12,8 +14,15 @@ except ModuleNotFoundError as error:
 
 from solfer.middleware.ros.middleware import RosMiddleware
 from solfer.middleware.ros.node.node import RosNode, arguments, run_main
-from solfer.middleware.ros.node.options import argument, setting, switch
-from solfer.middleware.ros.tf import BaseTransform, tf_prefix
+from solfer.middleware.ros.node.options import argument, setting
+from solfer.middleware.ros.tf import BaseTransform, base_transform, tf_prefix
+from solfer.process import switch
+
+
+def connect(name: str, argv: Sequence[str] | None = None, publishes_time: bool = False) -> RosMiddleware:
+    """Start the node of this process, see `RosNode`."""
+    return RosMiddleware(RosNode(name, argv, publishes_time))
+
 
 __all__ = [
     "BaseTransform",
@@ -21,6 +30,8 @@ __all__ = [
     "RosMiddleware",
     "argument",
     "arguments",
+    "base_transform",
+    "connect",
     "run_main",
     "setting",
     "switch",

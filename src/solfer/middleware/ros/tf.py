@@ -58,6 +58,11 @@ class BaseTransform:
             self._topic_publisher.send(PackedMessage(pack(message, stamp_of(message.stamp), self._prefix), name=None))
 
 
+def base_transform(middleware: Middleware) -> BaseTransform:
+    """Make the transform of the simulator's base."""
+    return BaseTransform(tf_prefix(middleware))
+
+
 def pack(message: BodyMessage, stamp: tuple[int, int], prefix: str = "") -> bytes:
     """Pack a tf2_msgs/TFMessage with one transform, and its stamp [s, ns]."""
     frame = message.frame.encode()

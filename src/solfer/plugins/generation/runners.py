@@ -10,7 +10,7 @@ from typing import NamedTuple
 from solfer.config import CheckReport, Configuration
 from solfer.config.loading.listed_plugins import Naming
 from solfer.config.loading.rt_layer import is_layer, read_layer
-from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE
+from solfer.config.records.middlewares import DEFAULT_MIDDLEWARE, MIDDLEWARES, RT
 from solfer.config.yaml.files import YamlFile
 from solfer.config.yaml.nodes import Mark
 from solfer.errors import ConfigError, SolferError
@@ -32,22 +32,25 @@ class Foreign(NamedTuple):
     setting: str
 
 
-def require_ros(configuration: Configuration, default: Naming, shared: bool = False) -> None:
+def require_ros(
+    configuration: Configuration, default: Naming, shared: bool = False, middleware: str = DEFAULT_MIDDLEWARE
+) -> None:
     """Check that a node under ROS is what the configuration requests.
 
     Args:
         configuration: The configuration.
         default: Returns the configuration of a plugin that an RT layer lists without one.
         shared: Whether the node runs it with others, as one of a shared plugin.
+        middleware: That of the node.
 
     Raises:
-        ConfigError: Its `middleware` is not ROS, or its `layer` is not NRT; the error names the command that runs it.
+        ConfigError: Its `middleware` is not the node's, or its `layer` not NRT; the error names what runs it.
     """
     name = configuration.name
-    foreign = _foreign(configuration)
+    foreign = _foreign(configuration, middleware)
     if foreign is not None:
         raise ConfigError(
-            f"'{name}' is for the {foreign.what}, and this node runs the layer NRT on ROS",
+            f"'{name}' is for the {foreign.what}, and this node runs the layer NRT on {middleware}",
             where=str(foreign.mark),
             expected=f"{foreign.setting}, or {_command(configuration, default)} in place of this node",
         )
@@ -78,7 +81,7 @@ def note_runners(report: CheckReport, default: Naming) -> None:
     """
     refused: dict[Foreign, dict[str, Configuration]] = {}
     for name, configuration in _started(report):
-        foreign = _foreign(configuration)
+        foreign = _foreign(configuration, DEFAULT_MIDDLEWARE)
         if foreign is not None:
             refused.setdefault(foreign, {})[name] = configuration
     for foreign, found in refused.items():
@@ -123,13 +126,13 @@ def _note_required(report: CheckReport) -> None:
             report.problems.inform(configuration.tree.nearest(("modules", name, "requires")).mark, what)
 
 
-def _foreign(configuration: Configuration) -> Foreign | None:
-    """Return what shows that a configuration is not for the layer NRT on ROS; also of one with mistakes."""
+def _foreign(configuration: Configuration, expected: str) -> Foreign | None:
+    """Return what shows that a configuration is not for the layer NRT on a middleware; also of one with mistakes."""
     tree = configuration.tree
     middleware = tree.get("middleware")
     layer = tree.get("modules", configuration.name, "layer")
-    if middleware is not None and middleware.value != DEFAULT_MIDDLEWARE:
-        return Foreign(middleware.mark, f"middleware {middleware.value}", f"`middleware: {DEFAULT_MIDDLEWARE}`")
+    if middleware is not None and middleware.value != expected:
+        return Foreign(middleware.mark, f"middleware {middleware.value}", f"`middleware: {expected}`")
     if layer is not None and layer.value == "RT":
         return Foreign(layer.mark, "layer RT", "`layer: NRT`")
     return None
@@ -139,6 +142,11 @@ def _command(configuration: Configuration, default: Naming) -> str:
     """Return the command that runs a configuration in an RT layer, with the layer's file if one beside it lists it."""
     name = configuration.name
     main = Path(configuration.file)
+    middleware, layer = (configuration.tree.get(*path) for path in (("middleware",), ("modules", name, "layer")))
+    kind = None if middleware is None else MIDDLEWARES.get(str(middleware.value))
+    if kind is not None and kind.layer != RT.layer and (layer is None or layer.value != RT.layer):
+        program = "rosrun plugins plugin" if kind.name == DEFAULT_MIDDLEWARE else f"./run {kind.name.lower()} plugin"
+        return f"`{program} -p ID -n {shlex.quote(name)} -c {shlex.quote(configuration.file)}`"
     for path in sorted(main.parent.glob("*.yaml")):
         if path.is_file() and is_layer(path) and _lists(path, main, name, default=default):
             return f"`rosrun solfer xbot {shlex.quote(os.fspath(path))}`"

@@ -53,7 +53,7 @@ def bind(
             if each.rest is not None:
                 inbox.sources.append(out.rest)
         elif isinstance(each, Action):
-            server = ActionServer(owner, each, middleware)
+            server = middleware.action(owner, each) or ActionServer(owner, each, middleware)
             inbox.sources.append(server.receive)
             queues += server.queues
             publications.add(server.publish)

@@ -38,15 +38,3 @@ def setting(argv: Sequence[str], name: str, default: Any, kind: Callable[[str], 
         return kind(str(value))
     except (ValueError, ArgumentTypeError) as error:
         raise ConfigError(f"'{value}' is not a value of '{name}'", where=where, expected=str(error)) from error
-
-
-def switch(text: str) -> bool:
-    """Convert 'true' or 'false', as roslaunch writes them.
-
-    Raises:
-        ValueError: The text is something else.
-    """
-    values = {"true": True, "1": True, "false": False, "0": False}
-    if text.lower() not in values:
-        raise ValueError("true or false")
-    return values[text.lower()]
