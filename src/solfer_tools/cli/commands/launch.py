@@ -115,7 +115,7 @@ def choices(known: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
 
     return {
         "engine": ENGINES,
-        "middleware": tuple(MIDDLEWARES),
+        "middleware": tuple(name for name, kind in MIDDLEWARES.items() if not kind.block),  # roslaunch starts no ROS 2
         "system": ("SM", "HW"),
         "layer": ("NRT", "RT"),
         "motion": ("tasks", "joints"),
