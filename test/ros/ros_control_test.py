@@ -81,8 +81,8 @@ class RosControlTest(unittest.TestCase):
 
     def moves(self, goal: float, reached: Callable[[float], bool]) -> None:
         """Move the joint of the page until its position is `reached`; a motion that a pause ends is asked for again."""
+        begin = len(self.logged)  # a pause may end the motion before the program that requests it has ended
         (joint,) = self.ask(self.requests[0], positions=[goal], speed=1.0)["joints"]
-        begin = len(self.logged)
 
         def is_reached() -> bool:
             nonlocal begin

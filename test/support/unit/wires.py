@@ -1,5 +1,6 @@
 """Middlewares as the tests that hold for every middleware see them."""
 
+import atexit
 import functools
 import itertools
 import os
@@ -113,7 +114,9 @@ def ros2_middleware(name):
     from solfer.middleware.ros2 import Ros2Middleware, Ros2Node
 
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)  # other tests on this machine stay outside
-    return Ros2Middleware(Ros2Node(name, ["test"]))
+    middleware = Ros2Middleware(Ros2Node(name, ["test"]))
+    atexit.register(middleware.close)  # a thread that still spins in C++ as Python ends would abort the process
+    return middleware
 
 
 class Ros2Wire(Wire):

@@ -2,12 +2,9 @@
 
 import dataclasses
 import functools
-import logging
 import socket
-import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
 from typing import Any
 
 import rosgraph
@@ -16,8 +13,7 @@ import rospy
 from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
 from solfer.middleware.ros.codecs.interfaces import service_class
 from solfer.middleware.ros.node.waiting import CHECK_PERIOD, wait_for
-
-logger = logging.getLogger(__name__)
+from solfer.transport.threaded_calls import as_fields, in_thread
 
 
 def provider(resolved: str) -> str | None:
@@ -67,12 +63,12 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
     """
     resolved = rospy.resolve_name(name)
     ros_class = service_class(interface)
-    values = {field.name: getattr(request, field.name) for field in dataclasses.fields(request)}
     end = time.monotonic() + timeout
     failure = ""
     while wait_for(functools.partial(provider, resolved), end - time.monotonic(), running):
         proxy = rospy.ServiceProxy(resolved, ros_class)
-        reply = in_thread(functools.partial(proxy, ros_class._request_class(**values)))  # rospy's call has no timeout
+        sent = ros_class._request_class(**as_fields(request))
+        reply = in_thread(functools.partial(proxy, sent))  # rospy's call has no timeout
         if not wait_for(reply.done, end - time.monotonic(), running):
             failure = "does not answer"
             break
@@ -99,21 +95,6 @@ def _alike(resolved: str) -> list[str]:
     except (rosgraph.MasterException, OSError):
         return []
     return [name for name, _ in services if name.endswith(ending)]
-
-
-def in_thread(work: Callable[[], Any]) -> "Future[Any]":
-    """Run `work` in a thread of its own and return its result to come."""
-    future: Future[Any] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(work())
-        except Exception as error:
-            logger.debug("a call fails", exc_info=True)
-            future.set_exception(error)
-
-    threading.Thread(target=run, daemon=True).start()
-    return future
 
 
 def replied(response: Any, reply: type) -> Any:

@@ -13,7 +13,7 @@ import rospy
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.interfaces.declaration import Service
-from solfer.middleware.ros.calls import call, in_thread, replied
+from solfer.middleware.ros.calls import call, replied
 from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.codecs.packed_message import present, set_epoch
 from solfer.middleware.ros.diagnostics import Diagnostics
@@ -32,6 +32,7 @@ from solfer.transport.endpoints import JointOrder
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
+from solfer.transport.threaded_calls import in_thread
 from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)

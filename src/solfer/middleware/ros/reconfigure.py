@@ -160,7 +160,11 @@ class ReconfigureServer:
         self._server = rospy.Service(f"{prefix}/set_parameters", Reconfigure, self._set)
         busy = object()
         bound_requests(
-            self._server.protocol, self._setting.largest, Rate(*QUICK_LIMIT), instead=lambda size: busy, busy=busy
+            self._server.protocol,
+            self._setting.service.largest,
+            Rate(*QUICK_LIMIT),
+            instead=lambda size: busy,
+            busy=busy,
         )
 
     def _set(self, request: Any) -> ReconfigureResponse:

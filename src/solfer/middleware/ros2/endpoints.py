@@ -4,36 +4,23 @@ Messages wait in the middleware of ROS 2 until they are read: bytes of a bounded
 takes and decodes. Without an executor a message costs neither a thread's wake-up nor a callback.
 """
 
-import logging
 import math
 import time
 from collections import deque
 from collections.abc import Callable, Container, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from solfer.errors import MiddlewareError, PipeError
-from solfer.middleware.ros2.codecs import CdrCodec, StampOf, codec
+from solfer.errors import MiddlewareError
+from solfer.middleware.ros2.codecs import StampOf, codec
 from solfer.middleware.ros2.quality import quality
-from solfer.throttle import Throttle
-from solfer.transport.backlog import SENDERS, Backlog
-from solfer.transport.endpoints import (
-    NEW,
-    NONE,
-    OLD,
-    PUBLISHER_TIMEOUT,
-    MessageStatus,
-    Publisher,
-    Queue,
-    Reader,
-    Writer,
-)
+from solfer.transport.arrivals import Arrival, ArrivalPublisher, ArrivalQueue, ArrivalReader, Arrivals
+from solfer.transport.backlog import SENDERS
+from solfer.transport.endpoints import MessageStatus, Publisher, Writer
 from solfer.transport.messages import Message
-
-logger = logging.getLogger(__name__)
 
 DEPTH = 64
 """Messages that wait for a reader that is late; of two publishers none crowds out the other's newest."""
@@ -60,15 +47,7 @@ class Polled(CallbackGroup):
         """Do nothing, as above."""
 
 
-class PackedArrival(NamedTuple):
-    """A message as it came in, and when by the reader's clock [s]."""
-
-    packed: bytes
-    sender: str
-    time: float
-
-
-class Ros2Subscription:
+class Ros2Subscription(Arrivals):
     """The messages of a topic, as bytes.
 
     Args:
@@ -78,11 +57,6 @@ class Ros2Subscription:
         quality: What is required of publishers.
         now: Clock of the reader [s].
         largest: Bytes of a message; a larger one is dropped undecoded. None: any size.
-
-    Attributes:
-        topic: Resolved name.
-        codec: Decodes what is taken.
-        oversized: Messages that were too large.
 
     Raises:
         MiddlewareError: There can be no such topic.
@@ -98,12 +72,8 @@ class Ros2Subscription:
         *,
         largest: int | None = None,
     ):
-        self.codec: CdrCodec = codec(message)
-        self.oversized = 0
+        super().__init__(codec(message), now, largest=largest)
         self._node = node
-        self._now = now
-        self._largest = largest
-        self._throttle = Throttle(logger)
         self._names: dict[bytes, str] = {}
         self._newest = -math.inf
         self._unnamed: deque[tuple[bytes, dict[str, Any]]] = deque()
@@ -119,40 +89,38 @@ class Ros2Subscription:
         self._depth = quality.depth
         self._take = self._subscription.handle.take_message
 
-    def take(self) -> list[PackedArrival]:
-        """Take what has come since the last call, at most as many messages as may wait."""
-        arrivals: list[PackedArrival] = []
-        self._time = self._now()
+    def poll(self, store: Callable[[Arrival], None]) -> None:
+        """Hand what has come since the last call to `store`, at most as many messages as may wait."""
+        self._time = self.now()
         self._wall = time.time_ns()
         while self._unnamed:  # in their order: what comes behind them waits
             arrival = self._arrival(*self._unnamed[0])
             if arrival is None:
                 break
             self._unnamed.popleft()
-            arrivals.append(arrival)
+            store(arrival)
         for _ in range(self._depth):
             taken = self._take(self.codec.ros_class, True)
             if taken is None:
                 break
             packed, info = taken
-            if self._largest is not None and len(packed) > self._largest:
-                self._refuse_size(info, len(packed))
+            if self.largest is not None and len(packed) > self.largest:
+                self.refuse_size(self._sender(info, NAMING_TIMEOUT) or "", len(packed))
                 continue
             arrival = None if self._unnamed else self._arrival(packed, info)
             if arrival is not None:
-                arrivals.append(arrival)
+                store(arrival)
             elif len(self._unnamed) < self._depth:
                 self._unnamed.append((packed, info))
-        return arrivals
 
-    def _arrival(self, packed: bytes, info: dict[str, Any]) -> PackedArrival | None:
+    def _arrival(self, packed: bytes, info: dict[str, Any]) -> Arrival | None:
         """Make the arrival of a message; None while the name of its sender is not known."""
         late = max(0.0, 1e-9 * (self._wall - info["received_timestamp"]))
         sender = self._sender(info, late)
         if sender is None:
             return None
         self._newest = max(self._newest, self._time - late)  # threads of the middleware may pass each other
-        return PackedArrival(packed, sender, self._newest)
+        return Arrival(packed, sender, self._newest)
 
     def _sender(self, info: dict[str, Any], waited: float) -> str | None:
         """Return the name of a message's sender; None: it is not known yet."""
@@ -170,31 +138,9 @@ class Ros2Subscription:
         self._names[gid] = name = name or gid.hex()
         return name
 
-    def _refuse_size(self, info: dict[str, Any], size: int) -> None:
-        self.oversized += 1
-        sender = self._sender(info, NAMING_TIMEOUT) or ""
-        self._throttle.warning(
-            sender,
-            "topic %s: a message of %s with %d bytes is dropped: %d bytes at most",
-            self.topic,
-            sender,
-            size,
-            self._largest,
-        )
-
     def senders(self) -> int:
         """Return how many publishers are connected."""
         return self._subscription.handle.get_publisher_count()
-
-    def decode(self, arrival: PackedArrival) -> Message | None:
-        """Decode a message; None if it is refused, which is logged once a second for each sender."""
-        try:
-            return self.codec.decode(arrival.packed, arrival.sender)
-        except PipeError as error:
-            self._throttle.warning(
-                arrival.sender, "topic %s: a message of %s is refused: %s", self.topic, arrival.sender, error
-            )
-            return None
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -205,21 +151,7 @@ def ignore(_: Any) -> None:
     """Stand in for a callback that never runs."""
 
 
-class Ros2Publisher(Publisher):
-    """A node that publishes on a topic, as one reader knows it.
-
-    Attributes:
-        newest: Its newest message, None before the first.
-        taken: The one that was read last.
-    """
-
-    def __init__(self, name: str):
-        super().__init__(name)
-        self.newest: PackedArrival | None = None
-        self.taken: PackedArrival | None = None
-
-
-class Ros2Reader(Reader):
+class Ros2Reader(ArrivalReader):
     """The newest message of a topic, or each of them.
 
     Args:
@@ -232,6 +164,7 @@ class Ros2Reader(Reader):
     """
 
     receives = True
+    subscription: Ros2Subscription
 
     def __init__(
         self,
@@ -243,125 +176,50 @@ class Ros2Reader(Reader):
         kept: int = 0,
         latched: bool = False,
     ):
-        self._all = Ros2Publisher("")
-        self._now = now
-        self._by_name: dict[str, Ros2Publisher] = {}
-        self._backlog: Backlog[tuple[PackedArrival, Ros2Publisher]] | None = Backlog(kept) if kept else None
-        self._waiting = deque[tuple[PackedArrival, Ros2Publisher]]()
+        super().__init__(now, kept)
         self.requires = quality(max(4 * kept, DEPTH), reliable=latched, latched=latched)
         self.subscription = Ros2Subscription(node, topic, message, self.requires, now=now)
         self.topic = self.subscription.topic
         self.carries = message
 
-    def _poll(self) -> None:
-        """Take what has come."""
-        for arrival in self.subscription.take():
-            publisher = self._by_name.get(arrival.sender) or self._add(arrival.sender)
-            self._all.newest = publisher.newest = arrival
-            publisher.arrival = arrival.time
-            if self._backlog is not None:
-                self._backlog.put(arrival.sender, (arrival, publisher))
-
-    @property
-    def dropped(self) -> int:  # type: ignore[override]
-        """See `Reader`."""
-        return 0 if self._backlog is None else self._backlog.dropped
-
-    def _add(self, name: str) -> Ros2Publisher:
-        """Add a node that publishes for the first time; those that have not published for long are dropped."""
-        recent = self._now() - PUBLISHER_TIMEOUT
-        self._by_name = {each: known for each, known in self._by_name.items() if known.arrival >= recent}
-        publisher = Ros2Publisher(name)
-        if len(self._by_name) < SENDERS:
-            self._by_name[name] = publisher
-        self.publishers = tuple(self._by_name.values())
-        return publisher
-
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
-        self._poll()
-        return self.read_from(self._all)
+        self.subscription.poll(self._store)
+        return super().read()
 
     def update(self) -> Sequence[Publisher]:
         """See `Reader.update`."""
-        self._poll()
+        self.subscription.poll(self._store)
         return self.publishers
 
-    def read_from(self, publisher: Ros2Publisher) -> MessageStatus:
-        """See `Reader.read_from`."""
-        newest = publisher.newest
-        if newest is not None and newest is not publisher.taken:
-            publisher.taken = newest
-            return self._receive(newest)
-        return NONE if self.message is None else OLD
-
-    def read_next(self) -> Ros2Publisher | None:
+    def read_next(self) -> ArrivalPublisher | None:
         """See `Reader.read_next`."""
-        waiting = self._waiting
-        if not waiting and self._backlog is not None:
-            self._poll()
-            waiting.extend(self._backlog.drain())
-        while waiting:
-            arrival, publisher = waiting.popleft()
-            if self._receive(arrival) is NEW:
-                return publisher
-        return None
-
-    def _receive(self, arrival: PackedArrival) -> MessageStatus:
-        message = self.subscription.decode(arrival)
-        if message is None:
-            self.refused += 1
-            return NONE if self.message is None else OLD
-        self.message = message
-        self.arrival = arrival.time
-        return NEW
-
-    def age(self) -> float:
-        """See `Reader.age`."""
-        return self._now() - self.arrival
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self.subscription.close()
+        if not self._waiting:
+            self.subscription.poll(self._store)
+        return super().read_next()
 
 
-class Ros2Queue(Queue):
+class Ros2Queue(ArrivalQueue):
     """Every message of a topic."""
 
     receives = True
+    subscription: Ros2Subscription
 
     def __init__(self, node: Node, topic: str, message: str, size: int, largest: int | None = None):
-        self._backlog: Backlog[PackedArrival] = Backlog(size)
+        super().__init__(size)
         self.requires = quality(max(4 * size, DEPTH), reliable=True)
         self.subscription = Ros2Subscription(node, topic, message, self.requires, largest=largest)
         self.topic = self.subscription.topic
 
-    @property
-    def dropped(self) -> int:
-        """See `Queue.dropped`."""
-        return self._backlog.dropped + self.subscription.oversized
-
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""
-        self._poll()
-        return self._decoded(self._backlog.drain())
+        self.subscription.poll(self._store)
+        return super().drain()
 
     def take(self, first: Container[str], most: int, others: int) -> list[Message]:
-        """See `Queue.take`; messages that are dropped are not decoded."""
-        self._poll()
-        return self._decoded(self._backlog.take(first, most, others))
-
-    def _poll(self) -> None:
-        for arrival in self.subscription.take():
-            self._backlog.put(arrival.sender, arrival)
-
-    def _decoded(self, arrivals: list[PackedArrival]) -> list[Message]:
-        decoded = (self.subscription.decode(arrival) for arrival in arrivals)
-        return [message for message in decoded if message is not None]
-
-    def close(self) -> None:
-        """Unsubscribe."""
-        self.subscription.close()
+        """See `Queue.take`."""
+        self.subscription.poll(self._store)
+        return super().take(first, most, others)
 
 
 class Ros2Writer(Writer):

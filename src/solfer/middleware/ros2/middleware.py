@@ -1,9 +1,7 @@
 """The Middleware of a node of ROS 2."""
 
-import logging
-import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, wait
 from typing import Any, TypeVar
 
@@ -23,9 +21,8 @@ from solfer.transport.endpoints import NEW, JointOrder
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
+from solfer.transport.threaded_calls import in_thread
 from solfer.transport.topics import Topics
-
-logger = logging.getLogger(__name__)
 
 Endpoint = TypeVar("Endpoint", Ros2Reader, Ros2Queue, Ros2Writer)
 
@@ -189,7 +186,7 @@ class Ros2Middleware(Middleware):
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; it is sent also when the node has to end."""
-        answer = _in_thread(
+        answer = in_thread(
             lambda: replied(call(self._ros, name, interface, request, timeout=timeout, running=lambda: True), reply)
         )
         self._requests = [*(each for each in self._requests if not each.done()), answer]
@@ -278,18 +275,3 @@ class Ros2Middleware(Middleware):
     @staticmethod
     def _full_name(end: Any) -> str:
         return f"{end.node_namespace.rstrip('/')}/{end.node_name}"
-
-
-def _in_thread(work: Callable[[], Any]) -> "Future[Any]":
-    """Run `work` in a thread of its own and return its result to come."""
-    future: Future[Any] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(work())
-        except Exception as error:
-            logger.debug("a call fails", exc_info=True)
-            future.set_exception(error)
-
-    threading.Thread(target=run, daemon=True).start()
-    return future

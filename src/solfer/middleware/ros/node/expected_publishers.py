@@ -6,8 +6,8 @@ from concurrent.futures import Future, wait
 import rosgraph
 import rospy
 
-from solfer.middleware.ros.calls import in_thread
 from solfer.transport.endpoints import PUBLISHER_TIMEOUT
+from solfer.transport.threaded_calls import in_thread
 
 
 class ExpectedPublishers:
