@@ -110,13 +110,36 @@ class XbotWire(Wire):
 
 @functools.cache
 def ros2_middleware(name):
-    """Make a node of ROS 2, once in this process: a test waits 0.1 s for each that it makes."""
+    """Make a node of ROS 2, once in this process: a test waits 0.1 s for each that it makes.
+
+    Two participants of Fast DDS in one process, the second made while the first is found, miss each other's readers in
+    one of some hundred pairs, for good; such a node is made anew.
+    """
     from solfer.middleware.ros2 import Ros2Middleware, Ros2Node
 
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)  # other tests on this machine stay outside
-    middleware = Ros2Middleware(Ros2Node(name, ["test"]))
-    atexit.register(middleware.close)  # a thread that still spins in C++ as Python ends would abort the process
-    return middleware
+    while True:
+        made = Ros2Middleware(Ros2Node(name, ["test"]))
+        pairs = [pair for known in ROS2_NODES for pair in ((known, made), (made, known))]
+        end = time.monotonic() + 5.0
+        while time.monotonic() < end:
+            if all(knows(*pair) for pair in pairs):
+                ROS2_NODES.append(made)
+                atexit.register(made.close)  # a thread that still spins in C++ as Python ends would abort the process
+                return made
+            time.sleep(STEP)
+        made.close()
+
+
+ROS2_NODES = []
+
+
+def knows(one, other):
+    """Return whether a node of ROS 2 has found another one, its publishers and its subscriptions."""
+    names = (node for node, _ in one._ros.get_node_names_and_namespaces())
+    return other.name.lstrip("/") in names and bool(
+        one._ros.get_service_names_and_types_by_node(other.name.lstrip("/"), "/")
+    )
 
 
 class Ros2Wire(Wire):
