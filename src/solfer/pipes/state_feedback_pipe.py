@@ -50,6 +50,8 @@ class _Destination:
         dofs: The DoFs, shape (k,).
 
     Attributes:
+        dofs: The DoFs, shape (k,).
+        live: Addresses of the State's arrays, shape (interfaces,).
         scatter: Writes values, shape (interfaces, k), of which it gets the indices, and returns what has changed.
         all: The indices of all values, shape (k,).
         changed: Names of the interfaces that have changed, by what `scatter` returns.
@@ -61,8 +63,9 @@ class _Destination:
         from solfer.numerics.pointers import address
 
         # arrays of a State stay where they are
-        live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
-        self.scatter = partial(scatter, dofs, live)
+        self.live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
+        self.dofs = np.array(dofs, dtype=np.int64)
+        self.scatter = partial(scatter, self.dofs, self.live)
         self.all = np.arange(len(dofs))
         self.changed = tuple(
             tuple(name for bit, name in enumerate(interfaces) if number >> bit & 1)
@@ -151,8 +154,6 @@ class StateFeedbackPipe(FeedbackPipe):
         reader = self.reader
         if precedence is None:
             status = super().run()
-            if status is NEW:
-                self._write_fields()
         elif self.history is not None:
             status = self._take_all(self.history)
         else:
@@ -169,7 +170,6 @@ class StateFeedbackPipe(FeedbackPipe):
                         sole.strikes = 0
                     else:
                         precedence.note(sole.name, self.part, reader.arrival)
-                    self._write_fields()
             else:
                 status = self._arbitrate(publishers)
         if self._filtering:
@@ -180,7 +180,7 @@ class StateFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.repeat`; writes them to the State, or passes them to the filters."""
         super().repeat(arrival)
         self.part = None
-        self._write_fields()
+        self._write_fields(arrival)
         if self.history is not None:
             self.history.add(arrival, arrival, self.values)
 
@@ -267,7 +267,6 @@ class StateFeedbackPipe(FeedbackPipe):
         if not counts or not self._accept():
             return False
         self._precedence.note(publisher.name, self.part, self.reader.arrival)
-        self._write_fields()
         return True
 
     def _unite(self, parts: Sequence[np.ndarray | None]) -> MessageStatus:
@@ -306,13 +305,13 @@ class StateFeedbackPipe(FeedbackPipe):
             )
         return counts
 
-    def _write_fields(self) -> None:
-        """Write the newest values to the State, or pass them to the filters."""
+    def _write_fields(self, arrival: float) -> None:
+        """Write the newest values, which came at `arrival` [s], to the State, or pass them to the filters."""
         if not self._filtered:
             destination = self._destination
             changes = destination.scatter(self.values, destination.all if self.part is None else self.part)
             if changes:
-                self.changed = self.arrival
+                self.changed = arrival
                 versions = self._state.versions
                 for interface in destination.changed[changes]:
                     versions[interface] += 1
@@ -320,6 +319,10 @@ class StateFeedbackPipe(FeedbackPipe):
         for state_field in self.state_fields:
             state_field.accept(self.part)
         self._filtering = True
+
+    @abc.abstractmethod
+    def _decode(self, message: Message) -> None:
+        """See `FeedbackPipe._decode`; writes the values to the State, or passes them to the filters."""
 
     @abc.abstractmethod
     def _match(self, message: Message) -> None:
