@@ -135,6 +135,8 @@ class Plugin:
             self.name, parts.watches, parts.claim, middleware=parts.middleware, period=period, stall=parts.stall
         )
         self._readiness.taken = parts.outputs.forget
+        refusals = () if parts.claim is None else (parts.claim.refusals,)
+        self.inbox.pending = parts.middleware.pending([*self.inbox.queues, *refusals])
         self.timing = CycleTiming()
         self._work = ComponentCycle(
             component,
@@ -196,14 +198,23 @@ class Plugin:
             self.overload.advance(gap)
             self._awake(now)
         inbox = self.inbox
-        if inbox.waits or (inbox.sources and (inbox.refusal or inbox.pending())):
+        news = inbox.pending()
+        if inbox.waits or (inbox.sources and (inbox.refusal or news)):
             inbox.apply()
         times[CALLS] = -mark + (mark := clock())
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        readiness.feedbacks.read(now, self.outputs.joints.distance)
-        verdict = readiness.decide(now, life is RUNNING)
+        complete = readiness.feedbacks.read(now, self.outputs.joints.distance)
+        goes_on = complete and life is RUNNING and now >= readiness.earliest
+        claim = readiness.claim
+        verdict = WORK
+        if (
+            not goes_on
+            or readiness.rewind_words[0] != readiness.rewinds
+            or (claim is not None and (news or claim.reason or claim.is_taken))
+        ):
+            verdict = readiness.decide(now, life is RUNNING)
         times[READ] = -mark + (mark := clock())
         if verdict is not WORK:
             self._obey(verdict, now)
