@@ -118,6 +118,7 @@ class StateFeedbackPipe(FeedbackPipe):
         self._destination = _Destination(state, interfaces, dofs)
         self.part: np.ndarray | None = None
         self._precedence = Precedence(len(dofs)) if reception.measured else None
+        self._newest_counts = not reception.measured
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
         self.history: History | None = None
@@ -153,7 +154,9 @@ class StateFeedbackPipe(FeedbackPipe):
         precedence = self._precedence
         reader = self.reader
         if precedence is None:
-            status = super().run()
+            status = reader.read()
+            if status is NEW and not self._accept():
+                status = OLD
         elif self.history is not None:
             status = self._take_all(self.history)
         else:
