@@ -124,6 +124,7 @@ class StateFeedbackPipe(FeedbackPipe):
         self.history: History | None = None
         if reception.history:
             self.history = History(interfaces, dofs, reception.history)
+            self.run = partial(self._take_all, self.history)  # type: ignore[method-assign] # without a call in between
             state.histories.append(self.history)
 
     @property
@@ -157,8 +158,6 @@ class StateFeedbackPipe(FeedbackPipe):
             status = reader.read()
             if status is NEW and not self._accept():
                 status = OLD
-        elif self.history is not None:
-            status = self._take_all(self.history)
         else:
             publishers = reader.update()
             sole = precedence.sole
@@ -257,10 +256,16 @@ class StateFeedbackPipe(FeedbackPipe):
                 history.sender = publisher.name
                 parts.append(self.part)
             rest -= 1
-            publisher = reader.read_next() if rest else None
+            publisher = reader.read_next() if rest and reader.has_next else None
         history.dropped += reader.dropped - history.unread
         history.unread = reader.dropped
-        return self._unite(parts) if parts else NONE if reader.message is None else OLD
+        if self._filtering:
+            self.filter()
+        if not parts:
+            return NONE if reader.message is None else OLD
+        if len(parts) > 1 or self._watch is not None:
+            self._unite(parts)
+        return NEW
 
     def _take(self, publisher: Publisher) -> bool:
         """Accept the message that was read last, if its publisher counts; return whether it does and fits."""
@@ -269,7 +274,11 @@ class StateFeedbackPipe(FeedbackPipe):
         self._clock = publisher.clock
         if not counts or not self._accept():
             return False
-        self._precedence.note(publisher.name, self.part, self.reader.arrival)
+        if sole is not None and self.part is sole.part and sole.name == publisher.name:
+            sole.arrival = self.reader.arrival
+            sole.strikes = 0
+        else:
+            self._precedence.note(publisher.name, self.part, self.reader.arrival)
         return True
 
     def _unite(self, parts: Sequence[np.ndarray | None]) -> MessageStatus:

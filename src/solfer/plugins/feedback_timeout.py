@@ -322,6 +322,14 @@ class FeedbackTimeouts:
             status = feedback.run()
             arrival = feedback.arrival
             if (
+                # nothing has come of what the plugin need not have
+                arrival == math.inf
+                and each.state is WAITING
+                and not feedback.required
+                and feedback.handovers == each.handovers
+            ):
+                continue
+            if (
                 # one that goes on, whose newest message has changed something, which is nearly every one
                 each.state is LIVE
                 and now - arrival <= each.fresh

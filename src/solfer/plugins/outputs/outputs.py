@@ -1,6 +1,7 @@
 """Commands of a plugin: collected from its component, checked, blended in and sent; the last ones are kept to hold."""
 
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from typing import Any, NoReturn, cast
 
 import numpy as np
@@ -15,6 +16,8 @@ from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
+
+_MOVED = attrgetter("moved")
 
 Claim = tuple[str, str, str]
 """A number of a command: controller, field and joint."""
@@ -121,7 +124,7 @@ class Outputs:
             pipe.send(stamp)
         joints = self.joints
         if joints.is_sent:
-            joints.distance += max([pipe.moved for pipe in joints.pipes], default=0.0)
+            joints.distance += max(map(_MOVED, joints.pipes), default=0.0)
         joints.is_sent = joints.are_followed = True
 
     def rest(self, stamp: float) -> None:

@@ -142,6 +142,7 @@ class XbotReader(Reader):
             self._sources = self.publishers
             return None
         oldest.ahead = False
+        self.has_next = len(self._sources) > 1 or oldest.end.words[NEWEST] != oldest.end.sequence
         record = oldest.record
         record.attributes["stamp"] = record.front[STAMP_COLUMN]
         if record.changes:
