@@ -19,7 +19,7 @@ from solfer.plugins.readiness import FORGET, HOLD, WORK, CycleVerdict, Readiness
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.timing.cycle_timing import NO_TIMES, CycleTiming, Stage
 from solfer.plugins.timing.overload import Overload
-from solfer.plugins.timing.robot_time import RobotTime
+from solfer.plugins.timing.robot_time import LOST, RobotTime
 from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET
@@ -138,14 +138,14 @@ class Plugin:
         refusals = () if parts.claim is None else (parts.claim.refusals,)
         self.inbox.pending = parts.middleware.pending([*self.inbox.queues, *refusals])
         self.timing = CycleTiming()
+        self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._work = ComponentCycle(
             component,
-            RobotTime(self.feedbacks, period),
+            RobotTime(self.feedbacks, period, self.overload),
             parts.jumps,
             guard=parts.guard,
             publications=parts.publications,
         )
-        self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._wait()
 
     @property
@@ -229,9 +229,13 @@ class Plugin:
         if work.dynamics is not None:
             work.dynamics.update()
         robot_time = work.robot_time
-        passed = robot_time.advance(now)
-        component.let_pass(passed, robot_time.lost)
-        component.pace = self.overload.advance(passed)
+        measured = robot_time.feedback
+        passed = robot_time.advance(now, measured.stamp, measured.accepted)
+        component.let_pass(passed, robot_time.state[LOST])
+        overload = self.overload
+        if overload.is_near[0] or overload.reason or overload.pace < 1.0:
+            overload.change(passed)
+        component.pace = overload.pace
         following = self.outputs.following
         if (
             following is not None
