@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from solfer.errors import SizeMismatch
 from solfer.transport.messages import GAINS
 
+
 class Calibration:
     """Names, signs and zeros of joints of the hardware, in the order of a pipe.
 

@@ -3,13 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-from numba import carray
 
 from solfer.numerics import kernels
 from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.checks import joints
 from solfer.numerics.compilation import cached, exact_part
-from solfer.numerics.pointers import floats
 
 TURNS = BlockLayout(
     "Turns",

@@ -113,7 +113,7 @@ class Outputs:
         for pipe, gate in self.controllers:
             if pipe.collect():
                 if gate is None:  # joints of other plugins: none of them shall follow what is not a number
-                    _refuse(pipe)
+                    _refuse(cast(JointCommandPipe, pipe))
                 gate.check()
         if self.blend.active:
             self.blend.step()
