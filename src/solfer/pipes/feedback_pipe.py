@@ -46,7 +46,6 @@ class FeedbackPipe(abc.ABC):
 
     _watch: Watch | None = None
     _clock: SenderClock | None = None  # of the sender of the message that was read last; None: any stamp counts
-    _newest_counts = True  # of several publishers
     handovers = 0
     changed = math.inf
 
@@ -164,7 +163,7 @@ class FeedbackPipe(abc.ABC):
         warnings = self.warnings
         if warnings.pending is not None:
             warnings.log_pending()
-        if self._newest_counts and len(reader.publishers) > 1:
+        if len(reader.publishers) > 1 and not self.measures:
             self._name_publishers()
         message = reader.message
         if message is not None:

@@ -48,16 +48,17 @@ class _Destination:
         state: The State.
         interfaces: Names of the interfaces that are written.
         dofs: The DoFs, shape (k,).
+        passed: What filters make of the values, shape (interfaces, k).
 
     Attributes:
-        dofs: The DoFs, shape (k,).
+        dofs, passed: See above.
         live: Addresses of the State's arrays, shape (interfaces,).
         scatter: Writes values, shape (interfaces, k), of which it gets the indices, and returns what has changed.
         all: The indices of all values, shape (k,).
         changed: Names of the interfaces that have changed, by what `scatter` returns.
     """
 
-    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray):
+    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray, passed: np.ndarray):
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import scatter
         from solfer.numerics.pointers import address
@@ -65,6 +66,7 @@ class _Destination:
         # arrays of a State stay where they are
         self.live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
         self.dofs = np.array(dofs, dtype=np.int64)
+        self.passed = passed
         self.scatter = partial(scatter, self.dofs, self.live)
         self.all = np.arange(len(dofs))
         self.changed = tuple(
@@ -109,16 +111,15 @@ class StateFeedbackPipe(FeedbackPipe):
         self._state = state
         self._filtered = low_pass is not None
         self.values = np.zeros((len(fields), len(dofs)))
-        self._passed = np.zeros((len(fields), len(dofs)))
+        passed = np.zeros((len(fields), len(dofs)))
         self.state_fields = tuple(
-            StateField(field, dofs, values, passed=passed, low_pass=low_pass(len(dofs)) if low_pass else None)
-            for field, values, passed in zip(fields, self.values, self._passed, strict=True)
+            StateField(field, dofs, values, passed=row, low_pass=low_pass(len(dofs)) if low_pass else None)
+            for field, values, row in zip(fields, self.values, passed, strict=True)
         )
         interfaces = [each.interface for each in self.state_fields]
-        self._destination = _Destination(state, interfaces, dofs)
+        self._destination = _Destination(state, interfaces, dofs, passed)
         self.part: np.ndarray | None = None
         self._precedence = Precedence(len(dofs)) if reception.measured else None
-        self._newest_counts = not reception.measured
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
         self.history: History | None = None
@@ -192,7 +193,7 @@ class StateFeedbackPipe(FeedbackPipe):
             for state_field in self.state_fields:
                 state_field.filter()
             destination = self._destination
-            changes = destination.scatter(self._passed, destination.all if self._ever is None else self._ever)
+            changes = destination.scatter(destination.passed, destination.all if self._ever is None else self._ever)
             self._state.touch(*destination.changed[changes])
 
     def restart(self) -> None:

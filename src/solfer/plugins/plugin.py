@@ -18,8 +18,9 @@ from solfer.plugins.peers import Peers
 from solfer.plugins.readiness import FORGET, HOLD, WORK, CycleVerdict, Readiness
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.timing.cycle_timing import NO_TIMES, CycleTiming, Stage
+from solfer.plugins.timing.limits import LOST
 from solfer.plugins.timing.overload import Overload
-from solfer.plugins.timing.robot_time import LOST, RobotTime
+from solfer.plugins.timing.robot_time import RobotTime
 from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET

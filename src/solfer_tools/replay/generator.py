@@ -12,7 +12,8 @@ from solfer.plugins.generation.generator import Generator
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.plugin import Plugin
-from solfer.plugins.timing.robot_time import LOST, RobotTime
+from solfer.plugins.timing.limits import LOST
+from solfer.plugins.timing.robot_time import RobotTime
 from solfer.robot import Robot
 from solfer_tools.replay.feedback import RecordedFeedbackPipe
 from solfer_tools.replay.rows import RecordedRows

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solfer.plugins.timing.robot_time import LATEST, LOST, RobotTime
+from solfer.plugins.timing.limits import LATEST, LOST
+from solfer.plugins.timing.robot_time import RobotTime
 
 PERIOD = 0.005
 

@@ -280,10 +280,9 @@ class JointCommandPipe(CommandPipe):
         sent: The command as the receiver gets it, in its names, signs, zeros and turns; `message` if all are the same.
         fields: Fields that are filled, each with its values in `message`, shape (n,).
         block: These values one below the other, shape (len(fields), n).
-        lower: Bounds of them, of the same shape; what is not finite is beyond any bounds.
-        upper: The others.
-        kept: What was sent last, of the same shape.
-        steps: The time for which each row acts, shape (len(fields),) [s], see `solfer.numerics.kernels.keep`.
+        step: What the compiled steps of a cycle work on. Of its arrays `lower` and `upper` are the bounds of `block`,
+            beyond which is what is not finite, too, `kept` is what was sent last, of the same shape, and `steps` the
+            time for which each row acts, shape (len(fields),) [s], see `solfer.numerics.kernels`.
         moved: The largest step of a joint that was sent last [rad, m].
         dofs: The Robot's DoFs in the order of the message, shape (n,).
         standing: That of the receiver.
@@ -314,10 +313,6 @@ class JointCommandPipe(CommandPipe):
             sent = JointMessage.empty(self._calibration.names, tuple(fields), component)
         super().__init__(name, writer, sent)
         self.message = message
-        self.lower = np.full_like(self.block, -np.inf)
-        self.upper = np.full_like(self.block, np.inf)
-        self.kept = np.zeros_like(self.block)
-        self.steps = np.full(len(fields), -1.0)
         self.moved = 0.0
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
         self._attributes = vars(sent)  # to assign one, a message looks for its arrays
@@ -333,7 +328,7 @@ class JointCommandPipe(CommandPipe):
         fields = self.message.rows
         is_turned = self._added is not None and "position" in fields
         added = self._added if is_turned else np.zeros(0)
-        self._block = MemoryBlock(
+        self.step = MemoryBlock(
             COMMAND,
             rows=len(fields),
             count=len(self.dofs),
@@ -342,10 +337,10 @@ class JointCommandPipe(CommandPipe):
             dofs=self.dofs,
             # arrays of a State stay where they are
             state=np.array([address(state[interface_of(field)]) for field in fields], dtype=np.int64),
-            lower=self.lower,
-            upper=self.upper,
-            kept=self.kept,
-            steps=self.steps,
+            lower=np.full_like(self.block, -np.inf),
+            upper=np.full_like(self.block, np.inf),
+            kept=np.zeros_like(self.block),
+            steps=np.full(len(fields), -1.0),
             sent=self.sent.block,
             corrects=self.sent is not self.message,
             sign=self._calibration.signs(fields),
@@ -353,8 +348,8 @@ class JointCommandPipe(CommandPipe):
             turning=fields.index("position") if is_turned else -1,
             added=added,
         )
-        self._fill = partial(fill, self._block.address)
-        self._pack = partial(pack, self._block.address)
+        self._fill = partial(fill, self.step.address)
+        self._pack = partial(pack, self.step.address)
         if not self._filters:
             self.collect = self._fill  # type: ignore[method-assign] # without a call in between
 
@@ -369,7 +364,8 @@ class JointCommandPipe(CommandPipe):
         self._fill()
         for low_pass, values in self._filters:
             low_pass.step(values)
-        return not ((self.block >= self.lower) & (self.block <= self.upper) & np.isfinite(self.block)).all()
+        arrays = self.step.arrays
+        return not ((self.block >= arrays["lower"]) & (self.block <= arrays["upper"]) & np.isfinite(self.block)).all()
 
     def send(self, stamp: float) -> None:
         """Send `message`, stamped with `stamp` [s], and keep it."""

@@ -34,11 +34,12 @@ class CommandGate:
         self.kinds = ("not finite", *(field for field, _ in pipe.fields))
         self._counts = memoryview(bytearray(8 * len(self.kinds))).cast("q")
         self._throttle = Throttle(logging.getLogger(__name__))
+        limits = pipe.step.arrays
         for row, (field, _) in enumerate(pipe.fields):
-            pipe.lower[row], pipe.upper[row] = _bounds(field, pipe.dofs, lower, upper=upper)
+            limits["lower"][row], limits["upper"][row] = _bounds(field, pipe.dofs, lower, upper=upper)
         self._checks = [
             (field, values, *bounds, np.zeros_like(values), np.zeros(len(values), dtype=bool))
-            for (field, values), *bounds in zip(pipe.fields, pipe.lower, pipe.upper, strict=True)
+            for (field, values), *bounds in zip(pipe.fields, limits["lower"], limits["upper"], strict=True)
         ]
 
     @property

@@ -28,9 +28,9 @@ class SentJoints:
     def __init__(self, pipes: Sequence[JointCommandPipe], moves: Callable[[JointCommandPipe], bool], period: float):
         self.pipes = tuple(pipes)
         for pipe in pipes:
-            pipe.steps[:] = _steps(pipe, period if moves(pipe) else None)
+            pipe.step.arrays["steps"][:] = _steps(pipe, period if moves(pipe) else None)
         self._positions = [
-            (pipe.dofs, pipe.kept[row])
+            (pipe.dofs, pipe.step.arrays["kept"][row])
             for pipe in pipes
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
@@ -44,7 +44,7 @@ class SentJoints:
     def restore(self) -> None:
         """Let what was sent last be sent again."""
         for pipe in self.pipes:
-            pipe.block[...] = pipe.kept
+            pipe.block[...] = pipe.step.arrays["kept"]
 
     def stop(self, position: np.ndarray) -> None:
         """Let all velocities be zero, also those that a filter carries; joints are at `position`, (n,) [rad, m]."""

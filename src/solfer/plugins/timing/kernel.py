@@ -4,8 +4,8 @@ from pathlib import Path
 
 from solfer.numerics.blocks import BlockLayout
 from solfer.numerics.compilation import cached, exact_part
-from solfer.plugins.timing import robot_time
-from solfer.plugins.timing.robot_time import EARLIEST, JUMP, LATEST, LOST, ROWS
+from solfer.plugins.timing import limits
+from solfer.plugins.timing.limits import EARLIEST, JUMP, LATEST, LOST, ROWS
 
 LOAD = BlockLayout(
     "Load",
@@ -107,4 +107,4 @@ def _advance(start, now, stamp, accepted):
 
 
 add = cached("void(int64, float64, int64)", _add)
-advance = cached("float64(int64, float64, float64, int64)", _advance, sources=[Path(robot_time.__file__)])
+advance = cached("float64(int64, float64, float64, int64)", _advance, sources=[Path(limits.__file__)])

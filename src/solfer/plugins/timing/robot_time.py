@@ -9,22 +9,8 @@ from typing import Any
 import numpy as np
 
 from solfer.pipes import FeedbackPipe
+from solfer.plugins.timing.limits import ROWS
 from solfer.plugins.timing.overload import Overload
-
-EARLIEST = 0.03
-"""Time by which the newest stamp may be before the robot's time: messages come early [s]."""
-
-LATEST = 0.06
-"""Time by which it may be behind it: messages come late [s]."""
-
-JUMP = 1.0
-"""A stamp that jumps by this is of a clock that was set [s]."""
-
-LOST = 0
-"""Place in `RobotTime.state`."""
-
-ROWS = 8
-"""Numbers of it."""
 
 _NOTHING = SimpleNamespace(stamp=math.nan, accepted=-1)
 """In place of a feedback that measures."""

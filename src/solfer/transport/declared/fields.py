@@ -67,13 +67,13 @@ class _Geometry:
     """A message of geometry, filled with dataclasses; what a dataclass does not have is zero."""
 
     def __init__(self, interface: str, cls: type):
-        ways = [(*path, name) for path, names in _PLACES[interface] for name in names]
-        there = [place for place, way in enumerate(ways) if _has(cls, way)]
-        self._places = slice(None) if len(there) == len(ways) else there
+        paths = [(*place, name) for place, names in _PLACES[interface] for name in names]
+        there = [place for place, path in enumerate(paths) if _has(cls, path)]
+        self._places = slice(None) if len(there) == len(paths) else there
         # attributes of attributes, without a call of Python for each
-        self._numbers = attrgetter(*[".".join(ways[place]) for place in there]) if there else lambda value: ()
+        self._numbers = attrgetter(*[".".join(paths[place]) for place in there]) if there else lambda value: ()
         self._has_header = _has(cls, ("header",))
-        self._values = np.zeros(len(ways))
+        self._values = np.zeros(len(paths))
         self._is_wrench = interface in WRENCH_MESSAGES
         self._message: VectorMessage | WrenchMessage | None = None
 
@@ -93,9 +93,9 @@ class _Geometry:
         return message
 
 
-def _has(cls: Any, way: tuple[str, ...]) -> bool:
+def _has(cls: Any, path: tuple[str, ...]) -> bool:
     """Return whether a dataclass has an attribute of its attributes."""
-    for name in way:
+    for name in path:
         if dataclasses.is_dataclass(cls):
             hints = typing.get_type_hints(cls)
             if name not in hints:
