@@ -21,8 +21,8 @@ class RobotTime:
 
     A simulation that cannot hold real time falls behind the clock of those who command it: references that follow the
     clock would run away from the robot. The stamps of the first feedback that measures it show how far it has come.
-    Messages that are only late or lost change nothing: within `EARLIEST` and `LATEST` the clock counts. Beyond that the
-    stamps do, until the robot keeps up with the clock again.
+    Messages that are only late or lost change nothing: within `limits.EARLIEST` and `limits.LATEST` the clock counts.
+    Beyond that the stamps do, until the robot keeps up with the clock again.
 
     Args:
         feedbacks: Pipes in, in the order of the configuration.
@@ -31,8 +31,8 @@ class RobotTime:
 
     Attributes:
         feedback: The first one that measures; stands for none, too.
-        state: What it remembers; at LOST the time that has passed by the clock and not for the robot in the newest
-            cycle [s]; negative: the other way.
+        state: What it remembers; at `limits.LOST` the time that has passed by the clock and not for the robot in the
+            newest cycle [s]; negative: the other way.
         advance: Returns how much time has passed for the robot since the last call [s]; takes the time of the clock
             [s], and `stamp` and `accepted` of `feedback`.
     """
