@@ -27,6 +27,7 @@ KERNELS = {
     "gather",
     "objective",
     "self._check",
+    "self._receive",
     "self._shift",
 }
 """Compiled functions by the names under which they are called."""

@@ -55,22 +55,6 @@ def _tables_finite(first, second):
 tables_finite = cached("boolean(float64[:, ::1], float64[:, ::1])", _tables_finite)
 
 
-def _gather(numbers, rows, source, places, out):
-    """Write numbers[rows][:, source] to out[:, places].
-
-    Returns the index, row by row, of the first one that is not finite; -1 if all are.
-    """
-    wrong = -1
-    count = len(source)
-    for row in range(len(rows)):
-        for index in range(count):
-            number = numbers[rows[row], source[index]]
-            out[row, places[index]] = number
-            if number - number != 0.0 and wrong < 0:  # infinity and NaN
-                wrong = row * count + index
-    return wrong
-
-
 def _scatter(dofs, arrays, values, places):
     """Write values[row, places] to the entries dofs[places] of the array at the address arrays[row], for each row.
 
@@ -180,7 +164,4 @@ def _keep(block, kept, steps):
     return displacement
 
 
-keep = cached("float64(float64[:, ::1], float64[:, ::1], float64[::1])", _keep)
-gather = cached("int64(float64[:, ::1], int64[::1], int64[::1], int64[::1], float64[:, ::1])", _gather)
 scatter = cached("int64(int64[::1], int64[::1], float64[:, ::1], int64[::1])", _scatter)
-collect = cached("void(int64[::1], int64[::1], float64[:, ::1])", _collect)

@@ -34,8 +34,8 @@ class CommandPipe(abc.ABC):
         return ""
 
     @abc.abstractmethod
-    def collect(self) -> None:
-        """Fill the message with the newest values."""
+    def collect(self) -> bool | None:
+        """Fill the message with the newest values; true: its gate has to look at them, see `JointCommandPipe`."""
 
     def reset(self) -> None:
         """Reset the filters: the next values are sent without a filter's delay."""

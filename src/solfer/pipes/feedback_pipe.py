@@ -108,13 +108,8 @@ class FeedbackPipe(abc.ABC):
 
     def run(self) -> MessageStatus:
         """Read and accept the newest message: NEW if there was one that fits, OLD or NONE if not."""
-        reader = self.reader
-        status = reader.read()
-        if status is not NEW:
-            return status
-        if len(reader.publishers) > 1:
-            self._name_publishers()
-        return NEW if self._accept() else OLD
+        status = self.reader.read()
+        return OLD if status is NEW and not self._accept() else status
 
     def conflict(self, now: float) -> str:
         """Return the publishers of the same DoFs at the time `now` [s]: either may be right; empty: there are none."""
@@ -168,6 +163,8 @@ class FeedbackPipe(abc.ABC):
         warnings = self.warnings
         if warnings.pending is not None:
             warnings.log_pending()
+        if len(reader.publishers) > 1 and not self.measures:
+            self._name_publishers()
         message = reader.message
         if message is not None:
             clock = self._clock

@@ -48,21 +48,26 @@ class _Destination:
         state: The State.
         interfaces: Names of the interfaces that are written.
         dofs: The DoFs, shape (k,).
+        passed: What filters make of the values, shape (interfaces, k).
 
     Attributes:
+        dofs, passed: See above.
+        live: Addresses of the State's arrays, shape (interfaces,).
         scatter: Writes values, shape (interfaces, k), of which it gets the indices, and returns what has changed.
         all: The indices of all values, shape (k,).
         changed: Names of the interfaces that have changed, by what `scatter` returns.
     """
 
-    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray):
+    def __init__(self, state: State, interfaces: Sequence[str], dofs: np.ndarray, passed: np.ndarray):
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import scatter
         from solfer.numerics.pointers import address
 
         # arrays of a State stay where they are
-        live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
-        self.scatter = partial(scatter, dofs, live)
+        self.live = np.array([address(state[interface]) for interface in interfaces], dtype=np.int64)
+        self.dofs = np.array(dofs, dtype=np.int64)
+        self.passed = passed
+        self.scatter = partial(scatter, self.dofs, self.live)
         self.all = np.arange(len(dofs))
         self.changed = tuple(
             tuple(name for bit, name in enumerate(interfaces) if number >> bit & 1)
@@ -106,13 +111,13 @@ class StateFeedbackPipe(FeedbackPipe):
         self._state = state
         self._filtered = low_pass is not None
         self.values = np.zeros((len(fields), len(dofs)))
-        self._passed = np.zeros((len(fields), len(dofs)))
+        passed = np.zeros((len(fields), len(dofs)))
         self.state_fields = tuple(
-            StateField(field, dofs, values, passed=passed, low_pass=low_pass(len(dofs)) if low_pass else None)
-            for field, values, passed in zip(fields, self.values, self._passed, strict=True)
+            StateField(field, dofs, values, passed=row, low_pass=low_pass(len(dofs)) if low_pass else None)
+            for field, values, row in zip(fields, self.values, passed, strict=True)
         )
         interfaces = [each.interface for each in self.state_fields]
-        self._destination = _Destination(state, interfaces, dofs)
+        self._destination = _Destination(state, interfaces, dofs, passed)
         self.part: np.ndarray | None = None
         self._precedence = Precedence(len(dofs)) if reception.measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
@@ -120,6 +125,7 @@ class StateFeedbackPipe(FeedbackPipe):
         self.history: History | None = None
         if reception.history:
             self.history = History(interfaces, dofs, reception.history)
+            self.run = partial(self._take_all, self.history)  # type: ignore[method-assign] # without a call in between
             state.histories.append(self.history)
 
     @property
@@ -150,11 +156,9 @@ class StateFeedbackPipe(FeedbackPipe):
         precedence = self._precedence
         reader = self.reader
         if precedence is None:
-            status = super().run()
-            if status is NEW:
-                self._write_fields()
-        elif self.history is not None:
-            status = self._take_all(self.history)
+            status = reader.read()
+            if status is NEW and not self._accept():
+                status = OLD
         else:
             publishers = reader.update()
             sole = precedence.sole
@@ -169,7 +173,6 @@ class StateFeedbackPipe(FeedbackPipe):
                         sole.strikes = 0
                     else:
                         precedence.note(sole.name, self.part, reader.arrival)
-                    self._write_fields()
             else:
                 status = self._arbitrate(publishers)
         if self._filtering:
@@ -180,7 +183,7 @@ class StateFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.repeat`; writes them to the State, or passes them to the filters."""
         super().repeat(arrival)
         self.part = None
-        self._write_fields()
+        self._write_fields(arrival)
         if self.history is not None:
             self.history.add(arrival, arrival, self.values)
 
@@ -190,7 +193,7 @@ class StateFeedbackPipe(FeedbackPipe):
             for state_field in self.state_fields:
                 state_field.filter()
             destination = self._destination
-            changes = destination.scatter(self._passed, destination.all if self._ever is None else self._ever)
+            changes = destination.scatter(destination.passed, destination.all if self._ever is None else self._ever)
             self._state.touch(*destination.changed[changes])
 
     def restart(self) -> None:
@@ -254,10 +257,16 @@ class StateFeedbackPipe(FeedbackPipe):
                 history.sender = publisher.name
                 parts.append(self.part)
             rest -= 1
-            publisher = reader.read_next() if rest else None
+            publisher = reader.read_next() if rest and reader.has_next else None
         history.dropped += reader.dropped - history.unread
         history.unread = reader.dropped
-        return self._unite(parts) if parts else NONE if reader.message is None else OLD
+        if self._filtering:
+            self.filter()
+        if not parts:
+            return NONE if reader.message is None else OLD
+        if len(parts) > 1 or self._watch is not None:
+            self._unite(parts)
+        return NEW
 
     def _take(self, publisher: Publisher) -> bool:
         """Accept the message that was read last, if its publisher counts; return whether it does and fits."""
@@ -266,8 +275,11 @@ class StateFeedbackPipe(FeedbackPipe):
         self._clock = publisher.clock
         if not counts or not self._accept():
             return False
-        self._precedence.note(publisher.name, self.part, self.reader.arrival)
-        self._write_fields()
+        if sole is not None and self.part is sole.part and sole.name == publisher.name:
+            sole.arrival = self.reader.arrival
+            sole.strikes = 0
+        else:
+            self._precedence.note(publisher.name, self.part, self.reader.arrival)
         return True
 
     def _unite(self, parts: Sequence[np.ndarray | None]) -> MessageStatus:
@@ -306,13 +318,13 @@ class StateFeedbackPipe(FeedbackPipe):
             )
         return counts
 
-    def _write_fields(self) -> None:
-        """Write the newest values to the State, or pass them to the filters."""
+    def _write_fields(self, arrival: float) -> None:
+        """Write the newest values, which came at `arrival` [s], to the State, or pass them to the filters."""
         if not self._filtered:
             destination = self._destination
             changes = destination.scatter(self.values, destination.all if self.part is None else self.part)
             if changes:
-                self.changed = self.arrival
+                self.changed = arrival
                 versions = self._state.versions
                 for interface in destination.changed[changes]:
                     versions[interface] += 1
@@ -320,6 +332,10 @@ class StateFeedbackPipe(FeedbackPipe):
         for state_field in self.state_fields:
             state_field.accept(self.part)
         self._filtering = True
+
+    @abc.abstractmethod
+    def _decode(self, message: Message) -> None:
+        """See `FeedbackPipe._decode`; writes the values to the State, or passes them to the filters."""
 
     @abc.abstractmethod
     def _match(self, message: Message) -> None:

@@ -307,8 +307,10 @@ class FeedbackTimeouts:
         self.feedbacks = tuple(each.feedback for each in timeouts)
         self.complete = False
 
-    def read(self, now: float, distance: float = 0.0) -> None:
+    def read(self, now: float, distance: float = 0.0) -> bool:
         """Read the newest messages at the time `now` [s], each pipe into its State or the component's input.
+
+        Returns `complete`.
 
         Args:
             now: The time [s].
@@ -319,6 +321,14 @@ class FeedbackTimeouts:
             feedback = each.feedback
             status = feedback.run()
             arrival = feedback.arrival
+            if (
+                # nothing has come of what the plugin need not have
+                arrival == math.inf
+                and each.state is WAITING
+                and not feedback.required
+                and feedback.handovers == each.handovers
+            ):
+                continue
             if (
                 # one that goes on, whose newest message has changed something, which is nearly every one
                 each.state is LIVE
@@ -332,6 +342,7 @@ class FeedbackTimeouts:
             if not each.judge(status, now, distance):
                 complete = False
         self.complete = complete
+        return complete
 
     def serve(self, running: bool) -> bool:
         """Return whether a plugin that is `running` or not can work with what was read, and has been received."""

@@ -18,6 +18,7 @@ from solfer.plugins.peers import Peers
 from solfer.plugins.readiness import FORGET, HOLD, WORK, CycleVerdict, Readiness
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.timing.cycle_timing import NO_TIMES, CycleTiming, Stage
+from solfer.plugins.timing.limits import LOST
 from solfer.plugins.timing.overload import Overload
 from solfer.plugins.timing.robot_time import RobotTime
 from solfer.plugins.tuning import Tuning
@@ -135,15 +136,17 @@ class Plugin:
             self.name, parts.watches, parts.claim, middleware=parts.middleware, period=period, stall=parts.stall
         )
         self._readiness.taken = parts.outputs.forget
+        refusals = () if parts.claim is None else (parts.claim.refusals,)
+        self.inbox.pending = parts.middleware.pending([*self.inbox.queues, *refusals])
         self.timing = CycleTiming()
+        self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._work = ComponentCycle(
             component,
-            RobotTime(self.feedbacks, period),
+            RobotTime(self.feedbacks, period, self.overload),
             parts.jumps,
             guard=parts.guard,
             publications=parts.publications,
         )
-        self.overload = Overload(self.name, self.feedbacks, period, limits=parts.limits or OverloadRecord())
         self._wait()
 
     @property
@@ -196,14 +199,23 @@ class Plugin:
             self.overload.advance(gap)
             self._awake(now)
         inbox = self.inbox
-        if inbox.waits or (inbox.sources and (inbox.refusal or inbox.pending())):
+        news = inbox.pending()
+        if inbox.waits or (inbox.sources and (inbox.refusal or news)):
             inbox.apply()
         times[CALLS] = -mark + (mark := clock())
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        readiness.feedbacks.read(now, self.outputs.joints.distance)
-        verdict = readiness.decide(now, life is RUNNING)
+        complete = readiness.feedbacks.read(now, self.outputs.joints.distance)
+        goes_on = complete and life is RUNNING and now >= readiness.earliest
+        claim = readiness.claim
+        verdict = WORK
+        if (
+            not goes_on
+            or readiness.rewind_words[0] != readiness.rewinds
+            or (claim is not None and (news or claim.reason or claim.is_taken))
+        ):
+            verdict = readiness.decide(now, life is RUNNING)
         times[READ] = -mark + (mark := clock())
         if verdict is not WORK:
             self._obey(verdict, now)
@@ -218,9 +230,13 @@ class Plugin:
         if work.dynamics is not None:
             work.dynamics.update()
         robot_time = work.robot_time
-        passed = robot_time.advance(now)
-        component.let_pass(passed, robot_time.lost)
-        component.pace = self.overload.advance(passed)
+        measured = robot_time.feedback
+        passed = robot_time.advance(now, measured.stamp, measured.accepted)
+        component.let_pass(passed, robot_time.state[LOST])
+        overload = self.overload
+        if overload.is_near[0] or overload.reason or overload.pace < 1.0:
+            overload.change(passed)
+        component.pace = overload.pace
         following = self.outputs.following
         if (
             following is not None

@@ -52,8 +52,12 @@ class Readiness:
         feedbacks: Its feedbacks with their timeouts.
         taken: Called in each cycle while others have the joints.
         lacks: What the plugin waits for.
+        claim: See above.
         newest: When its newest cycle began; infinity: it is not known [s]. Its plugin keeps it.
         longest: Time between two cycles from which on its loop stood still [s].
+        earliest: When it may work again [s].
+        rewinds: The middleware's `rewinds` that it knows of.
+        rewind_words: That of the middleware.
     """
 
     def __init__(
@@ -69,15 +73,16 @@ class Readiness:
         self.feedbacks = FeedbackTimeouts(timeouts)
         self.taken: Callable[[], None] = lambda: None
         self._plugin = plugin
-        self._claim = claim
+        self.claim = claim
         self._middleware = middleware
-        self._rewinds = middleware.rewinds
+        self.rewinds = middleware.rewinds
+        self.rewind_words = middleware.rewind_words()
         # after less a component goes on, by the time that has passed; meanwhile the lower level carries out its last
         # commands, for its lease on the joints is longer
         self.longest = period + min(stall or max(0.2, 5 * period), self.feedbacks.shortest_timeout)
         self._past = ""
         self._logged = ""
-        self._earliest = -math.inf
+        self.earliest = -math.inf
         self._latest: float | None = None
         self.newest = math.inf
         self.lacks = self._missing()
@@ -86,7 +91,7 @@ class Readiness:
     @property
     def released(self) -> bool:
         """Whether the joints were released, and the lower level has confirmed it."""
-        return self._claim is None or self._claim.released
+        return self.claim is None or self.claim.released
 
     def stand_still(self, gap: float) -> None:
         """Note that the loop stood still for a time [s], before a plugin begins again."""
@@ -95,7 +100,9 @@ class Readiness:
     def decide(self, now: float, running: bool) -> CycleVerdict:
         """Decide by the messages that were read `now` [s] what a plugin that is `running` or not does in this cycle.
 
-        Claims the joints when all feedbacks are there.
+        Its plugin need not ask while it runs, all feedbacks are there, `earliest` is over, no time has gone back, and
+        the claim, if there is one, has no `reason`, is not taken and has no news: it works. Claims the joints when all
+        feedbacks are there.
 
         Raises:
             ReceiveTimeout: A required feedback did not arrive in time.
@@ -103,13 +110,8 @@ class Readiness:
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
             ClaimRefused: Another plugin commands a joint of this one.
         """
-        # a plugin that goes on, which is nearly every cycle
-        goes_on = running and self.feedbacks.complete and now >= self._earliest
-        if goes_on and self._middleware.rewinds == self._rewinds:
-            verdict = WORK
-        else:
-            verdict = self._decide_by_feedbacks(now, running)
-        claim = self._claim
+        verdict = self._decide_by_feedbacks(now, running)
+        claim = self.claim
         if claim is None:
             return verdict
         if not running and claim.restarts():
@@ -132,7 +134,7 @@ class Readiness:
 
     def give_back(self) -> None:
         """Release or lapse the claim, or damp, after the joints were brought to rest."""
-        claim = self._claim
+        claim = self.claim
         if claim is None:
             return
         if self.feedbacks.action() == "damp":
@@ -144,15 +146,15 @@ class Readiness:
 
     def release(self) -> None:
         """Release the joints for good."""
-        if self._claim is not None:
-            self._claim.release()
+        if self.claim is not None:
+            self.claim.release()
 
     def forget(self, now: float) -> None:
         """Discard all that was received before `now` [s], and the claim: what comes soon may be old, too."""
         self.feedbacks.restart()
-        if self._claim is not None:
-            self._claim.lapse()
-        self._earliest = now + 0.1  # by then received messages are certain to be new [s]
+        if self.claim is not None:
+            self.claim.lapse()
+        self.earliest = now + 0.1  # by then received messages are certain to be new [s]
         self.lacks = f"{self._missing()}, {self._past}"
         self._level = logging.WARNING
 
@@ -174,7 +176,7 @@ class Readiness:
 
     def health(self, running: bool) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence; empty if good."""
-        claim = self._claim
+        claim = self.claim
         if not running:
             refused = claim is not None and claim.reason
             return Health.ERROR if refused else Health.WARNING, f"holds and waits {self.lacks}"
@@ -190,7 +192,7 @@ class Readiness:
 
     def figures(self) -> dict[str, float | str]:
         """Return figures for health reports."""
-        refused = {} if self._claim is None else {"refused by the lower level": self._claim.refused}
+        refused = {} if self.claim is None else {"refused by the lower level": self.claim.refused}
         return {**self.feedbacks.figures(self._middleware.now()), **refused}
 
     def reports(self) -> Iterator[tuple[str, HealthReport]]:
@@ -199,12 +201,12 @@ class Readiness:
 
     def _decide_by_feedbacks(self, now: float, running: bool) -> CycleVerdict:
         # after the messages: a simulator publishes that the time went back before it publishes the new state
-        if self._middleware.rewinds != self._rewinds:
-            self._rewinds = self._middleware.rewinds
+        if self._middleware.rewinds != self.rewinds:
+            self.rewinds = self._middleware.rewinds
             self._past = "after the simulated time went back"
             return FORGET
         feedbacks = self.feedbacks
-        if now < self._earliest:
+        if now < self.earliest:
             feedbacks.restart()  # what is compared with an old measurement would be refused
             return WAIT
         ready = (feedbacks.complete or feedbacks.serve(True)) if running else feedbacks.begins(now)

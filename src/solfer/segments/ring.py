@@ -56,7 +56,7 @@ class Ring(Slots):
         if self.words[NEWEST] - self.sequence > most:
             self.limit(most)
         while self.sequence < (newest := self.words[NEWEST]):
-            if self._fetch(self.sequence + 1):
+            if self.fetch(self.sequence + 1):
                 if self._refuse:
                     self.words[TAKEN] = self.sequence
                 return True

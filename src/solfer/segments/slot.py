@@ -88,7 +88,7 @@ class Slots:
         self.sequence = number
         self.stamp = stamp
 
-    def _fetch(self, number: int) -> bool:
+    def fetch(self, number: int) -> bool:
         """Read a record into `values`; returns False, and changes nothing, if it is overwritten meanwhile."""
         words = self.words
         index = number % self._count
@@ -138,7 +138,7 @@ class Slot(Slots):
         if number == self.sequence:
             return False
         for _ in range(8):  # then the writer is too fast, and this read finds nothing new
-            if self._fetch(number):
+            if self.fetch(number):
                 return True
             number = self.words[NEWEST]
         self.given_up += 1

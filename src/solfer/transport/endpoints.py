@@ -55,6 +55,7 @@ class Reader(abc.ABC):
         message: Newest message read, None until the first; it stays the same until the next read of any kind.
         arrival: When `message` arrived, in the pipe's own clock [s]; minus infinity before the first.
         refused: Messages that were not of this topic's type, or contradicted themselves.
+        has_next: Whether another message may wait for `read_next`, as of the last one.
         dropped: Messages that `read_next` missed because more had come than are kept.
         publishers: All that have published on the topic, the first one first, as of the last `read`, `read_next` or
             `update`.
@@ -65,6 +66,7 @@ class Reader(abc.ABC):
     message: Any = None
     arrival: float = -math.inf
     refused: int = 0
+    has_next: bool = True
     dropped: int = 0
     publishers: Sequence[Publisher] = ()
 

@@ -6,6 +6,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from solfer.errors import MiddlewareError
+from solfer.transport.endpoints import Queue
 
 _Call = tuple[Callable[[], Any], "Future[Any]"]
 
@@ -23,8 +24,9 @@ class Inbox:
         most: The largest number of calls, urgent ones left out, that a cycle has run.
         waits: Whether a call may wait; a loop that finds nothing here, nor in `sources`, has nothing to `apply`.
         sources: Called with the `refusal` before the queued calls: they receive what comes in by topics.
-        pending: Returns whether anything may wait in these topics; where nothing does, the sources are called only
-            where there is a `refusal`.
+        queues: Where what comes in by topics waits.
+        pending: Returns whether anything may wait there; where nothing does, the sources are called only where there
+            is a `refusal`.
     """
 
     def __init__(self, refusal: str = "", ration: int = 16, waiting: int = 64) -> None:
@@ -38,6 +40,7 @@ class Inbox:
         self._urgent: deque[_Call] = deque()
         self._single: deque[_Call] = deque()
         self.sources: list[Callable[[str], None]] = []
+        self.queues: list[Queue] = []
         self.pending: Callable[[], bool] = lambda: True
 
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":

@@ -118,6 +118,10 @@ class Middleware(abc.ABC):
     def now(self) -> float:
         """Return the monotonic time [s]."""
 
+    def rewind_words(self) -> Any:
+        """Return live numbers of which the first is `rewinds`: each cycle of each plugin looks at it."""
+        return _Rewinds(self)
+
     def stamp_time(self) -> float:
         """Return the time in which messages are stamped [s]: `now`, unless the middleware has another one for that."""
         return self.now()
@@ -340,3 +344,13 @@ class Middleware(abc.ABC):
     @abc.abstractmethod
     def close(self) -> None:
         """Send what is still queued, wait a little for the replies to requests, then release everything."""
+
+
+class _Rewinds:
+    """The `rewinds` of a middleware as a number at the place 0."""
+
+    def __init__(self, middleware: Middleware):
+        self._middleware = middleware
+
+    def __getitem__(self, place: int) -> int:
+        return self._middleware.rewinds

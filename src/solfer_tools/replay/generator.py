@@ -12,6 +12,7 @@ from solfer.plugins.generation.generator import Generator
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.plugin import Plugin
+from solfer.plugins.timing.limits import LOST
 from solfer.plugins.timing.robot_time import RobotTime
 from solfer.robot import Robot
 from solfer_tools.replay.feedback import RecordedFeedbackPipe
@@ -56,12 +57,15 @@ class RecordedTime(RobotTime):
     def __init__(self, plugin: Plugin, passed: np.ndarray, lost: np.ndarray):
         super().__init__(plugin.feedbacks, 1.0 / plugin.rate)
         self._rows = passed.tolist(), lost.tolist()
+        self._overload = plugin.overload
         self.row = 0
+        self.advance = self._recorded
 
-    def advance(self, now: float) -> float:
+    def _recorded(self, now: float, stamp: float, accepted: int) -> float:
         """See `RobotTime.advance`."""
         passed, lost = self._rows
-        self.lost = lost[self.row]
+        self.state[LOST] = lost[self.row]
+        self._overload.advance(passed[self.row])
         return passed[self.row]
 
 

@@ -128,7 +128,12 @@ class Slow(Follower):
 
     def __init__(self, folder, component="Sine"):
         super().__init__(folder, component)
-        self.plugin.robot_time.advance = lambda now: 0.6 / self.plugin.rate
+        self.plugin.robot_time.advance = self._slowly
+
+    def _slowly(self, now, stamp, accepted):
+        passed = 0.6 / self.plugin.rate
+        self.plugin.overload.advance(passed)
+        return passed
 
 
 class EveryMessage(Follower):

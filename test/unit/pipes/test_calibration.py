@@ -11,6 +11,7 @@ from solfer.pipes import JointCommandPipe, JointFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointReceiver, JointSender
 from solfer.pipes.state_feedback_pipe import Reception
+from solfer.pipes.state_field import interface_of
 from solfer.transport import JointMessage, MessageStatus
 
 DOFS = ("base", "yaw", "knee", "wheel")
@@ -111,12 +112,23 @@ def test_gains_have_neither_sign_nor_zero(mapping, calibration):
 
 
 @pytest.mark.parametrize("field", ["position", "velocity", "effort", "stiffness", "acceleration"])
-def test_one_way_undoes_the_other(calibration, field):
-    values = np.array([0.3, -1.25, 2.0])
-    there, back = np.zeros(3), np.zeros(3)
-    calibration.to_hardware(field)(values, there)
-    calibration.to_robot(field)(there, back)
-    assert_allclose(back, values, atol=1e-15)
+def test_one_way_undoes_the_other(mapping, calibration, field):
+    """What a pipe out sends to the hardware is what a pipe in makes of it."""
+    there, back = State(DOFS), State(DOFS)
+    if field == "stiffness":
+        there.add(field)
+        back.add(field)
+    values = np.array([9.0, 0.3, -1.25, 2.0])
+    there[interface_of(field)] = values
+    writer = KeptWriter()
+    command = JointCommandPipe("out", writer, mapping, there, (field,), receiver=JointReceiver(calibration))
+    command.collect()
+    command.send(0.0)
+    reader = StandInReader(writer.messages[0])
+    JointFeedbackPipe(
+        "in", reader, mapping, back, (field,), reception=Reception(), sender=JointSender(calibration)
+    ).run()
+    assert_allclose(back[interface_of(field)][1:], values[1:], atol=1e-15)
 
 
 def test_every_joint_has_a_sign_and_an_offset():

@@ -8,6 +8,7 @@ import pytest
 from support.unit.joint_pipes import make_robot
 
 from solfer.errors import PipeError
+from solfer.numerics.checks.joints import find_leap
 from solfer.pipes.joint.leaps import JointLeaps
 
 PERIOD = 0.005
@@ -25,7 +26,7 @@ def check(leaps, time, position, velocity=(0.0, 0.0), part=ALL, stamp=0.0):
     """Check a message; return what is wrong with it, empty if nothing is."""
     position = np.array(position, float)
     velocity = np.array(velocity, float)
-    wrong = leaps.find(position, velocity, part, time, stamp)
+    wrong = find_leap(leaps.address, position, velocity, part, time, stamp)
     if wrong < 0:
         return ""
     with pytest.raises(PipeError) as error:

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solfer.plugins.timing.robot_time import LATEST, RobotTime
+from solfer.plugins.timing.limits import LATEST, LOST
+from solfer.plugins.timing.robot_time import RobotTime
 
 PERIOD = 0.005
 
@@ -29,8 +30,8 @@ class StampedClock:
         self.time += periods * PERIOD
         if stamp is not None:
             self.feedback.stamp = self._epoch + stamp
-        self.passed.append(self.robot_time.advance(self.time))
-        self.lost += self.robot_time.lost
+        self.passed.append(self.robot_time.advance(self.time, self.feedback.stamp, 0))
+        self.lost += self.robot_time.state[LOST]
         return self.passed[-1]
 
 
@@ -95,4 +96,5 @@ def test_stamps_that_mean_nothing_do_not_stop_it(stamps):
 def test_it_goes_by_the_clock_without_a_robot_that_is_measured():
     robot_time = RobotTime([object_without()], PERIOD)
     robot_time.restart(0.0)
-    assert [robot_time.advance(PERIOD * k) for k in (1, 2, 4)] == pytest.approx([PERIOD, PERIOD, 2.0 * PERIOD])
+    passed = [robot_time.advance(PERIOD * k, robot_time.feedback.stamp, 0) for k in (1, 2, 4)]
+    assert passed == pytest.approx([PERIOD, PERIOD, 2.0 * PERIOD])

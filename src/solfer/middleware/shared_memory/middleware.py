@@ -12,7 +12,7 @@ from solfer.middleware.shared_memory.discovery import Survey
 from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
-from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
+from solfer.middleware.shared_memory.simulated_time import SimulatedTime
 from solfer.middleware.shared_memory.topics.endpoints import PendingMessages, XbotQueue, XbotReader, XbotWriter
 from solfer.middleware.shared_memory.topics.subscriptions import Subscriptions
 from solfer.segments.lock import locked
@@ -120,7 +120,11 @@ class XbotMiddleware(Middleware):
     @property
     def rewinds(self) -> int:
         """See `Middleware.rewinds`; of a simulation in this namespace."""
-        return self._simulated.words[REWINDS]  # a cycle requests it
+        return self._simulated.rewinds
+
+    def rewind_words(self) -> Any:
+        """See `Middleware.rewind_words`."""
+        return self._simulated.words
 
     def now(self) -> float:
         """See `Middleware.now`."""

@@ -3,7 +3,7 @@
 import math
 
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, part
+from solfer.numerics.compilation import exact_part, part
 from solfer.numerics.kernels import wrapped
 
 LONGEST_INTERVAL = 1.0
@@ -104,7 +104,8 @@ def _reset_stray(before, k):
     before[STRAYED, k] = before[ALLOWED, k] = before[LIMIT, k] = 0.0
 
 
-def _find_leap(start, position, velocity, part, arrival, stamp):
+@exact_part
+def find_leap(start, position, velocity, part, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
@@ -192,6 +193,3 @@ def _find_leap(start, position, velocity, part, arrival, stamp):
             before[ARRIVAL, k] = arrival
             before[STAMP, k] = stamp
     return wrong
-
-
-find_leap = cached("int64(int64, float64[::1], float64[::1], int64[::1], float64, float64)", _find_leap)

@@ -155,6 +155,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
             self._warn(carried.base[4])
         for values, measured in self._measured:
             values[...] = measured
+        self._write_fields(self.reader.arrival)
 
     def _align(self) -> None:
         """Align the sender's world so that the base is at the pose of the State."""

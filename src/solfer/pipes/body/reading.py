@@ -106,7 +106,7 @@ class BodyReading(abc.ABC):
         """Read the values; those that are not in the orientation need no check."""
 
     def _check_name(self, name: str) -> None:
-        if name != self._body and bare_frame(name) != self._body:
+        if bare_frame(name) != self._body:
             raise PipeError(
                 f"it describes '{name}'",
                 expected=f"'{self._body}', or the key 'reference' in the pipe",
@@ -146,7 +146,8 @@ class ImuReading(BodyReading):
     carries = frozenset(("orientation", "angular"))
 
     def _read_values(self, message: ImuMessage) -> None:
-        self._check_name(message.frame)
+        if message.frame != self._body:
+            self._check_name(message.frame)
         numbers = (message.orientation, message.angular, message.acceleration)
         try:
             lacks = self._read_imu(*numbers, self.values, self.force)

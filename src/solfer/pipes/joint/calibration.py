@@ -1,18 +1,12 @@
 """Converts joint values between a robot's hardware and its model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import SizeMismatch
 from solfer.transport.messages import GAINS
-
-Correction = Callable[[np.ndarray, np.ndarray], None]
-"""Writes the corrected first array into the second one; both may be the same."""
-
-same: Correction = np.positive
-"""Copies the first array into the second one; a function of numpy, which costs the cycle no call of Python."""
 
 
 class Calibration:
@@ -43,33 +37,15 @@ class Calibration:
             if values.shape != (len(self.names),):
                 raise SizeMismatch(f"{values.size} {what} for {len(self.names)} joints")
 
-    def to_robot(self, field: str) -> Correction:
-        """Return the conversion of a message's `field` from hardware to model."""
-        sign = self.sign
-        offset = self.offset
+    def signs(self, fields: Sequence[str]) -> np.ndarray:
+        """Return the signs of fields of a message, shape (len(fields), k)."""
+        return np.array([np.ones_like(self.sign) if field in GAINS else self.sign for field in fields])
 
-        def position(values: np.ndarray, out: np.ndarray) -> None:
-            np.subtract(values, offset, out=out)
-            np.multiply(out, sign, out=out)
+    def offsets(self, fields: Sequence[str]) -> np.ndarray:
+        """Return the offsets of fields of a message, shape (len(fields), k): a model's number is s (h - o)."""
+        return np.array([self.offset if field == "position" else np.zeros_like(self.offset) for field in fields])
 
-        return self._other(field) or position
-
-    def to_hardware(self, field: str) -> Correction:
-        """Return the conversion of a message's `field` from model to hardware."""
-        sign = self.sign
-        offset = self.offset
-
-        def position(values: np.ndarray, out: np.ndarray) -> None:
-            np.multiply(values, sign, out=out)
-            np.add(out, offset, out=out)
-
-        return self._other(field) or position
-
-    def _other(self, field: str) -> Correction | None:
-        """Return the conversion of a field other than the position, the same in both directions."""
-        if field == "position":
-            return None
-        return same if field in GAINS else self._turn
-
-    def _turn(self, values: np.ndarray, out: np.ndarray) -> None:
-        np.multiply(values, self.sign, out=out)
+    @classmethod
+    def none(cls, names: Sequence[str]) -> "Calibration":
+        """Return that of hardware which has the model's names, signs and zeros."""
+        return cls(names, np.ones(len(names)), np.zeros(len(names)))

@@ -1,6 +1,5 @@
 """Finds measurements of joints that cannot be true: no joint moves as far or as fast, or otherwise than it measures."""
 
-from functools import partial
 from typing import NoReturn
 
 import numpy as np
@@ -28,10 +27,7 @@ class JointLeaps:
         dofs: DoFs that the pipe measures, shape (k,).
 
     Attributes:
-        find: Checks a message, and remembers it; returns a number for `refuse`, negative: it can be true. Takes the
-            measured positions, shape (k,) [rad, m], the velocities, shape (k,), or (0,) if there are none [rad/s, m/s],
-            which of the DoFs it has, when it arrived, in the pipe's own clock, and when it was true, by the sender's
-            clock [s].
+        address: What `find_leap` gets, which returns a number for `refuse`.
     """
 
     def __init__(self, robot: Robot, dofs: np.ndarray):
@@ -50,7 +46,7 @@ class JointLeaps:
             revolutions=np.array(robot.revolutions[dofs]),
             endless=np.isinf(robot.upper_limits.position[dofs]),
         )
-        self.find = partial(joints.find_leap, self._block.address)
+        self.address = self._block.address
         self._place = self._before[joints.PLACE]
         self._arrival = self._before[joints.ARRIVAL]
         self._strayed = self._before[joints.STRAYED]
@@ -63,7 +59,7 @@ class JointLeaps:
         self._before[self._never] = -np.inf
 
     def refuse(self, wrong: int, position: np.ndarray, velocity: np.ndarray, arrival: float) -> NoReturn:
-        """Refuse what `find` has found, in the message that it was given.
+        """Refuse what `find_leap` has found, in the message that it was given.
 
         Raises:
             Contradiction: A joint cannot be there, or so fast, or its velocities contradict it.

@@ -4,13 +4,14 @@ import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import NoReturn
 
 import numpy as np
 
 from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
 from solfer.pipes.command_pipe import CommandPipe
-from solfer.pipes.joint.calibration import Calibration, Correction, same
+from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.joint.turns import JointTurns
@@ -79,26 +80,38 @@ class JointFeedbackPipe(StateFeedbackPipe):
             reception = replace(reception, required=True)
         super().__init__(name, reader, state, fields=fields, dofs=np.array(mapping.robot_indices), reception=reception)
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import gather
+        from solfer.numerics.blocks import MemoryBlock
+        from solfer.pipes.joint.kernel import RECEPTION, receive
 
-        self._gather = gather
         self._limits = sender.limits
         self._leaps = sender.leaps if "position" in fields else None
         self._turns = sender.turns if "position" in fields else None
-        self._of_position = fields.index("position") if "position" in fields else 0
-        of_velocity = fields.index("velocity") if "velocity" in fields else len(fields)
-        self._velocity = self.values[of_velocity] if of_velocity < len(fields) else np.zeros(0)
-        self._names = NameOrder(
-            calibration.names if calibration else external_names(mapping), sender.known, ignores=True
+        destination = self._destination
+        corrected = calibration or Calibration.none(external_names(mapping))
+        self._block = MemoryBlock(
+            RECEPTION,
+            rows=len(fields),
+            count=len(destination.dofs),
+            values=self.values,
+            sign=corrected.signs(fields),
+            offset=corrected.offsets(fields),
+            position=self._row("position", 0),
+            velocity=self._row("velocity", -1),
+            turns=0 if self._turns is None else self._turns.address,
+            leaps=0 if self._leaps is None else self._leaps.address,
+            writes=not self._filtered,
+            dofs=destination.dofs,
+            state=destination.live,
         )
+        self._receive = partial(receive, self._block.address)
+        self._names = NameOrder(corrected.names, sender.known, ignores=True)
         self._logged: set[tuple[int, ...]] = set()  # the DoFs of messages that lack some
         self._carried: tuple[str, ...] = ()
         self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
-        self._corrections: list[tuple[Correction, np.ndarray]] = []
-        if calibration is not None:
-            self._corrections = [
-                (calibration.to_robot(state_field.field), state_field.values) for state_field in self.state_fields
-            ]
+
+    def _row(self, field: str, default: int) -> int:
+        """Return the row of a field in `values`."""
+        return next((row for row, each in enumerate(self.state_fields) if each.field == field), default)
 
     @property
     def lacks(self) -> str:
@@ -157,27 +170,31 @@ class JointFeedbackPipe(StateFeedbackPipe):
                 self._find_rows(message.rows, len(names))
             rows = self._rows
         self.part = order.target
-        wrong = self._gather(numbers, rows, order.source, order.places, self.values)
-        if wrong >= 0:
-            row, place = divmod(wrong, len(order.source))
-            field = self.state_fields[row].field
-            name = names[order.source[place]]
-            raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
-        for correct, values in self._corrections:
-            correct(values, values)
-        part = order.places
-        position = self.values[self._of_position]
-        if self._turns is not None:
-            self._turns.unwrap(position, part)
-        if self._leaps is not None:
-            arrival = self.reader.arrival
-            wrong = self._leaps.find(position, self._velocity, part, arrival, self._stamp)
-            if wrong >= 0:
-                self._leaps.refuse(wrong, position, self._velocity, arrival)
-        if self._turns is not None:
-            self._turns.keep(position, part)
+        arrival = self.reader.arrival
+        found = self._receive(numbers, rows, order.source, order.places, arrival, self._stamp)
+        if found >= 0:
+            self._refuse_numbers(found, names, order, arrival)
         if not self.received:
             self._note(order)
+        if self._filtered:
+            self._write_fields(arrival)
+        elif found < -1:
+            self.changed = arrival
+            versions = self._state.versions
+            for interface in self._destination.changed[-1 - found]:
+                versions[interface] += 1
+
+    def _refuse_numbers(self, found: int, names: tuple[str, ...], order: Order, arrival: float) -> NoReturn:
+        """Refuse what the compiled step has found in a message that arrived at `arrival` [s]."""
+        count = len(order.source)
+        row, place = divmod(found, count)
+        if row < len(self.state_fields):
+            name = names[order.source[place]]
+            raise NotFinite(f"a '{self.state_fields[row].field}' of joint '{name}' that is not a finite number")
+        velocity = self.values[self._row("velocity", 0)]
+        self._leaps.refuse(
+            found - count * len(self.state_fields), self.values[self._row("position", 0)], velocity, arrival
+        )
 
     def _find_rows(self, carried: tuple[str, ...], count: int) -> None:
         """Find the fields of the pipe in messages with `count` names that have their numbers in one array."""
@@ -263,6 +280,10 @@ class JointCommandPipe(CommandPipe):
         sent: The command as the receiver gets it, in its names, signs, zeros and turns; `message` if all are the same.
         fields: Fields that are filled, each with its values in `message`, shape (n,).
         block: These values one below the other, shape (len(fields), n).
+        step: What the compiled steps of a cycle work on. Of its arrays `lower` and `upper` are the bounds of `block`,
+            beyond which is what is not finite, too, `kept` is what was sent last, of the same shape, and `steps` the
+            time for which each row acts, shape (len(fields),) [s], see `solfer.numerics.kernels`.
+        moved: The largest step of a joint that was sent last [rad, m].
         dofs: The Robot's DoFs in the order of the message, shape (n,).
         standing: That of the receiver.
     """
@@ -279,69 +300,75 @@ class JointCommandPipe(CommandPipe):
         low_pass: MakeFilter | None = None,
     ):
         component = receiver.component
-        calibration = receiver.calibration
         turns = receiver.turns
         self.standing = receiver.standing
-        self._calibration = calibration
         self.controller = receiver.controller or name
         message = sent = JointMessage.empty(external_names(mapping), tuple(fields), component)
         (self.block,) = arrays(message)
         self.fields = list(zip(message.rows, self.block, strict=True))
-        self.dofs = np.array(mapping.robot_indices)
+        self.dofs = np.array(mapping.robot_indices, dtype=np.int64)
         self._added = turns[1] if turns is not None and turns[0][self.dofs].any() else None
-        self._more = np.zeros(len(self.dofs))
-        self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
-        if calibration is not None or (self._added is not None and "position" in fields):
-            names = message.names if calibration is None else calibration.names
-            sent = JointMessage.empty(names, tuple(fields), component)
-            self._corrections = [
-                (self._correction(field), values, sent.numbers(field)) for field, values in self.fields
-            ]
+        self._calibration = receiver.calibration or Calibration.none(message.names)
+        if receiver.calibration is not None or (self._added is not None and "position" in fields):
+            sent = JointMessage.empty(self._calibration.names, tuple(fields), component)
         super().__init__(name, writer, sent)
         self.message = message
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import collect
-        from solfer.numerics.pointers import address
-
-        # arrays of a State stay where they are
-        live = np.array([address(state[interface_of(field)]) for field in message.rows], dtype=np.int64)
-        self._collect = partial(collect, live, self.dofs, self.block)
+        self.moved = 0.0
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
-        if not self._filters:
-            self.collect = self._collect  # type: ignore[method-assign] # without a call in between
         self._attributes = vars(sent)  # to assign one, a message looks for its arrays
+        self._bind(state)
+
+    def _bind(self, state: State) -> None:
+        """Prepare the compiled steps of a cycle."""
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.blocks import MemoryBlock
+        from solfer.numerics.pointers import address
+        from solfer.pipes.joint.kernel import COMMAND, fill, pack
+
+        fields = self.message.rows
+        is_turned = self._added is not None and "position" in fields
+        added = self._added if is_turned else np.zeros(0)
+        self.step = MemoryBlock(
+            COMMAND,
+            rows=len(fields),
+            count=len(self.dofs),
+            size=len(added),
+            block=self.block,
+            dofs=self.dofs,
+            # arrays of a State stay where they are
+            state=np.array([address(state[interface_of(field)]) for field in fields], dtype=np.int64),
+            lower=np.full_like(self.block, -np.inf),
+            upper=np.full_like(self.block, np.inf),
+            kept=np.zeros_like(self.block),
+            steps=np.full(len(fields), -1.0),
+            sent=self.sent.block,
+            corrects=self.sent is not self.message,
+            sign=self._calibration.signs(fields),
+            shift=0.0 - self._calibration.offsets(fields),  # zero without a sign: it changes no number
+            turning=fields.index("position") if is_turned else -1,
+            added=added,
+        )
+        self._fill = partial(fill, self.step.address)
+        self._pack = partial(pack, self.step.address)
+        if not self._filters:
+            self.collect = self._fill  # type: ignore[method-assign] # without a call in between
 
     def to_receiver(self, field: str, values: np.ndarray) -> np.ndarray:
         """Return a field's `values`, shape (n,), in the signs, zeros and turns of the receiver."""
-        out = np.array(values)
-        self._correction(field)(values, out)
-        return out
+        if field == "position" and self._added is not None:
+            values = values - self._added[self.dofs]
+        return self._calibration.signs([field])[0] * values + self._calibration.offsets([field])[0]
 
-    def _correction(self, field: str) -> Correction:
-        """Return what makes a field of the receiver of one of the Robot."""
-        correct = same if self._calibration is None else self._calibration.to_hardware(field)
-        if field != "position" or self._added is None:
-            return correct
-        added = self._added
-        more = self._more
-        dofs = self.dofs
-
-        def position(values: np.ndarray, out: np.ndarray) -> None:
-            np.take(added, dofs, out=more, mode="clip")
-            np.subtract(values, more, out=out)
-            correct(out, out)
-
-        return position
-
-    def collect(self) -> None:
-        """Copy the values of the State into `message`."""
-        self._collect()
+    def collect(self) -> bool:
+        """Copy the values of the State into `message`; return whether any is not finite, or beyond its bounds."""
+        self._fill()
         for low_pass, values in self._filters:
             low_pass.step(values)
+        arrays = self.step.arrays
+        return not ((self.block >= arrays["lower"]) & (self.block <= arrays["upper"]) & np.isfinite(self.block)).all()
 
     def send(self, stamp: float) -> None:
-        """Send `message`, stamped with `stamp` [s]."""
-        for correct, values, out in self._corrections:
-            correct(values, out)
+        """Send `message`, stamped with `stamp` [s], and keep it."""
+        self.moved = self._pack()
         self._attributes["stamp"] = stamp
         self.writer.write(self.sent)

@@ -16,7 +16,7 @@ from solfer.pipes.feedback_pipe import FeedbackPipe
 from solfer.pipes.name_order import NameOrder
 from solfer.pipes.point.notation import PointNotation
 from solfer.throttle import Throttle
-from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
+from solfer.transport.endpoints import NEW, OLD, MessageStatus, Reader, Writer
 from solfer.transport.inexact import InexactOrientations
 from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
 
@@ -82,7 +82,9 @@ class PointFeedbackPipe(FeedbackPipe):
 
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
-        status = super().run()
+        status = self.reader.read()
+        if status is NEW and not self._accept():
+            status = OLD
         self._port.fresh = status is NEW
         if status is NEW:
             self._port.value[...] = self._values

@@ -117,7 +117,11 @@ class ManagedPlugin:
             self.plugin.cycle()
         except BaseException as error:
             self.abort(located(error), error)
-            return
+        else:
+            self.follow()
+
+    def follow(self) -> None:
+        """Follow what the plugin has become in its newest cycle."""
         if self.state is RUNNING:
             if self.plugin.life is not RUNNING:
                 self._go(STARTING, self.plugin.health()[1])

@@ -7,7 +7,7 @@ from time import monotonic_ns
 
 import numpy as np
 
-from solfer.errors import MiddlewareError
+from solfer.errors import MiddlewareError, located
 from solfer.plugins.life.budget import Budget, BudgetRules
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.switchboard import Switchboard
@@ -19,6 +19,7 @@ from solfer.transport.plugin_state import FAILED_STATES, PluginState
 logger = logging.getLogger(__name__)
 
 COMPONENT = Stage.COMPONENT
+RUNNING = PluginState.RUNNING
 
 NOTHING: Mapping[str, Sequence[str]] = {}
 
@@ -119,7 +120,17 @@ class PluginSet:
             self.inbox.apply()
         components = 0
         for managed, times, budget in self._rows:
-            managed.cycle()
+            if managed.state is RUNNING:  # mostly: without a call in between
+                plugin = managed.plugin
+                try:
+                    plugin.cycle()
+                except BaseException as error:
+                    managed.abort(located(error), error)
+                else:
+                    if plugin.life is not RUNNING or managed.reason != plugin.overload.reason:
+                        managed.follow()
+            else:
+                managed.cycle()
             took = times[COMPONENT]
             components += took
             if budget is not None and (took > budget.limit or budget.overruns.count):

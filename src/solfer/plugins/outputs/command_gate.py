@@ -29,22 +29,18 @@ class CommandGate:
     """
 
     def __init__(self, owner: str, pipe: JointCommandPipe, lower: State, upper: State):
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import inside
-
-        self._inside = inside
         self._owner = owner
         self._pipe = pipe
         self.kinds = ("not finite", *(field for field, _ in pipe.fields))
         self._counts = memoryview(bytearray(8 * len(self.kinds))).cast("q")
         self._throttle = Throttle(logging.getLogger(__name__))
-        bounds = [_bounds(field, pipe.dofs, lower, upper=upper) for field, _ in pipe.fields]
+        limits = pipe.step.arrays
+        for row, (field, _) in enumerate(pipe.fields):
+            limits["lower"][row], limits["upper"][row] = _bounds(field, pipe.dofs, lower, upper=upper)
         self._checks = [
-            (field, values, *bound, np.zeros_like(values), np.zeros(len(values), dtype=bool))
-            for (field, values), bound in zip(pipe.fields, bounds, strict=True)
+            (field, values, *bounds, np.zeros_like(values), np.zeros(len(values), dtype=bool))
+            for (field, values), *bounds in zip(pipe.fields, limits["lower"], limits["upper"], strict=True)
         ]
-        # all fields at once, row by row
-        self._all = pipe.block.reshape(-1), *(np.concatenate(side) for side in zip(*bounds, strict=True))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -57,13 +53,11 @@ class CommandGate:
         self._counts = counts
 
     def check(self) -> None:
-        """Check and limit what the pipe has collected.
+        """Check and limit what the pipe has collected, where any of it is beyond its bounds.
 
         Raises:
             NotFinite: A value is NaN or infinite; names the joint, the field and the plugin.
         """
-        if self._inside(*self._all):
-            return
         for field, values, lower, upper, held, flags in self._checks:
             if not all_finite(values, flags):
                 self._refuse(field, flags)

@@ -1,7 +1,8 @@
 """Commands of a plugin: collected from its component, checked, blended in and sent; the last ones are kept to hold."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, cast
+from operator import attrgetter
+from typing import Any, NoReturn, cast
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
+
+_MOVED = attrgetter("moved")
 
 Claim = tuple[str, str, str]
 """A number of a command: controller, field and joint."""
@@ -52,10 +55,6 @@ class Outputs:
         requests: StartRequests | None = None,
         following: JointFollowing | None = None,
     ):
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import finite
-
-        self._finite = finite
         self._requests = requests
         self.controllers = tuple(controllers)
         self.blend = blend
@@ -67,8 +66,6 @@ class Outputs:
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
         self.joints = SentJoints(joints, self._moves, period)
-        # joints that go to other plugins have no gate, but none of them shall follow what is not a number
-        self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
         self.following = following
         self.start_position = np.array(robot.state.position)
 
@@ -114,26 +111,21 @@ class Outputs:
             NotFinite: A value is NaN or infinite; nothing may be sent.
         """
         for pipe, gate in self.controllers:
-            pipe.collect()
-            if gate is not None:
+            if pipe.collect():
+                if gate is None:  # joints of other plugins: none of them shall follow what is not a number
+                    _refuse(cast(JointCommandPipe, pipe))
                 gate.check()
-        for joint_pipe, values in self._unguarded:
-            if not self._finite(values):
-                _refuse(joint_pipe)
         if self.blend.active:
             self.blend.step()
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        joints = self.joints
-        farthest = 0.0
-        for block, sent, steps in joints.blocks:
-            farthest = max(farthest, joints.copy(block, sent, steps))
-        if joints.is_sent:
-            joints.distance += farthest
-        joints.is_sent = joints.are_followed = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
+        joints = self.joints
+        if joints.is_sent:
+            joints.distance += max(map(_MOVED, joints.pipes), default=0.0)
+        joints.is_sent = joints.are_followed = True
 
     def rest(self, stamp: float) -> None:
         """Collect and send, but with all velocities at zero."""
@@ -184,7 +176,7 @@ class Outputs:
         self.joints.follow(self.start_position)
 
 
-def _refuse(pipe: JointCommandPipe) -> None:
+def _refuse(pipe: JointCommandPipe) -> NoReturn:
     field, values = next((field, values) for field, values in pipe.fields if not np.isfinite(values).all())
     joint = pipe.message.names[int(np.argmin(np.isfinite(values)))]
     raise NotFinite(

@@ -16,8 +16,7 @@ class SentJoints:
         period: Time of a control cycle [s].
 
     Attributes:
-        blocks: Numbers of each pipe, those sent last, and for each row the time that it acts [s].
-        copy: Copies a block to what was sent last, and returns the largest step of a joint [rad, m].
+        pipes: The pipes, which keep what was sent last.
         is_sent: Whether anything was sent since the start.
         are_followed: Whether joints follow what was sent last.
         distance: Sum over all cycles of the largest commanded step of a joint [rad, m].
@@ -27,16 +26,12 @@ class SentJoints:
     """Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
 
     def __init__(self, pipes: Sequence[JointCommandPipe], moves: Callable[[JointCommandPipe], bool], period: float):
-        # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import keep
-
-        self.copy = keep
-        self.blocks = [
-            (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if moves(pipe) else None)) for pipe in pipes
-        ]
+        self.pipes = tuple(pipes)
+        for pipe in pipes:
+            pipe.step.arrays["steps"][:] = _steps(pipe, period if moves(pipe) else None)
         self._positions = [
-            (pipe.dofs, sent[row])
-            for pipe, (_, sent, _) in zip(pipes, self.blocks, strict=True)
+            (pipe.dofs, pipe.step.arrays["kept"][row])
+            for pipe in pipes
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
         ]
@@ -48,8 +43,8 @@ class SentJoints:
 
     def restore(self) -> None:
         """Let what was sent last be sent again."""
-        for block, sent, _ in self.blocks:
-            block[...] = sent
+        for pipe in self.pipes:
+            pipe.block[...] = pipe.step.arrays["kept"]
 
     def stop(self, position: np.ndarray) -> None:
         """Let all velocities be zero, also those that a filter carries; joints are at `position`, (n,) [rad, m]."""

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -37,16 +38,35 @@ class Overload:
         reason: Why it is overloaded, with the figure of the beginning; empty while nothing is.
         figures: Ratio of the periods left out, age of the measurement [s], and pace; live, shape (3,).
         pace: Ratio of their speed with which motions may go on.
+        is_near: Whether a limit is exceeded, shape (1,): then, and while motions are slowed down, `change` is due.
+        address: What `RobotTime` counts a cycle in.
     """
 
     def __init__(self, plugin: str, feedbacks: Sequence[FeedbackPipe], period: float, limits: OverloadRecord):
         self._plugin = plugin
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.blocks import MemoryBlock
+        from solfer.plugins.timing.kernel import LOAD, add
+
         self._period = period
-        self._ratio_limit = limits.left_out
-        self._age_limit = limits.age
+        self._limits = limits
         self._slowed = max(SLOWING_RATIO, limits.left_out)
         self._feedback = next((each for each in feedbacks if each.measures), None)
         self.figures = np.zeros(3)
+        self.is_near = np.zeros(1, dtype=bool)
+        self._block = MemoryBlock(
+            LOAD,
+            period=period,
+            window=WINDOW,
+            ratio_limit=limits.left_out,
+            age_limit=limits.age,
+            sums=np.zeros(2),
+            accepted=np.zeros(1, dtype=np.int64),
+            figures=self.figures,
+            is_near=self.is_near,
+        )
+        self.address = self._block.address
+        self._add = partial(add, self.address)
         self.restart()
 
     def restart(self) -> None:
@@ -54,40 +74,30 @@ class Overload:
         self.reason = ""
         self.pace = 1.0
         self.figures[:] = 0.0, 0.0, 1.0
-        self._left_out = self._age = self._calm = 0.0
-        self._passed = WINDOW
-        self._cycles = WINDOW / self._period
-        self._accepted = -1
+        self._calm = 0.0
+        arrays = self._block.arrays
+        arrays["sums"][:] = WINDOW, WINDOW / self._period
+        arrays["accepted"][0] = -1
+        self.is_near[0] = False
 
     def advance(self, passed: float) -> float:
         """Return the pace, in a cycle that begins `passed` [s] after the one before, in the robot's time."""
-        # over time, not in each cycle: measurements that come in bunches let the robot's time pass in bunches
-        kept = 1.0 / (1.0 + passed / WINDOW)
-        self._passed = kept * self._passed + passed
-        self._cycles = kept * self._cycles + 1.0
-        self._left_out = max(1.0 - self._cycles * self._period / self._passed, 0.0)
-        feedback = self._feedback
-        if feedback is not None:
-            self._age = self._age + passed if feedback.accepted == self._accepted else 0.0
-            self._accepted = feedback.accepted
-        ratio = self._left_out / self._ratio_limit
-        age = self._age / self._age_limit
-        if self.reason or ratio > 1.0 or age > 1.0 or self.pace < 1.0:
-            self._change(ratio, age, passed)
-        figures = self.figures
-        figures[0] = self._left_out
-        figures[1] = self._age
-        figures[2] = self.pace
+        self._add(passed, -1 if self._feedback is None else self._feedback.accepted)
+        if self.is_near[0] or self.reason or self.pace < 1.0:
+            self.change(passed)
         return self.pace
 
-    def _change(self, ratio: float, age: float, passed: float) -> None:
-        """Begin or end the overload, and change the pace; `ratio` and `age` are multiples of their limits."""
+    def change(self, passed: float) -> None:
+        """Begin or end the overload, and change the pace."""
+        left_out, oldest_age, _ = self.figures.tolist()
+        ratio = left_out / self._limits.left_out
+        age = oldest_age / self._limits.age
         worst = max(ratio, age)
         if worst > 1.0 and not self.reason:
             self.reason = (
-                f"overloaded: it leaves out {self._left_out:.0%} of its periods"
+                f"overloaded: it leaves out {left_out:.0%} of its periods"
                 if ratio > age
-                else f"behind: its newest measurement is {1e3 * self._age:.0f} ms old"
+                else f"behind: its newest measurement is {1e3 * oldest_age:.0f} ms old"
             )
             logger.warning("%s is %s; motions slow down", self._plugin, self.reason)
         self._calm = self._calm + passed if worst < 0.5 else 0.0
@@ -95,7 +105,7 @@ class Overload:
             self.reason = ""
             logger.info("%s keeps up again", self._plugin)
         oldest = 4.0  # age of the measurement at which motions rest, in ages at which the overload begins
-        slowed = max((self._left_out - self._slowed) / (REST_RATIO - SLOWING_RATIO), (age - 1.0) / (oldest - 1.0), 0.0)
+        slowed = max((left_out - self._slowed) / (REST_RATIO - SLOWING_RATIO), (age - 1.0) / (oldest - 1.0), 0.0)
         if slowed and not self.pace:  # what rests goes on when nothing slows it down any more, and does not creep
             slowed = 1.0
         change = max(1.0 - slowed, 0.0) - self.pace
@@ -104,3 +114,4 @@ class Overload:
         fall_rate = 4.0  # [1/s]
         rise_rate = 1.0
         self.pace += min(max(change, -fall_rate * step), rise_rate * step)
+        self.figures[2] = self.pace

@@ -9,7 +9,6 @@ from solfer.transport.declared.action_server import ActionServer
 from solfer.transport.declared.fields import exactly
 from solfer.transport.declared.publications import Publications
 from solfer.transport.declared.topics import DeclaredIn, DeclaredOut, SoleSender
-from solfer.transport.endpoints import Queue
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
 
@@ -37,7 +36,6 @@ def bind(
     _require_rates(owner, declared)
     middleware.serve(owner, [each for each in declared if isinstance(each, Service)], inbox.submit)
     publications = Publications()
-    queues: list[Queue] = []
     senders: dict[str, SoleSender] = {}
     for each in declared:
         if isinstance(each, Parameter):
@@ -46,7 +44,7 @@ def bind(
             sole = senders.setdefault(each.stream, SoleSender()) if each.stream else None
             topic = DeclaredIn(owner, each, middleware, sole=sole)
             inbox.sources.append(topic.receive)
-            queues.append(topic.queue)
+            inbox.queues.append(topic.queue)
         elif isinstance(each, TopicOut):
             out = DeclaredOut(owner, each, middleware)
             publications.add(out.publish, cycles=1 if each.rate is None else max(1, round(rate / each.rate)))
@@ -55,9 +53,8 @@ def bind(
         elif isinstance(each, Action):
             server = middleware.action(owner, each) or ActionServer(owner, each, middleware)
             inbox.sources.append(server.receive)
-            queues += server.queues
+            inbox.queues += server.queues
             publications.add(server.publish)
-    inbox.pending = middleware.pending(queues)
     return publications
 
 

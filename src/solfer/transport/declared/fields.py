@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import typing
 from collections.abc import Callable, Mapping
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -50,18 +51,57 @@ def require_carried(interface: str) -> None:
 
 def message_of(interface: str, value: Any) -> Message:
     """Make the message of a dataclass, as it travels."""
-    fields = plain(value)
-    if interface not in _PLACES:
-        return FieldsMessage(fields)
-    header = fields.get("header", {})
-    frame = header.get("frame_id", "")
-    stamp = header.get("stamp", 0.0)
-    numbers = np.array(
-        [float(_at(fields, path).get(name, 0.0)) for path, names in _PLACES[interface] for name in names]
-    )
-    if interface in WRENCH_MESSAGES:
-        return WrenchMessage(frame, numbers[:3], numbers[3:], stamp=stamp)
-    return VectorMessage(frame, numbers, stamp)
+    return encoder(interface, type(value))(value)
+
+
+def encoder(interface: str, cls: type) -> Callable[[Any], Message]:
+    """Return what makes messages of dataclasses; numbers of geometry are in the same message each time."""
+    return _Geometry(interface, cls).fill if interface in _PLACES else _written_out
+
+
+def _written_out(value: Any) -> FieldsMessage:
+    return FieldsMessage(plain(value))
+
+
+class _Geometry:
+    """A message of geometry, filled with dataclasses; what a dataclass does not have is zero."""
+
+    def __init__(self, interface: str, cls: type):
+        paths = [(*place, name) for place, names in _PLACES[interface] for name in names]
+        there = [place for place, path in enumerate(paths) if _has(cls, path)]
+        self._places = slice(None) if len(there) == len(paths) else there
+        # attributes of attributes, without a call of Python for each
+        self._numbers = attrgetter(*[".".join(paths[place]) for place in there]) if there else lambda value: ()
+        self._has_header = _has(cls, ("header",))
+        self._values = np.zeros(len(paths))
+        self._is_wrench = interface in WRENCH_MESSAGES
+        self._message: VectorMessage | WrenchMessage | None = None
+
+    def fill(self, value: Any) -> Message:
+        """Return the message of a dataclass."""
+        header = value.header if self._has_header else None
+        frame = getattr(header, "frame_id", "")
+        values = self._values
+        values[self._places] = self._numbers(value)
+        message = self._message
+        if message is None or message.frame != frame:
+            if self._is_wrench:
+                message = self._message = WrenchMessage(frame, values[:3], values[3:])
+            else:
+                message = self._message = VectorMessage(frame, values)
+        message.stamp = getattr(header, "stamp", 0.0)
+        return message
+
+
+def _has(cls: Any, path: tuple[str, ...]) -> bool:
+    """Return whether a dataclass has an attribute of its attributes."""
+    for name in path:
+        if dataclasses.is_dataclass(cls):
+            hints = typing.get_type_hints(cls)
+            if name not in hints:
+                return False
+            cls = hints[name]
+    return True
 
 
 def value_of(cls: type, message: Message) -> Any:
@@ -148,12 +188,6 @@ def _sequence(values: Any) -> Any:
     if not isinstance(values, tuple | list | np.ndarray):
         raise TypeError(values)
     return values
-
-
-def _at(fields: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
-    for name in path:
-        fields = fields.get(name, {})
-    return fields
 
 
 def _fields_of(message: Message) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from solfer.errors import ComponentError, SolferError
 from solfer.interfaces.declaration import TopicIn, TopicOut, full_name
 from solfer.throttle import Throttle
 from solfer.transport.clocks.stamp_faults import StreamClock
-from solfer.transport.declared.fields import message_of, require_carried, value_of
+from solfer.transport.declared.fields import encoder, require_carried, value_of
 from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
@@ -116,6 +116,7 @@ class DeclaredOut:
         require_carried(topic.interface)
         middleware.require_fields(topic.interface, topic.message)
         self._topic = topic
+        self._encode = encoder(topic.interface, topic.message)
         self._writer = middleware.declared_writer(full_name(owner, topic.name), topic.interface)
         self._now = middleware.now
         self._has_worked = False
@@ -135,10 +136,10 @@ class DeclaredOut:
                 f"a {type(value).__name__} for topic {self._writer.topic}", expected=f"a {self._topic.message.__name__}"
             )
         self._has_worked = True
-        self._writer.write(message_of(self._topic.interface, value))
+        self._writer.write(self._encode(value))
 
     def rest(self, refusal: str) -> None:
         """Publish now and then, while a component that has worked does not (a `refusal`), what is declared for that."""
         if refusal and self._has_worked and self._now() >= self._next:
             self._next = self._now() + 0.05  # repeated: a message may be lost
-            self._writer.write(message_of(self._topic.interface, self._topic.rest))
+            self._writer.write(self._encode(self._topic.rest))

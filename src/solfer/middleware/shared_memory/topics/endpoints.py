@@ -72,13 +72,19 @@ class XbotReader(Reader):
         notification = self._notification
         quiet = notification.words[notification.place] == notification.received
         for sender_segment in self.publishers if quiet else self.update():
-            if sender_segment.end.read():
+            slot = sender_segment.end
+            number = slot.words[NEWEST]
+            if number != slot.sequence and (slot.fetch(number) or slot.read()):
                 sent = sender_segment.arrival = sender_segment.record.front[SENT_COLUMN]
                 if news is None or sent >= news.arrival:
                     news = sender_segment
         if news is None or news.arrival < self.arrival:  # sent before what is known already
             return NONE if self.message is None else OLD
-        self.message = news.record.decode()
+        record = news.record
+        record.attributes["stamp"] = record.front[STAMP_COLUMN]
+        if record.changes:
+            record.update()
+        self.message = record.message
         self.arrival = news.arrival
         return NEW
 
@@ -98,10 +104,15 @@ class XbotReader(Reader):
 
     def read_from(self, publisher: SenderSegment) -> MessageStatus:
         """See `Reader.read_from`."""
-        if not publisher.end.read():
+        slot = publisher.end
+        number = slot.words[NEWEST]
+        if number == slot.sequence or not (slot.fetch(number) or slot.read()):
             return NONE if self.message is None else OLD
         record = publisher.record
-        self.message = record.decode()
+        record.attributes["stamp"] = record.front[STAMP_COLUMN]
+        if record.changes:
+            record.update()
+        self.message = record.message
         self.arrival = publisher.arrival = record.front[SENT_COLUMN]
         return NEW
 
@@ -115,9 +126,13 @@ class XbotReader(Reader):
         for source in self._sources:
             if not source.ahead and source.end.words[NEWEST] != source.end.sequence:
                 ring: Any = source.end  # one that keeps messages
-                lost = ring.lost
-                source.ahead = ring.read(self._kept)
-                self.dropped += ring.lost - lost
+                number = ring.sequence + 1
+                if ring.words[NEWEST] - number < self._kept and ring.fetch(number):
+                    source.ahead = True
+                else:
+                    lost = ring.lost
+                    source.ahead = ring.read(self._kept)
+                    self.dropped += ring.lost - lost
             if source.ahead:
                 sent = source.record.front[SENT_COLUMN]
                 if oldest is None or sent < arrival:
@@ -127,7 +142,12 @@ class XbotReader(Reader):
             self._sources = self.publishers
             return None
         oldest.ahead = False
-        self.message = oldest.record.decode()
+        self.has_next = len(self._sources) > 1 or oldest.end.words[NEWEST] != oldest.end.sequence
+        record = oldest.record
+        record.attributes["stamp"] = record.front[STAMP_COLUMN]
+        if record.changes:
+            record.update()
+        self.message = record.message
         self.arrival = oldest.arrival = arrival
         return oldest
 
@@ -295,6 +315,9 @@ class XbotWriter(Writer):
         block = record.block
         if block is not None and message.block is not None and message.rows == record.rows:
             block[...] = message.block
+        elif record.views:
+            for name, view in record.views:
+                view[...] = getattr(message, name)
         else:
             record.encode(message)
         self._end.put(int(1e9 * now))

@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -32,37 +32,40 @@ class WireRecord(abc.ABC):
         front: The columns in front of those of the message; live.
         block: All numbers of a JointMessage as rows of one array, which takes less time to copy; None: another message.
         rows: What the rows of `block` are.
+        views: Arrays of numbers by the names of their fields; empty: the message is written out, by `encode`.
+        attributes: Those of `message`: to assign one, a message looks for its arrays.
+        changes: Whether `message` lacks what changes in the array until `update` is called.
     """
 
     block: np.ndarray | None = None
     rows: tuple[str, ...] = ()
 
-    message: Message
-    _changes = True
-    """Whether `message` lacks what changes in the array until `_decode` is called."""
+    views: Sequence[tuple[str, np.ndarray]] = ()
+    changes = True
 
-    def __init__(self, values: np.ndarray):
+    def __init__(self, values: np.ndarray, message: Message):
         self.front: Any = memoryview(values)[:WIRE_COLUMNS]
+        self.message = message
+        self.attributes: dict[str, Any] = vars(message)
 
-    @abc.abstractmethod
     def encode(self, message: Message) -> None:
-        """Write a message of the same layout, behind the columns in front."""
+        """Write a message of the same layout, behind the columns in front, where it has no `views`."""
+        raise NotImplementedError
 
     def decode(self) -> Message:
         """Bring `message` up to date and return it."""
-        message = self.message
-        message.__dict__["stamp"] = self.front[STAMP_COLUMN]  # to assign one, a message looks for its arrays
-        if self._changes:
-            self._decode()
-        return message
+        self.attributes["stamp"] = self.front[STAMP_COLUMN]
+        if self.changes:
+            self.update()
+        return self.message
 
     @abc.abstractmethod
     def copy(self) -> Message:
         """Return the content as a message of its own."""
 
     @abc.abstractmethod
-    def _decode(self) -> None:
-        """Bring `message` up to date."""
+    def update(self) -> None:
+        """Bring `message` up to date, beside its stamp and its views."""
 
 
 class NumbersWireRecord(WireRecord):
@@ -87,18 +90,18 @@ class NumbersWireRecord(WireRecord):
         *,
         sender: str,
     ):
-        super().__init__(values)
-        self._views: list[tuple[str, np.ndarray]] = []
+        views: list[tuple[str, np.ndarray]] = []
         start = WIRE_COLUMNS
         for name, shape in shapes.items():
             if shape is None:
                 continue
             end = start + int(np.prod(shape))
-            self._views.append((name, values[start:end].reshape(shape)))
+            views.append((name, values[start:end].reshape(shape)))
             start = end
-        self._tuples = [(name, view) for name, view in self._views if name in tuples]
-        self.message = message_type(**texts, **dict(self._views), sender=sender)
-        self._changes = bool(self._tuples)
+        self._tuples = [(name, view) for name, view in views if name in tuples]
+        super().__init__(values, message_type(**texts, **dict(views), sender=sender))
+        self.views = views
+        self.changes = bool(self._tuples)
         if isinstance(self.message, JointMessage):
             self._lay(self.message, values[WIRE_COLUMNS:start])
 
@@ -106,21 +109,17 @@ class NumbersWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return copied(self.decode())
 
-    def encode(self, message: Any) -> None:
-        """See `WireRecord.encode`."""
-        for name, view in self._views:
-            view[...] = getattr(message, name)
-
     def _lay(self, message: JointMessage, values: np.ndarray) -> None:
         """Let the numbers of a message be rows of one array, if there is one for each name."""
         size = len(message.names)
-        rows = (*(name for name, _ in self._views if name in JOINT_FIELDS), *message.interfaces)
-        if all(view.shape[-1] == size for _, view in self._views) and len(rows) * size == len(values):
+        rows = (*(name for name, _ in self.views if name in JOINT_FIELDS), *message.interfaces)
+        if all(view.shape[-1] == size for _, view in self.views) and len(rows) * size == len(values):
             self.rows = rows
             self.block = values.reshape(len(rows), size)
             message.lay(rows, self.block)
 
-    def _decode(self) -> None:
+    def update(self) -> None:
+        """See `WireRecord.update`."""
         for name, view in self._tuples:
             setattr(self.message, name, tuple(view.tolist()))
 
@@ -129,12 +128,9 @@ class TextWireRecord(WireRecord):
     """A message of texts, written out; elements at the end of its tuples that do not fit are left out."""
 
     def __init__(self, message_type: type, values: np.ndarray, sender: str):
-        super().__init__(values)
-        self._text = Text(values[WIRE_COLUMNS:])
-        self._type = message_type
-        self._sender = sender
         self._fields = [field.name for field in dataclasses.fields(message_type) if field.name not in SEPARATE_FIELDS]
-        self.message = message_type(*(() for _ in self._fields), sender=sender)
+        super().__init__(values, message_type(*(() for _ in self._fields), sender=sender))
+        self._text = Text(values[WIRE_COLUMNS:])
 
     def copy(self) -> Message:
         """See `WireRecord.copy`."""
@@ -147,7 +143,8 @@ class TextWireRecord(WireRecord):
             parts = [part[:-1] for part in parts]
         self._text.write(text)
 
-    def _decode(self) -> None:
+    def update(self) -> None:
+        """See `WireRecord.update`."""
         for name, part in zip(self._fields, json.loads(self._text.read()), strict=True):
             setattr(self.message, name, tuple(part))
 
@@ -158,9 +155,8 @@ class FieldsWireRecord(WireRecord):
     message: FieldsMessage
 
     def __init__(self, message_type: type, values: np.ndarray, sender: str):
-        super().__init__(values)
+        super().__init__(values, message_type({}, sender=sender))
         self._text = Text(values[WIRE_COLUMNS:])
-        self.message = message_type({}, sender=sender)
 
     def copy(self) -> Message:
         """See `WireRecord.copy`."""
@@ -170,7 +166,8 @@ class FieldsWireRecord(WireRecord):
         """See `WireRecord.encode`."""
         self._text.write(fields_text(message))
 
-    def _decode(self) -> None:
+    def update(self) -> None:
+        """See `WireRecord.update`."""
         self.message.fields = json.loads(self._text.read())
 
 
