@@ -20,7 +20,7 @@ def _normal_matrix(jacobian, weights, columns, diagonal, factor):
     cholesky(factor)
 
 
-def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
+def _fit(weights, columns, diagonal, factor, forces, rest, jacobian, world):
     """Write the forces that explain the world best, and what they leave."""
     _normal_matrix(jacobian, weights, columns, diagonal, factor)
     for i in range(len(forces)):
@@ -60,18 +60,18 @@ def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
             normal_forces[i] += normals[i, axis] * forces[i, axis]
 
 
-def _touch(forces, speeds, period, limits, touching, lifted, times):
+def _touch(limits, touching, lifted, times, forces, speeds, period):
     """Decide which contacts touch, see `Touch`.
 
     Args:
-        forces: Their normal forces [N].
-        speeds: Their speeds along the normal [m/s].
-        period: Time since the cycle before [s].
         limits: Force from which on one touches, below which it ends [N], time until it changes [s], and reduction of
             the force by the speed [Ns/m].
         touching: Which touch; written.
         lifted: Which are in the air for sure; written.
         times: For how long each was about to change, and has not touched [s]; written.
+        forces: Their normal forces [N].
+        speeds: Their speeds along the normal [m/s].
+        period: Time since the cycle before [s].
     """
     begin, end, delay, reduction = limits
     for i in range(len(forces)):
@@ -162,7 +162,7 @@ _VECTOR = "float64[::1]"
 _INDICES = "int64[::1]"
 
 fit = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR})",
+    f"void({_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR})",
     _fit,
     sources=[DENSE],
 )
@@ -170,6 +170,6 @@ learn = cached(f"void(int64, {_VECTOR}, {_VECTOR})", _learn, sources=[DENSE])
 observe = cached(f"void({_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _observe)
 measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
 touch = cached(
-    f"void({_VECTOR}, {_VECTOR}, float64, {_VECTOR}, boolean[::1], boolean[::1], {_MATRIX})",
+    f"void({_VECTOR}, boolean[::1], boolean[::1], {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
     _touch,
 )

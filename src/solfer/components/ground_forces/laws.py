@@ -105,11 +105,11 @@ class WeightedLaw:
         """
         world = self._world.update(self._torque, passed)
         if self.offsets is None:
-            forces = self._forces.update(jacobian, world)
+            self._forces.update(jacobian, world)
         else:
             np.add(world, self.offsets.value, out=self._corrected)
-            forces = self._forces.update(jacobian, self._corrected)
-        self._pushed.write_forces(forces)
+            self._forces.update(jacobian, self._corrected)
+        self._pushed.write_forces(self._forces.value)
         if self._floating:
             self._write_push()
         if self.offsets is not None:

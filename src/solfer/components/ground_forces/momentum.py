@@ -30,7 +30,11 @@ class MomentumObserver:
     def __init__(self, robot: Robot, cut_off: float | None):
         self._robot = robot
         self._cut_off = cut_off
-        robot.dynamics.subscribe([BIAS] if cut_off is None else [BIAS, INERTIA])
+        dynamics = robot.dynamics
+        dynamics.subscribe([BIAS] if cut_off is None else [BIAS, INERTIA])
+        self._use = dynamics.manager.use
+        self._bias = dynamics.bias
+        self._inertia = dynamics.inertia
         self.value, self._before = np.zeros((2, robot.size))
 
     def start(self, torque: np.ndarray) -> None:
@@ -40,11 +44,11 @@ class MomentumObserver:
 
     def update(self, torque: np.ndarray, period: float) -> np.ndarray:
         """Return what the world does after `period` [s] more, by the torques of now, shape (n,); live."""
-        dynamics = self._robot.dynamics
-        bias = dynamics.bias
+        self._use(BIAS)
         if self._cut_off is None:
-            return np.subtract(bias, torque, out=self.value)
+            return np.subtract(self._bias, torque, out=self.value)
+        self._use(INERTIA)
         ratio = -math.expm1(-2.0 * math.pi * self._cut_off * period)
         velocity = self._robot.state.velocity
-        kernel.observe(bias, torque, dynamics.inertia, velocity, self._before, period, ratio, self.value)
+        kernel.observe(self._bias, torque, self._inertia, velocity, self._before, period, ratio, self.value)
         return self.value

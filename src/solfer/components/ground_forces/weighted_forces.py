@@ -1,6 +1,7 @@
 """Forces at contacts that explain what the world does to a robot best."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -32,20 +33,16 @@ class WeightedForces:
     Attributes:
         value: The forces, shape (k, 3), world axes [N]; live.
         rest: w - J^T f, shape (n,) [N, Nm]; live.
+        update: update(jacobian, world) computes both by the Jacobian, shape (3k, n), and by what the world does, shape
+            (n,).
     """
 
     def __init__(self, contacts: Sequence[Contact], deviations: np.ndarray):
         rows = 3 * len(contacts)
         size = len(deviations)
-        self._weights = deviations**-2
-        self._columns = weighed(contacts, self._weights)
-        self._factor = np.zeros((rows, rows))
-        self._forces = np.zeros(rows)
-        self.rest, self.value = np.zeros(size), self._forces.reshape(-1, 3)
-
-    def update(self, jacobian: np.ndarray, world: np.ndarray) -> np.ndarray:
-        """Return the forces by the Jacobian, shape (3k, n), and by what the world does, shape (n,); live."""
-        kernel.fit(
-            jacobian, world, self._weights, self._columns, PRIOR_INFORMATION, self._factor, self._forces, self.rest
-        )
-        return self.value
+        weights = deviations**-2
+        columns = weighed(contacts, weights)
+        forces = np.zeros(rows)
+        self.rest, self.value = np.zeros(size), forces.reshape(-1, 3)
+        factor = np.zeros((rows, rows))
+        self.update = partial(kernel.fit, weights, columns, PRIOR_INFORMATION, factor, forces, self.rest)

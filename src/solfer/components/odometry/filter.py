@@ -282,7 +282,7 @@ class FilteredOdometry:
         """
         slips = bool(self.slip.lasts) or self._motion.feet is not None  # then the velocity is that of the filter
         known = self.kalman.velocity_covariance if slips else self._spread.covariance
-        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose=pose, twist=twist)
+        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose, twist)
 
     def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.

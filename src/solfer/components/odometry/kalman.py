@@ -1,6 +1,7 @@
 """The error-state Kalman filter of the base: wheels that roll, a gyroscope, and an IMU's tilt."""
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -104,6 +105,10 @@ class WheelInertialFilter:
         innovations: Innovation of each wheel's velocity, shape (k, 3) [m/s]; live.
         slide: Variance of the position after a metre by wheels that slide [m^2/m].
         pushed: What an accelerometer measures in the interval, see `push`, shape (5,); live.
+        write_covariances: Writes the covariances of the pose of the base's origin, in W, and of its twist, in H. Takes
+            the heading [rad]; the `arm`, see `predict`; the interval for which the angular velocity is a mean [s]; the
+            covariance of the velocity by the wheels in H, shape (3, 3) [m^2/s^2]; and where it writes those of position
+            and rotations, shape (6, 6) [m, rad], and of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
     """
 
     def __init__(
@@ -148,6 +153,7 @@ class WheelInertialFilter:
             pushed=self.pushed,
         )
         self._address = self._block.address
+        self.write_covariances = partial(kernel.write_covariances, self._address, self._variances.noise)
         self._velocity_noise = 0.0
         self.start()
 
@@ -361,30 +367,6 @@ class WheelInertialFilter:
     def velocity_covariance(self) -> np.ndarray:
         """Covariance of v, shape (3, 3) [m^2/s^2]; a new array."""
         return np.ascontiguousarray(self.covariance[VELOCITY:GYRO_BIAS, VELOCITY:GYRO_BIAS])
-
-    def write_covariances(
-        self,
-        heading: float,
-        arm: np.ndarray,
-        period: float,
-        velocity: np.ndarray,
-        *,
-        pose: np.ndarray,
-        twist: np.ndarray,
-    ) -> None:
-        """Write the covariances of the pose of the base's origin, in W, and of its twist, in H.
-
-        Args:
-            heading: Heading [rad].
-            arm: From the base's origin to the ground point in H, shape (3,) [m].
-            period: Interval for which the angular velocity is a mean [s].
-            velocity: Covariance of the velocity by the wheels in H, shape (3, 3) [m^2/s^2].
-            pose: Of position and rotations, shape (6, 6) [m, rad].
-            twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
-        """
-        kernel.write_covariances(
-            self._address, heading, arm, self._variances.noise / period, velocity, pose, twist,
-        )  # fmt: skip
 
 
 _ORIGIN = np.zeros(3)

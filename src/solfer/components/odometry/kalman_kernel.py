@@ -439,13 +439,14 @@ def _condition(start, which, variance):
             covariance[i, k] -= column[i] * column[k] / spread
 
 
-def _write_covariances(start, heading, arm, white, velocity, pose, twist):
+def _write_covariances(start, density, heading, arm, period, velocity, pose, twist):
     """Write the covariances of a pose and of a twist; see `WheelInertialFilter.write_covariances`.
 
-    The angular velocity errs by the gyroscope's variance `white` and by its biases, and the base's origin moves by that
+    The angular velocity errs by the gyroscope's white noise with a `density` and by its biases, and the base's origin moves by that
     and by the arm. The velocity errs by its covariance, and leads uphill by the error of the tilt.
     """
     kalman = _filter_at(start)
+    white = density / period
     errors = kalman.covariance
     ahead = kalman.state[VELOCITY]
     left = kalman.state[VELOCITY + 1]
@@ -503,4 +504,4 @@ integrate = cached(f"void(int64, {_F}, {_F}, {_F}, UniTuple(float64, 3))", _inte
 level = cached(f"boolean(int64, {_F}, {_F}, {_F})", _level)
 measure = cached(f"boolean(int64, int64, {_F}, {_F})", _measure)
 condition = cached(f"void(int64, int64, {_F})", _condition)
-write_covariances = cached(f"void(int64, {_F}, {_V}, {_F}, {_M}, {_M}, {_M})", _write_covariances)
+write_covariances = cached(f"void(int64, {_F}, {_F}, {_V}, {_F}, {_M}, {_M}, {_M})", _write_covariances)

@@ -103,6 +103,9 @@ class Wheels:
             )
         self._robot = robot
         self._contacts = Handler(made)
+        # the Handler is this object's own: its arrays stay where they are
+        self._places = self._contacts.value.reshape(-1, 3)
+        self._place_jacobian = self._contacts.jacobian
         self.links = tuple(contact.link for contact in self._contacts)
         radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records)
         self.radii = radii or (radius or 0.0,) * len(made)
@@ -162,9 +165,9 @@ class Wheels:
         self.ground.rotate(cosine, sine)
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
-        places = self._contacts.value.reshape(-1, 3)
-        jacobian = self._contacts.jacobian
-        filter_kernel.turn_back(places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
+        filter_kernel.turn_back(
+            self._places, self._origin, self._place_jacobian, cosine, sine, self.arms, self.jacobian,
+        )  # fmt: skip
 
     def subtract_tilt(self, x: float, y: float) -> None:
         """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""

@@ -139,7 +139,7 @@ class OriginalShaping:
         self._references.step(step)
         stack.update()
         steering.measure(self._wheels.offsets.directions)
-        tasks.find_errors()
+        tasks.find_errors(False)
         self._solve(self._before_camber @ self._robot.state.velocity)
         self._aims += step * (self._before_steering @ self.program.velocity)
         self._keep_jacobians()
