@@ -31,7 +31,7 @@ class GroundForces(Component):
 
     The method `projection` computes the forces that keep the contacts in place, or rolling, as the paper does
     (`ContactForces`). They may pull, and forces that the constraints do not allow for are forced upon them. The method
-    `weighted` takes those that explain the torques best (`WeightedForces` of a `MomentumObserver`): a wheel in the air
+    `weighted` takes those that explain the torques best (`WeightedForces`): a wheel in the air
     gets none, whatever its constraint, and what is left at the base is a push from outside.
 
     The State has two interfaces more: `bias_force`, J^T f - h, and `overall_force`, to which the torques are added: the

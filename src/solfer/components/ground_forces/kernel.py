@@ -1,8 +1,13 @@
 """Compiled steps of the parts of `GroundForces`, number by number. Arrays are described there."""
 
+from pathlib import Path
+
+from solfer.numerics import base_chart
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, part
+from solfer.numerics.compilation import cached, exact_part, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
+
+_moment_of = exact_part(base_chart.moment_of)
 
 
 @part
@@ -20,6 +25,7 @@ def _normal_matrix(jacobian, weights, columns, diagonal, factor):
     cholesky(factor)
 
 
+@exact_part
 def _fit(weights, columns, diagonal, factor, forces, rest, jacobian, world):
     """Write the forces that explain the world best, and what they leave."""
     _normal_matrix(jacobian, weights, columns, diagonal, factor)
@@ -36,6 +42,7 @@ def _fit(weights, columns, diagonal, factor, forces, rest, jacobian, world):
             rest[column] -= jacobian[i, column] * forces[i]
 
 
+@exact_part
 def _observe(bias, torque, inertia, velocity, before, period, coefficient, value):
     """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference."""
     count = len(value)
@@ -46,6 +53,65 @@ def _observe(bias, torque, inertia, velocity, before, period, coefficient, value
         value[i] += coefficient * (world - value[i])
     for i in range(count):
         before[i] = velocity[i]
+
+
+EXPLANATION = BlockLayout(
+    "Explanation",
+    row_count=int,
+    dofs=int,
+    # dynamics and torques, whether accelerations count, and what the world does
+    bias=(float, "dofs"),
+    torque=(float, "dofs"),
+    observes=int,
+    inertia=(float, "dofs", "dofs"),
+    velocity=(float, "dofs"),
+    before=(float, "dofs"),
+    world=(float, "dofs"),
+    # the same with offsets, and the forces that explain it best
+    offsets=(float, "dofs"),
+    corrected=(float, "dofs"),
+    jacobian=(float, "row_count", "dofs"),
+    weights=(float, "dofs"),
+    column_count=int,
+    columns=(int, "column_count"),
+    diagonal=float,
+    factor=(float, "row_count", "row_count"),
+    forces=(float, "row_count"),
+    rest=(float, "dofs"),
+    # what is left at a floating base, in the axes of its chart and in those of the world
+    is_floating=int,
+    position=(float, "dofs"),
+    rotation=(float, 3, 3),
+    push=(float, 6),
+)
+"""What `explain` reads and writes."""
+
+_explanation_at = EXPLANATION.at
+
+
+def _explain(start, period, coefficient):
+    """Write what the world does, the forces that explain it, and the push on the base; see `WeightedForces`."""
+    block = _explanation_at(start)
+    bias = block.bias
+    torque = block.torque
+    world = block.world
+    rest = block.rest
+    corrected = block.corrected
+    if block.observes:
+        _observe(bias, torque, block.inertia, block.velocity, block.before, period, coefficient, world)
+    else:
+        for i in range(block.dofs):
+            world[i] = bias[i] - torque[i]
+    for i in range(block.dofs):
+        corrected[i] = world[i] + block.offsets[i]
+    _fit(block.weights, block.columns, block.diagonal, block.factor, block.forces, rest, block.jacobian, corrected)
+    if block.is_floating:
+        moment = _moment_of(block.position[3], block.position[4], rest[3], rest[4], rest[5])
+        for axis in range(3):
+            block.push[axis] = block.push[3 + axis] = 0.0
+            for k in range(3):
+                block.push[axis] += block.rotation[axis, k] * rest[k]
+                block.push[3 + axis] += block.rotation[axis, k] * moment[k]
 
 
 def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
@@ -159,15 +225,9 @@ def _learn(start, world, weights):
 
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
-_INDICES = "int64[::1]"
 
-fit = cached(
-    f"void({_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR})",
-    _fit,
-    sources=[DENSE],
-)
+explain = cached("void(int64, float64, float64)", _explain, sources=[DENSE, Path(base_chart.__file__)])
 learn = cached(f"void(int64, {_VECTOR}, {_VECTOR})", _learn, sources=[DENSE])
-observe = cached(f"void({_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _observe)
 measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
 touch = cached(
     f"void({_VECTOR}, boolean[::1], boolean[::1], {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
