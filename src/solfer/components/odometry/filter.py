@@ -239,9 +239,7 @@ class FilteredOdometry:
         self._base.read(measured)
         motion.wheels.update(self._base.heading)
         self._imu.period = period
-        motion.find_step()
-        keep = REST_TIME / (REST_TIME + period)
-        moved, legs, sway = filter_kernel.joint_motion(motion.step, motion.wheels.legs, self._imu.sway, keep)
+        moved, legs, sway = motion.find_step(self._imu.sway, REST_TIME / (REST_TIME + period))
         shaken, sample = self._follow_imu(legs / period)
         if motion.feet is not None:
             self._push()

@@ -281,14 +281,11 @@ class WheelInertialFilter:
         """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
         if self._variances.tilt:
             variance = 2.0 * TILT_TIME_CONSTANT / time * self._variances.tilt
-            for which in (TILT, TILT + 1):
-                kernel.measure(self._address, which, 0.0, variance)
+            kernel.measure(self._address, TILT, _NO_TILT, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
         """Measure the bias about the base's first axes by the gyroscope at rest, in B, shape (2,) or (3,)."""
-        variance = self._variances.noise / time
-        for axis in range(len(angular)):
-            kernel.measure(self._address, GYRO_BIAS + axis, float(angular[axis]), variance)
+        kernel.measure(self._address, GYRO_BIAS, angular, self._variances.noise / time)
 
     def level(self, x: float, y: float) -> bool:
         """Measure the tilt by the plane through the contacts, which is turned about x and y of H by the IMU [rad].
@@ -370,3 +367,4 @@ class WheelInertialFilter:
 
 
 _ORIGIN = np.zeros(3)
+_NO_TILT = np.zeros(2)

@@ -1,6 +1,7 @@
 """The wheels of a robot as an odometry sees them: contacts, their arms from the base, and how joints move them."""
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,9 +40,8 @@ class _Ground:
 
     def rotate(self, cosine: float, sine: float) -> None:
         """Let the contacts have the normal, turned about the vertical."""
-        if not self.is_level:
-            x, y, z = self.normal.tolist()
-            self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
+        x, y, z = self.normal.tolist()
+        self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
 
     def _tilt(self, normal: ArrayLike) -> None:
         for contact in self._contacts:
@@ -71,6 +71,7 @@ class Wheels:
         jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
         ground: The ground: its `normal`, shape (3,), live, and whether it `is_level`.
         legs: Which of them do not roll, shape (joints,).
+        subtract_tilt: subtract_tilt(x, y) turns arms and Jacobian back by an error of the tilt about x and y [rad].
 
     Raises:
         ComponentError: The Robot has no floating base, or no wheel.
@@ -113,6 +114,7 @@ class Wheels:
         joints = robot.size - 6
         self.arms = np.zeros((count, 3))
         self.jacobian = np.zeros((3 * count, joints))
+        self.subtract_tilt = partial(filter_kernel.subtract_tilt, self.arms, self.jacobian)
         self.legs = np.ones(joints, dtype=bool)
         rolling = [each.link for each in made if not _is_foot(each)]
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in rolling]] = False
@@ -162,16 +164,13 @@ class Wheels:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)
         sine = math.sin(heading)
-        self.ground.rotate(cosine, sine)
+        if not self.ground.is_level:
+            self.ground.rotate(cosine, sine)
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
         filter_kernel.turn_back(
             self._places, self._origin, self._place_jacobian, cosine, sine, self.arms, self.jacobian,
         )  # fmt: skip
-
-    def subtract_tilt(self, x: float, y: float) -> None:
-        """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
-        filter_kernel.subtract_tilt(self.arms, self.jacobian, x, y)
 
     @property
     def forces(self) -> np.ndarray:

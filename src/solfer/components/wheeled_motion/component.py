@@ -381,6 +381,4 @@ class WheeledMotion(Component):
     def _published_pace(self) -> float:
         """Return the ratio of the received velocities with which the motion goes on."""
         received = self.received
-        if self.references.waits:
-            return 0.0
-        return self.references.pace * received.ratio * self._delay.ratio * received.drive.progress
+        return self.references.going * received.ratio * self._delay.ratio * received.drive.progress
