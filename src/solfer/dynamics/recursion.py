@@ -1,5 +1,7 @@
 """Dynamics of a kinematic tree, with the arrays that the kernels work on."""
 
+from functools import partial
+
 import numpy as np
 from scipy.linalg import lapack
 
@@ -47,6 +49,8 @@ class Recursion:
         bias: Bias force, shape (n,) [Nm, N].
         inertia: Inertia matrix, shape (n, n) [kg, kg m, kg m^2].
         inertia_inverse: Its inverse, shape (n, n).
+        compute: compute(parts) computes a sum of `kernel.PLACE`, `WITH_BIAS` and `WITH_INERTIA`, and writes the last
+            two.
     """
 
     def __init__(self, robot: RobotView):
@@ -60,6 +64,7 @@ class Recursion:
         self._unfolded = np.zeros((size, size)) if self._folds else self.inertia
         self._branches = _Branches(self._tree.parents[1:] - 1, self._folds)
         self._block = self._make_block(size)
+        self.compute = self._fold if self._folds else partial(kernel.compute, self._block.address)
         # when LAPACK inverts faster, measured by `benchmark/growth.py`: from some 30 joints in a row on, but not where
         # limbs branch off a base
         self._dense = self._branches.products > 3500 + 0.125 * size**3
@@ -89,15 +94,14 @@ class Recursion:
             inertia=self._unfolded,
         )
 
-    def compute(self, parts: int) -> None:
-        """Compute a sum of `kernel.PLACE`, `WITH_BIAS` and `WITH_INERTIA`, and write the last two."""
+    def _fold(self, parts: int) -> None:
+        """Compute `parts`, and give what belongs to followers to their leaders."""
         kernel.compute(self._block.address, parts)
-        if self._folds:
-            if parts & kernel.WITH_BIAS:
-                self._tree.followers.fold(self.bias)
-            if parts & kernel.WITH_INERTIA:
-                self.inertia[:] = self._unfolded
-                self._tree.followers.fold_inertia(self.inertia)
+        if parts & kernel.WITH_BIAS:
+            self._tree.followers.fold(self.bias)
+        if parts & kernel.WITH_INERTIA:
+            self.inertia[:] = self._unfolded
+            self._tree.followers.fold_inertia(self.inertia)
 
     def compute_inverse(self) -> None:
         """Write `inertia_inverse`.

@@ -155,7 +155,9 @@ OFFSETS = BlockLayout(
     "Offsets",
     row_count=int,
     dofs=int,
-    jacobian=(float, "row_count", "dofs"),
+    # weights while nothing pushes the base, and while something does
+    calm=(float, "dofs"),
+    pushed=(float, "dofs"),
     # columns that count, the first of them that is a joint, and a number on the diagonal of J S J^T
     column_count=int,
     columns=(int, "column_count"),
@@ -170,7 +172,9 @@ OFFSETS = BlockLayout(
     information=(float, "size", "size"),
     moments=(float, "size"),
     offsets=(float, "size"),
-    # work space
+    value=(float, "dofs"),  # those of all DoFs
+    # work space: the Jacobian of contacts that are not lifted
+    jacobian=(float, "row_count", "dofs"),
     factor=(float, "row_count", "row_count"),
     spread=(float, "size", "row_count"),
     needed=(float, "row_count"),
@@ -181,10 +185,14 @@ OFFSETS = BlockLayout(
 _offsets_at = OFFSETS.at
 
 
-def _learn(start, world, weights):
+def _learn(start, contacts, world, lifted, pushed):
     """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     block = _offsets_at(start)
+    weights = block.pushed if pushed else block.calm
     jacobian = block.jacobian
+    for i in range(block.row_count):
+        for k in range(block.dofs):
+            jacobian[i, k] = 0.0 if lifted[i // 3] else contacts[i, k]
     columns = block.columns
     fraction = block.fraction
     decay = block.decay
@@ -221,13 +229,15 @@ def _learn(start, world, weights):
         offsets[a] = block.moments[a]
     forward(solved, offsets)
     backward(solved, offsets)
+    for a in range(block.size):
+        block.value[columns[block.first + a]] = offsets[a]
 
 
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
 
 explain = cached("void(int64, float64, float64)", _explain, sources=[DENSE, Path(base_chart.__file__)])
-learn = cached(f"void(int64, {_VECTOR}, {_VECTOR})", _learn, sources=[DENSE])
+learn = cached(f"void(int64, {_MATRIX}, {_VECTOR}, boolean[::1], boolean)", _learn, sources=[DENSE])
 measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
 touch = cached(
     f"void({_VECTOR}, boolean[::1], boolean[::1], {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",

@@ -42,24 +42,20 @@ class CommandedJoints:
         if self._resteering is not None:
             self._resteering.start()
 
-    def integrate(self, rates: np.ndarray, step: float, measured: np.ndarray) -> None:
+    def integrate(self, rates: np.ndarray, step: float, measured: np.ndarray | None = None) -> None:
         """Take over joint velocities for a time, and turn wheels back where they are at their ends.
 
         Args:
             rates: Joint velocities, shape (n,) [rad/s, m/s].
             step: The time [s].
-            measured: Measured positions, shape (n,) [rad, m].
+            measured: Measured positions, shape (n,) [rad, m]; None: no wheel turns back.
         """
-        self.move(rates, step)
-        if self._resteering is not None:
+        move(self.moved, rates, step, self.velocity, self.position)
+        self.is_first = False
+        if self._resteering is not None and measured is not None:
             commanded = self.position[self._steering]
             self._resteering.update(measured[self._steering], commanded)
             self.position[self._steering] = commanded
-
-    def move(self, rates: np.ndarray, step: float) -> None:
-        """Take over joint velocities, shape (n,) [rad/s, m/s], for a time [s]; no wheel turns back."""
-        move(self.moved, rates, step, self.velocity, self.position)
-        self.is_first = False
 
     def stop(self, command: State) -> None:
         """Write that all joints are still."""
