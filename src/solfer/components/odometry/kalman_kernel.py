@@ -444,8 +444,8 @@ def _condition(start, which, variance):
 def _write_covariances(start, density, heading, arm, period, velocity, pose, twist):
     """Write the covariances of a pose and of a twist; see `WheelInertialFilter.write_covariances`.
 
-    The angular velocity errs by the gyroscope's white noise with a `density` and by its biases, and the base's origin moves by that
-    and by the arm. The velocity errs by its covariance, and leads uphill by the error of the tilt.
+    The angular velocity errs by the gyroscope's white noise with a `density` and by its biases, and the base's origin
+    moves by that and by the arm. The velocity errs by its covariance, and leads uphill by the error of the tilt.
     """
     kalman = _filter_at(start)
     white = density / period
