@@ -40,7 +40,7 @@ class _Branches:
 class Recursion:
     """Bias force, inertia matrix and its inverse at the present kinematics of a robot; nothing is allocated.
 
-    PLACE comes first after each change of positions, WITH_INERTIA before `compute_inverse`.
+    Bodies have to be placed first after each change of positions, and the inertia comes before `compute_inverse`.
 
     Args:
         robot: The robot.

@@ -198,7 +198,7 @@ class FilteredOdometry:
         self._imu.rate_before[:] = base.angular
         self.ground.start_map()
         base.subtract_tilt(*kalman.tilt.tolist())
-        wheels.subtract_tilt(*kalman.tilt.tolist())
+        filter_kernel.subtract_tilt(wheels.arms, wheels.jacobian, *kalman.tilt.tolist())
         self.position[:] = 0.0, 0.0, -motion.mean_height()
         base.angular[:2] = 0.0
         self._motion.remember()
@@ -244,7 +244,7 @@ class FilteredOdometry:
         if motion.feet is not None:
             self._push()
         self._weigh()
-        motion.measure(self._base.turned)
+        filter_kernel.measure_displacements(motion.block.address, self._base.turned)
         yaw, imu_time, unknown = self._measure_yaw()
         self._note_rest(moved, sway, imu_time)
         self.kalman.predict(
@@ -280,7 +280,7 @@ class FilteredOdometry:
         """
         slips = bool(self.slip.lasts) or self._motion.feet is not None  # then the velocity is that of the filter
         known = self.kalman.velocity_covariance if slips else self._spread.covariance
-        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose, twist)
+        self.kalman.write_covariances(self.heading, self._motion.arm, self._imu.period, known, pose=pose, twist=twist)
 
     def _follow_imu(self, leg_speed: float) -> tuple[float, ImuSample]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
@@ -328,7 +328,8 @@ class FilteredOdometry:
         base.angular[1] = base.turned[1] / time
         base.turned[:2] -= imu.assumed
         imu.assumed[:] = 0.0
-        self._motion.wheels.subtract_tilt(*kalman.tilt.tolist())
+        wheels = self._motion.wheels
+        filter_kernel.subtract_tilt(wheels.arms, wheels.jacobian, *kalman.tilt.tolist())
         return shaken, sample
 
     def _push(self) -> None:

@@ -12,7 +12,7 @@ _rates_of = part(chart.rates_of)
 _rotation_of = part(chart.rotation_of)
 
 
-def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
+def _turn_back(places, origin, jacobian, arms, turned, cosine, sine):
     """Write arms and Jacobians in axes that are turned about the vertical, without the six columns of a base."""
     for i in range(len(places)):
         x = places[i, 0] - origin[0]
@@ -556,7 +556,7 @@ _V = "float64[::1]"
 _M = "float64[:, ::1]"
 _B = "boolean[::1]"
 
-turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
+turn_back = cached(f"void({_M}, {_V}, {_M}, {_M}, {_M}, {_F}, {_F})", _turn_back)
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
 joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_V}, {_V}, {_B}, {_V}, {_F})", _joint_motion)
 mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_M}, {_M})", _mean_rate)

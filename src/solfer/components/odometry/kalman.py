@@ -152,8 +152,7 @@ class WheelInertialFilter:
             half=half,
             pushed=self.pushed,
         )
-        self._address = self._block.address
-        self.write_covariances = partial(kernel.write_covariances, self._address, self._variances.noise)
+        self.write_covariances = partial(kernel.write_covariances, self._block.address, self._variances.noise)
         self._velocity_noise = 0.0
         self.start()
 
@@ -252,7 +251,7 @@ class WheelInertialFilter:
             FLOOR_DEVIATION**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
         )
         kernel.predict(
-            self._address,
+            self._block.address,
             _ORIGIN if arm is None else arm,
             heading,
             (yaw, tilt_yaw),
@@ -281,11 +280,11 @@ class WheelInertialFilter:
         """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
         if self._variances.tilt:
             variance = 2.0 * TILT_TIME_CONSTANT / time * self._variances.tilt
-            kernel.measure(self._address, TILT, _NO_TILT, variance)
+            kernel.measure(self._block.address, TILT, _NO_TILT, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
         """Measure the bias about the base's first axes by the gyroscope at rest, in B, shape (2,) or (3,)."""
-        kernel.measure(self._address, GYRO_BIAS, angular, self._variances.noise / time)
+        kernel.measure(self._block.address, GYRO_BIAS, angular, self._variances.noise / time)
 
     def level(self, x: float, y: float) -> bool:
         """Measure the tilt by the plane through the contacts, which is turned about x and y of H by the IMU [rad].
@@ -293,7 +292,7 @@ class WheelInertialFilter:
         Returns:
             Whether it passes for level ground.
         """
-        return not self._variances.tilt or bool(kernel.level(self._address, x, y, PLANE_DEVIATION**2))
+        return not self._variances.tilt or bool(kernel.level(self._block.address, x, y, PLANE_DEVIATION**2))
 
     def allow_scrubbing(self, variance: float) -> None:
         """Let scrubbing have at least a variance [rad^2/s^2]."""
@@ -324,7 +323,7 @@ class WheelInertialFilter:
         """
         steps = height is not None
         kernel.correct(
-            self._address, speeds, arms, rate, covered, variances, inliers, height if steps else math.nan, steps
+            self._block.address, speeds, arms, rate, covered, variances, inliers, height if steps else math.nan, steps
         )
 
     def lose_velocity(self, variance: float) -> None:
@@ -354,11 +353,11 @@ class WheelInertialFilter:
         """
         x, y, _ = self.velocity.tolist()
         variances = (self.slide * math.hypot(x, y) * period, unknown, self._variances.walk * period)
-        kernel.integrate(self._address, heading, period, imu_time, variances)
+        kernel.integrate(self._block.address, heading, period, imu_time, variances)
 
     def settle_height(self, deviation: float) -> None:
         """Measure the height, which is as expected, with a standard deviation [m]."""
-        kernel.condition(self._address, 2, deviation * deviation)
+        kernel.condition(self._block.address, 2, deviation * deviation)
 
     @property
     def velocity_covariance(self) -> np.ndarray:

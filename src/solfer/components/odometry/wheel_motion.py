@@ -33,7 +33,6 @@ class WheelMotion:
         find_step: find_step(sway, keep) computes the steps of the joints since the last `remember`, and smooths them as
             `sway`, which keeps a ratio of what it was; returns the largest step of all, of those of legs, and the
             largest sway [rad].
-        measure: measure(turned) computes the displacements by a rotation of the base, shape (3,) [rad].
     """
 
     def __init__(self, wheels: Wheels):
@@ -68,7 +67,6 @@ class WheelMotion:
         )
         self.feet = Feet(count, self.block, wheels.weight) if wheels.steps else None
         self.find_step = partial(filter_kernel.joint_motion, wheels.position, joints_before, self.step, wheels.legs)
-        self.measure = partial(filter_kernel.measure_displacements, self.block.address)
 
     def weigh(self, lifted: np.ndarray, touch: float | None) -> None:
         """Weigh the wheels: those that are lifted do not count, unless fewer than two would be left.

@@ -71,7 +71,6 @@ class Wheels:
         jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
         ground: The ground: its `normal`, shape (3,), live, and whether it `is_level`.
         legs: Which of them do not roll, shape (joints,).
-        subtract_tilt: subtract_tilt(x, y) turns arms and Jacobian back by an error of the tilt about x and y [rad].
 
     Raises:
         ComponentError: The Robot has no floating base, or no wheel.
@@ -104,9 +103,6 @@ class Wheels:
             )
         self._robot = robot
         self._contacts = Handler(made)
-        # the Handler is this object's own: its arrays stay where they are
-        self._places = self._contacts.value.reshape(-1, 3)
-        self._place_jacobian = self._contacts.jacobian
         self.links = tuple(contact.link for contact in self._contacts)
         radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records)
         self.radii = radii or (radius or 0.0,) * len(made)
@@ -114,12 +110,15 @@ class Wheels:
         joints = robot.size - 6
         self.arms = np.zeros((count, 3))
         self.jacobian = np.zeros((3 * count, joints))
-        self.subtract_tilt = partial(filter_kernel.subtract_tilt, self.arms, self.jacobian)
         self.legs = np.ones(joints, dtype=bool)
         rolling = [each.link for each in made if not _is_foot(each)]
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in rolling]] = False
-        self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
+        # the Handler is this object's own: its arrays stay where they are
+        places = self._contacts.value.reshape(-1, 3)
+        self._turn_back = partial(
+            filter_kernel.turn_back, places, self._origin, self._contacts.jacobian, self.arms, self.jacobian
+        )
         self.ground = _Ground([each for each in made if isinstance(each, RollingContact)])
         self._forces = np.zeros(count)
         self.position = robot.state.position[6:]
@@ -167,10 +166,9 @@ class Wheels:
         if not self.ground.is_level:
             self.ground.rotate(cosine, sine)
         self._contacts.update()
-        np.copyto(self._origin, self._robot.kinematics.position(self._link))
-        filter_kernel.turn_back(
-            self._places, self._origin, self._place_jacobian, cosine, sine, self.arms, self.jacobian,
-        )  # fmt: skip
+        kinematics = self._robot.kinematics
+        np.copyto(self._origin, kinematics.position(kinematics.base_link or ""))
+        self._turn_back(cosine, sine)
 
     @property
     def forces(self) -> np.ndarray:
