@@ -115,10 +115,8 @@ class Wheels:
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in rolling]] = False
         self._origin = np.zeros(3)
         # the Handler is this object's own: its arrays stay where they are
-        places = self._contacts.value.reshape(-1, 3)
-        self._turn_back = partial(
-            filter_kernel.turn_back, places, self._origin, self._contacts.jacobian, self.arms, self.jacobian
-        )
+        measured = self._contacts.value.reshape(-1, 3), self._origin, self._contacts.jacobian
+        self._turn_back = partial(filter_kernel.turn_back, *measured, self.arms, self.jacobian)
         self.ground = _Ground([each for each in made if isinstance(each, RollingContact)])
         self._forces = np.zeros(count)
         self.position = robot.state.position[6:]
