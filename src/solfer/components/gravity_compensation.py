@@ -61,7 +61,8 @@ class GravityCompensation(Component):
         self._rows: Handler[Point] = Handler(
             contact if contact.holds_a_point else ContactConstraint(contact) for contact in self._contacts.values()
         )
-        self._none = np.zeros((0, robot.size))
+        # the Handler is this component's own: its arrays stay where they are
+        self._jacobian = self._rows.jacobian if self._contacts else np.zeros((0, robot.size))
         self._carrying = CarryingTorques(robot.dynamics, free)
         robot.dynamics.subscribe(BIAS)
         self._gains = configured_gains(robot, self.tags.gains)
@@ -94,11 +95,9 @@ class GravityCompensation(Component):
     def update(self) -> None:
         """Compute the torques of this cycle."""
         self._desired_positions.read()
-        jacobian = self._none
-        if len(self._rows):
+        if self._contacts:
             self._rows.update()
-            jacobian = self._rows.jacobian
-        np.copyto(self._torque, self._carrying.update(jacobian))
+        np.copyto(self._torque, self._carrying.update(self._jacobian))
         if self._left > 0.0:
             self._left = max(self._left - self.time_step, 0.0)
             u = 1.0 - self._left / self._fade

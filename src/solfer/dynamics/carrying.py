@@ -5,6 +5,7 @@ from scipy.linalg import lapack
 
 from solfer.dynamics.carrying_kernel import CARRYING, bear, carry
 from solfer.dynamics.dynamic_model import DynamicModel
+from solfer.dynamics.elements import BIAS
 from solfer.errors import SizeMismatch
 from solfer.numerics.blocks import MemoryBlock
 from solfer.numerics.solvers.null_space import RANK_TOLERANCE
@@ -46,6 +47,7 @@ class CarryingTorques:
         size = model.robot.kinematics.size
         count = len(free)
         self.model = model
+        self._bias = model.bias
         self.torque = np.zeros(size)
         self.rank = self.carried = 0
         self._held = np.zeros((count, count))
@@ -74,7 +76,8 @@ class CarryingTorques:
         Raises:
             SizeMismatch: `jacobian` has another shape.
         """
-        bias = self.model.bias
+        self.model.manager.use(BIAS)
+        bias = self._bias
         size = len(self.torque)
         if jacobian.ndim != 2 or jacobian.shape[1] != size or len(jacobian) > size:
             raise SizeMismatch(f"a matrix of shape {jacobian.shape}, expected (k, {size}), k <= {size}")

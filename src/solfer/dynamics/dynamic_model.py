@@ -6,6 +6,7 @@ from operator import itemgetter
 from typing import Protocol
 
 from solfer.dynamics.elements import BIAS, INERTIA, Elements
+from solfer.dynamics.kernel import PLACE, WITH_BIAS, WITH_INERTIA
 from solfer.dynamics.recursion import Recursion
 from solfer.model.view import RobotView
 
@@ -27,7 +28,9 @@ class DynamicModel(Elements):
         self._bias = self._recursion.bias
         self._inertia = self._recursion.inertia
         self._inertia_inverse = self._recursion.inertia_inverse
-        super().__init__(self.stamp)
+        super().__init__(
+            self.stamp, partial(self._compute, WITH_BIAS), partial(self._compute, WITH_INERTIA), self._compute_inverse
+        )
 
     def update(self) -> None:
         """Bring the robot up to date, and compute what is subscribed and stale."""
@@ -39,21 +42,12 @@ class DynamicModel(Elements):
         inputs = ("position", "velocity") if name == BIAS else ("position",)
         return partial(itemgetter(*inputs), self.robot.state.versions)
 
-    def _place(self) -> None:
-        """Move the bodies to their places in the state; part of every element, and done once for all."""
+    def _compute(self, parts: int) -> None:
+        """Compute bias force or inertia; the bodies move to their places in the state once for all elements."""
         self.robot.update()
         version = self.robot.state.versions["position"]
-        if version != self._placed:
-            self._recursion.place()
-            self._placed = version
-
-    def _compute_bias(self) -> None:
-        self._place()
-        self._recursion.compute_bias()
-
-    def _compute_inertia(self) -> None:
-        self._place()
-        self._recursion.compute_inertia()
+        self._recursion.compute(parts if version == self._placed else parts | PLACE)
+        self._placed = version
 
     def _compute_inverse(self) -> None:
         self.manager.refresh(INERTIA)

@@ -1,6 +1,5 @@
 """Base class of all dynamic models: three elements that are computed when they are used and stale."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 
 import numpy as np
@@ -17,11 +16,17 @@ INERTIA_INVERSE = "inertia_inverse"
 """The same of its inverse."""
 
 
-class Elements(ABC):
+class Elements:
     """Bias force, inertia and its inverse of a model; a subclass computes them into arrays of its own.
 
     Each is computed at most once for a state: what is subscribed by `update`, the rest at its first use. Arrays are
     live: they hold until the state changes and must not be written to.
+
+    Args:
+        stamp: Returns for the name of an element what returns the stamp of its inputs, see `UpdateManager.add`.
+        bias: Writes the bias force.
+        inertia: Writes the inertia.
+        inverse: Writes its inverse.
 
     Attributes:
         manager: Counts what is subscribed and what was computed.
@@ -31,11 +36,17 @@ class Elements(ABC):
     _inertia: np.ndarray
     _inertia_inverse: np.ndarray
 
-    def __init__(self, stamp: Callable[[str], Callable[[], Hashable]]):
+    def __init__(
+        self,
+        stamp: Callable[[str], Callable[[], Hashable]],
+        bias: Callable[[], None],
+        inertia: Callable[[], None],
+        inverse: Callable[[], None],
+    ):
         self.manager = UpdateManager()
-        self.manager.add(BIAS, self._compute_bias, stamp(BIAS))
-        self.manager.add(INERTIA, self._compute_inertia, stamp(INERTIA))
-        self.manager.add(INERTIA_INVERSE, self._compute_inverse, stamp(INERTIA_INVERSE))
+        self.manager.add(BIAS, bias, stamp(BIAS))
+        self.manager.add(INERTIA, inertia, stamp(INERTIA))
+        self.manager.add(INERTIA_INVERSE, inverse, stamp(INERTIA_INVERSE))
 
     def subscribe(self, calls: Calls) -> None:
         """See `UpdateManager.subscribe`."""
@@ -62,15 +73,3 @@ class Elements(ABC):
         """Inverse of the inertia matrix."""
         self.manager.use(INERTIA_INVERSE)
         return self._inertia_inverse
-
-    @abstractmethod
-    def _compute_bias(self) -> None:
-        """Write `bias`."""
-
-    @abstractmethod
-    def _compute_inertia(self) -> None:
-        """Write `inertia`."""
-
-    @abstractmethod
-    def _compute_inverse(self) -> None:
-        """Write `inertia_inverse`."""

@@ -8,13 +8,51 @@ Source: R. Featherstone, "Rigid Body Dynamics Algorithms", 2008: tables 5.1 and 
 
 import math
 
-from solfer.numerics.compilation import REORDERED, cached
+from solfer.numerics.blocks import BlockLayout
+from solfer.numerics.compilation import REORDERED, cached, part
+
+# what is to be computed, as a sum
+PLACE = 1
+"""The inertias of the bodies in world axes, which the others need after each change of positions."""
+
+WITH_BIAS = 2
+"""The bias force."""
+
+WITH_INERTIA = 4
+"""The inertia matrix."""
+
+BODIES = BlockLayout(
+    "Bodies",
+    size=int,
+    # the tree: see `KinematicTree`; the parent of each body
+    joints=(float, "size", 6),
+    placements=(float, "size + 1", 12),
+    velocity=(float, "size"),
+    masses=(float, "size + 1"),
+    levers=(float, "size + 1", 3),
+    inertias=(float, "size + 1", 3, 3),
+    armature=(float, "size"),
+    parents=(int, "size"),
+    gravity=(float, 3),
+    # inertias of a body alone, and of all that it carries; its velocity and acceleration; the force on it
+    spatial=(float, "size", 10),
+    composite=(float, "size", 10),
+    motion=(float, "size", 12),
+    force=(float, "size", 6),
+    # results
+    bias=(float, "size"),
+    inertia=(float, "size", "size"),
+)
+"""What `compute` reads and writes."""
+
+_bodies_at = BODIES.at
 
 _MATRIX = "float64[:, ::1]"
 _NUMBERS = "float64[::1]"
 _INDICES = "int64[::1]"
 
 
+@part
 def _place(placements, masses, levers, inertias, spatial):
     """Write the spatial inertia of each body: mass, mass times centre, and xx, yy, zz, xy, xz, yz about the origin."""
     for k in range(len(spatial)):
@@ -47,6 +85,7 @@ def _place(placements, masses, levers, inertias, spatial):
                 out[9] += ay * entry * bz
 
 
+@part
 def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
     """Write the bias force: the recursive Newton-Euler algorithm without accelerations of the DoFs.
 
@@ -152,6 +191,7 @@ def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
                 force[above, i] += needed[i]
 
 
+@part
 def _inertia(joints, parents, spatial, composite, inertia):
     """Write both triangles of the inertia matrix: the composite-rigid-body algorithm. Zeros are not written."""
     composite[:] = spatial
@@ -184,6 +224,22 @@ def _inertia(joints, parents, spatial, composite, inertia):
         if above >= 0:
             for i in range(10):
                 composite[above, i] += body[i]
+
+
+def _compute(start, parts):
+    """Compute bodies, bias force and inertia matrix with the rotors; `parts` is a sum of PLACE and what follows it."""
+    bodies = _bodies_at(start)
+    joints = bodies.joints
+    parents = bodies.parents
+    spatial = bodies.spatial
+    if parts & PLACE:
+        _place(bodies.placements, bodies.masses, bodies.levers, bodies.inertias, spatial)
+    if parts & WITH_BIAS:
+        _bias(joints, bodies.velocity, parents, spatial, bodies.gravity, bodies.motion, bodies.force, bodies.bias)
+    if parts & WITH_INERTIA:
+        _inertia(joints, parents, spatial, bodies.composite, bodies.inertia)
+        for k in range(bodies.size):
+            bodies.inertia[k, k] += bodies.armature[k]
 
 
 def _inverse(inertia, parents, last, factor, roots, inverse):
@@ -237,11 +293,5 @@ def _inverse(inertia, parents, last, factor, roots, inverse):
     return -1
 
 
-place = cached(f"void({_MATRIX}, {_NUMBERS}, {_MATRIX}, float64[:, :, ::1], {_MATRIX})", _place, REORDERED)
-bias = cached(
-    f"void({_MATRIX}, {_NUMBERS}, {_INDICES}, {_MATRIX}, {_NUMBERS}, {_MATRIX}, {_MATRIX}, {_NUMBERS})",
-    _bias,
-    REORDERED,
-)
-inertia = cached(f"void({_MATRIX}, {_INDICES}, {_MATRIX}, {_MATRIX}, {_MATRIX})", _inertia, REORDERED)
+compute = cached("void(int64, int64)", _compute, REORDERED)
 inverse = cached(f"int64({_MATRIX}, {_INDICES}, {_INDICES}, {_MATRIX}, {_NUMBERS}, {_MATRIX})", _inverse, REORDERED)

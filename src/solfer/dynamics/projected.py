@@ -43,7 +43,12 @@ class ProjectedDynamics(Elements):
         self._factors = np.zeros(size * size)
         self._solutions = np.zeros(size * size)
         self._fit()
-        super().__init__(lambda name: self._with_constraints(model.stamp(name)))
+        super().__init__(
+            lambda name: self._with_constraints(model.stamp(name)),
+            self._compute_bias,
+            self._compute_inertia,
+            self._compute_inverse,
+        )
 
     @property
     def rank(self) -> int:

@@ -1,11 +1,14 @@
 """Dynamics of a kinematic tree, with the arrays that the kernels work on."""
 
+from functools import partial
+
 import numpy as np
 from scipy.linalg import lapack
 
 from solfer.dynamics import kernel
 from solfer.errors import ModelError
 from solfer.model.view import RobotView
+from solfer.numerics.blocks import MemoryBlock
 
 
 class _Branches:
@@ -34,28 +37,10 @@ class _Branches:
         self.products = np.sum((last - np.arange(size) + 1) ** 2)
 
 
-class _Bodies:
-    """What the kernels compute of each body.
-
-    Args:
-        size: Number n of bodies.
-
-    Attributes:
-        spatial, composite: Inertias of a body alone, and of all that it carries, shape (n, 10).
-        motion: Velocity and acceleration, shape (n, 12).
-        force: Shape (n, 6).
-    """
-
-    def __init__(self, size: int):
-        self.spatial, self.composite = np.zeros((2, size, 10))
-        self.motion = np.zeros((size, 12))
-        self.force = np.zeros((size, 6))
-
-
 class Recursion:
     """Bias force, inertia matrix and its inverse at the present kinematics of a robot; nothing is allocated.
 
-    `place` comes first after each change of positions, `compute_inertia` before `compute_inverse`.
+    Bodies have to be placed first after each change of positions, and the inertia comes before `compute_inverse`.
 
     Args:
         robot: The robot.
@@ -64,22 +49,22 @@ class Recursion:
         bias: Bias force, shape (n,) [Nm, N].
         inertia: Inertia matrix, shape (n, n) [kg, kg m, kg m^2].
         inertia_inverse: Its inverse, shape (n, n).
+        compute: compute(parts) computes a sum of `kernel.PLACE`, `WITH_BIAS` and `WITH_INERTIA`, and writes the last
+            two.
     """
 
     def __init__(self, robot: RobotView):
         self._robot = robot
         self._tree = robot.kinematics.tree
-        self._gravity = np.array(robot.kinematics.gravity)
         size = robot.kinematics.size
         self.bias = np.zeros(size)
         self.inertia, self.inertia_inverse = np.zeros((2, size, size))
         # entries that are always zero are not written: what is folded is not the array that the recursion writes
         self._folds = bool(self._tree.followers)
         self._unfolded = np.zeros((size, size)) if self._folds else self.inertia
-        self._diagonal = self._unfolded.reshape(-1)[:: size + 1]
-        self._has_rotors = bool(self._tree.armature.any())
         self._branches = _Branches(self._tree.parents[1:] - 1, self._folds)
-        self._bodies = _Bodies(size)
+        self._block = self._make_block(size)
+        self.compute = self._fold if self._folds else partial(kernel.compute, self._block.address)
         # when LAPACK inverts faster, measured by `benchmark/growth.py`: from some 30 joints in a row on, but not where
         # limbs branch off a base
         self._dense = self._branches.products > 3500 + 0.125 * size**3
@@ -87,34 +72,34 @@ class Recursion:
         self._factor = np.zeros((size, size), order="F" if self._dense else "C")
         self._roots = np.zeros(size)
 
-    def place(self) -> None:
-        """Compute the inertias of the bodies in world axes."""
+    def _make_block(self, size: int) -> MemoryBlock:
         tree = self._tree
-        kernel.place(tree.placements, tree.masses, tree.levers, tree.inertias, self._bodies.spatial)
-
-    def compute_bias(self) -> None:
-        """Write `bias`."""
-        bodies = self._bodies
-        kernel.bias(
-            self._tree.jacobian,
-            self._tree.velocity,
-            self._branches.parents,
-            bodies.spatial,
-            self._gravity,
-            bodies.motion,
-            bodies.force,
-            self.bias,
+        return MemoryBlock(
+            kernel.BODIES,
+            size=size,
+            joints=tree.jacobian,
+            placements=tree.placements,
+            velocity=tree.velocity,
+            masses=tree.masses,
+            levers=tree.levers,
+            inertias=tree.inertias,
+            armature=tree.armature,
+            parents=self._branches.parents,
+            gravity=np.array(self._robot.kinematics.gravity),
+            spatial=np.zeros((size, 10)),
+            composite=np.zeros((size, 10)),
+            motion=np.zeros((size, 12)),
+            force=np.zeros((size, 6)),
+            bias=self.bias,
+            inertia=self._unfolded,
         )
-        if self._folds:
-            self._tree.followers.fold(self.bias)
 
-    def compute_inertia(self) -> None:
-        """Write `inertia`."""
-        bodies = self._bodies
-        kernel.inertia(self._tree.jacobian, self._branches.parents, bodies.spatial, bodies.composite, self._unfolded)
-        if self._has_rotors:
-            self._diagonal += self._tree.armature
-        if self._folds:
+    def _fold(self, parts: int) -> None:
+        """Compute `parts`, and give what belongs to followers to their leaders."""
+        kernel.compute(self._block.address, parts)
+        if parts & kernel.WITH_BIAS:
+            self._tree.followers.fold(self.bias)
+        if parts & kernel.WITH_INERTIA:
             self.inertia[:] = self._unfolded
             self._tree.followers.fold_inertia(self.inertia)
 

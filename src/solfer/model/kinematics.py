@@ -241,7 +241,8 @@ class Kinematics:
         return np.union1d(columns, self.followers.leaders[np.isin(self.followers.dofs, columns)])
 
     def _update_frames(self, link: str) -> None:
-        self.frame(link)
+        if link not in self._frames:
+            self.frame(link)  # refuses it
         if not self._frames_are_current:
             pin.updateFramePlacements(self._model, self._data)
             self._frames_are_current = True

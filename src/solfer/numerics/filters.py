@@ -1,6 +1,7 @@
 """Low-pass filters for numbers that arrive once a cycle."""
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -8,11 +9,12 @@ from solfer.errors import ConfigError
 from solfer.numerics.compilation import cached
 
 
-def _filter_values(values, first, second, factors, started):
-    """Replace values by filtered ones (direct form II transposed); return whether the memory holds for the next."""
+def _filter_values(first, second, factors, started, values):
+    """Replace values by filtered ones (direct form II transposed), and note whether the memory holds for the next."""
     for i in range(len(values)):
         if not math.isfinite(values[i]):
-            return False
+            started[0] = False
+            return
     b0 = factors[0]
     b1 = factors[1]
     b2 = factors[2]
@@ -20,18 +22,18 @@ def _filter_values(values, first, second, factors, started):
     a2 = factors[4]
     for i in range(len(values)):
         value = values[i]
-        if not started:  # as if the input had always been this
+        if not started[0]:  # as if the input had always been this
             first[i] = value * (1.0 - b0)
             second[i] = value * (b2 - a2)
         filtered = b0 * value + first[i]
         first[i] = b1 * value - a1 * filtered + second[i]
         second[i] = b2 * value - a2 * filtered
         values[i] = filtered
-    return True
+    started[0] = True
 
 
 _V = "float64[::1]"
-filter_values = cached(f"boolean(float64[:], {_V}, {_V}, {_V}, boolean)", _filter_values)
+filter_values = cached(f"void({_V}, {_V}, {_V}, boolean[::1], float64[:])", _filter_values)
 
 
 class LowPass:
@@ -52,6 +54,8 @@ class LowPass:
     Attributes:
         factors: Numerator and denominator without its first number, shape (5,); live. Each mean of those of two filters
             makes a stable one with unit gain at zero frequency.
+        step: step(values) replaces the newest values, shape (n,), by the filtered ones, and allocates nothing. Values
+            that are not finite pass unchanged, and the filter starts again after them.
 
     Raises:
         ConfigError: The cut-off is not between zero and half of the rate, or the damping is not positive.
@@ -75,16 +79,9 @@ class LowPass:
             scale * (1.0 - 2.0 * damping * warped + warped * warped),
         )
         self.factors = np.array((*self.numerator, *self.denominator[1:]))
-        self._first, self._second = np.zeros((2, size))
-        self._started = False
+        self._started = np.zeros(1, dtype=bool)
+        self.step = partial(filter_values, *np.zeros((2, size)), self.factors, self._started)
 
     def reset(self) -> None:
         """Forget everything: the next values pass unchanged, as if the input had always had them."""
-        self._started = False
-
-    def step(self, values: np.ndarray) -> None:
-        """Replace the newest values, shape (n,), by the filtered ones. Allocates nothing.
-
-        Values that are not finite pass unchanged, and the filter starts again after them.
-        """
-        self._started = filter_values(values, self._first, self._second, self.factors, self._started)
+        self._started[:] = False

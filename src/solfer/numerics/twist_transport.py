@@ -8,6 +8,7 @@ against the base in the axes of the base, the base has
 """
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,27 +48,22 @@ class Carried:
         world: From the sensor's world to ours: rotation row by row, then shift [m], shape (12,).
         base: The six numbers of the base [m, rad], shape (6,).
         rates: Their rates [m/s, rad/s], shape (6,).
+        write: write(base, rates, options) computes as `update`, into the first six of other numbers.
+        update: update(options) computes `rates`, and `base` where a pose is given; without a pose, `base` is used as it
+            is. The options are a sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, CONTINUOUS.
     """
 
     def __init__(self, base_chart: BaseChart, values: np.ndarray, mount: np.ndarray):
-        self._values = values
-        self._mount = mount
         self.base = np.zeros(6)
         self.rates = np.zeros(6)
         self.world = np.concatenate((np.eye(3).ravel(), np.zeros(3)))
-        self._chart = np.concatenate((base_chart.rotation.ravel(), base_chart.position))
+        self.write = partial(_update, values, mount, self.world, numbers_of(base_chart))
+        self.update = partial(self.write, self.base, self.rates)
 
-    def update(self, options: int) -> None:
-        """Compute `rates`, and `base` where a pose is given; without a pose, `base` is used as it is.
 
-        Args:
-            options: Sum of FROM_POSE, FROM_TWIST, OWN_AXES, WITH_ORIENTATION, CONTINUOUS.
-        """
-        self.write(options, self.base, self.rates)
-
-    def write(self, options: int, base: np.ndarray, rates: np.ndarray) -> None:
-        """Compute as `update`, into the first six of other numbers."""
-        _update(self._values, self._mount, self.world, self._chart, base, rates, options)
+def numbers_of(base_chart: BaseChart) -> np.ndarray:
+    """Return rotation and position of a chart one after the other, shape (12,)."""
+    return np.concatenate((base_chart.rotation.ravel(), base_chart.position))
 
 
 # In the kernel a matrix is nine numbers, row by row.
@@ -178,6 +174,8 @@ class BaseKinematics:
         rotation: Rotation from the base to the world, shape (3, 3).
         position: Its position, shape (3,) [m].
         velocity: Linear, then angular velocity in world axes, shape (6,) [m/s, rad/s].
+        update: update(base, rates) computes them of the six numbers [m, rad] and their rates, which may be the first
+            ones of longer arrays.
     """
 
     def __init__(self, base_chart: BaseChart):
@@ -185,14 +183,10 @@ class BaseKinematics:
         self.rotation = self._numbers[:9].reshape(3, 3)
         self.position = self._numbers[9:12]
         self.velocity = self._numbers[12:]
-        self._chart = np.concatenate((base_chart.rotation.ravel(), base_chart.position))
-
-    def update(self, base: np.ndarray, rates: np.ndarray) -> None:
-        """Compute them of the six numbers [m, rad] and their rates, which may be the first ones of longer arrays."""
-        _move(base, rates, self._chart, self._numbers)
+        self.update = partial(_move, numbers_of(base_chart), self._numbers)
 
 
-def move(base, rates, origin, out):
+def move(origin, out, base, rates):
     """Compute pose and twist of the base; see `BaseKinematics`."""
     out[:9] = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
     out[9:12] = _rotated(origin, base[:3]) + origin[9:12]

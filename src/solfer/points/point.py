@@ -2,6 +2,7 @@
 
 import abc
 from collections.abc import Iterable
+from operator import attrgetter
 from typing import NoReturn, Protocol, Union
 from weakref import WeakSet
 
@@ -71,7 +72,12 @@ class Point(abc.ABC):
     Attributes:
         space: Space of the value.
         robot: The Robot, or None.
+        value: Value as of the last `update`, shape (size,); live.
+        jacobian: Jacobian as of the last `update` with Jacobian, shape (rows, cols); live.
     """
+
+    value: np.ndarray = property(attrgetter("_value"))  # type: ignore[assignment]  # read in each cycle
+    jacobian: np.ndarray = property(attrgetter("_jacobian"))  # type: ignore[assignment]
 
     __array_ufunc__ = None  # an array minus a point is a Minus, too
 
@@ -84,16 +90,6 @@ class Point(abc.ABC):
         self._flags = np.zeros(2, dtype=np.int64)
         self._is_overwritten = False
         self._layout = Layout()
-
-    @property
-    def value(self) -> np.ndarray:
-        """Value as of the last `update`, shape (size,); live."""
-        return self._value
-
-    @property
-    def jacobian(self) -> np.ndarray:
-        """Jacobian as of the last `update` with Jacobian, shape (rows, cols); live."""
-        return self._jacobian
 
     @property
     def size(self) -> int:

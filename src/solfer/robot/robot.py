@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,14 +39,12 @@ class _Measured:
 
     Attributes:
         position, velocity: Numbers that the kinematics were computed at.
-        updates: How often they were computed.
         points: The points that every Robot has.
     """
 
     def __init__(self, robot: "Robot", contacts: Sequence[ContactRecord]):
         self._robot = robot
         self.position = self.velocity = b""
-        self.updates = 0
         self.points = RobotPoints(robot, contacts)
 
     @cached_property
@@ -90,7 +89,20 @@ class Robot:
         is_whole: Whether no other part of the robot has links with masses that this one lacks.
         actuated: Indices of the DoFs that have a drive: of those that the actuators' file lists, or without a file all
             but those of a floating base, shape (m,).
+        center_of_mass: Centre of mass in the world as of the last `update` [m].
+        contacts: Contacts with the ground as of the last `update`: their positions [m] and the reaction forces there
+            [N].
+        center_of_pressure: Centre of pressure of the contacts as of the last `update`, for the forces that they have
+            now [m]; a PointError where the robot has no contacts.
+        dynamics: Dynamics of the measured state, one model for all users of this Robot (section 1.2 of the paper).
     """
+
+    center_of_mass: "CenterOfMass" = property(attrgetter("_measured.points.center_of_mass"))  # type: ignore[assignment]
+    contacts: "Contacts" = property(attrgetter("_measured.points.contacts"))  # type: ignore[assignment]
+    center_of_pressure: "CenterOfPressure" = property(  # type: ignore[assignment]
+        attrgetter("_measured.points.center_of_pressure")
+    )
+    dynamics: "DynamicModel" = property(attrgetter("_measured.dynamics"))  # type: ignore[assignment]
 
     def __init__(
         self,
@@ -215,30 +227,6 @@ class Robot:
         """Acceleration of gravity in the world, shape (3,) [m/s^2]."""
         return self.kinematics.gravity
 
-    @property
-    def center_of_mass(self) -> "CenterOfMass":
-        """Centre of mass in the world as of the last `update` [m]."""
-        return self._measured.points.center_of_mass(self._measured.updates)
-
-    @property
-    def contacts(self) -> "Contacts":
-        """Contacts with the ground as of the last `update`: their positions [m] and the reaction forces there [N]."""
-        return self._measured.points.contacts(self._measured.updates)
-
-    @property
-    def center_of_pressure(self) -> "CenterOfPressure":
-        """Centre of pressure of the contacts as of the last `update`, for the forces that they have now [m].
-
-        Raises:
-            PointError: The robot has no contacts.
-        """
-        return self._measured.points.center_of_pressure(self._measured.updates)
-
-    @property
-    def dynamics(self) -> "DynamicModel":
-        """Dynamics of the measured state, one model for all users of this Robot (section 1.2 of the paper)."""
-        return self._measured.dynamics
-
     def dof(self, name: str) -> int:
         """Return the index of a DoF; an UnknownName if there is none of that name."""
         if name not in self._places:
@@ -282,13 +270,12 @@ class Robot:
         if not (moved or accelerated):
             return False
         self.kinematics.update(self._position, self._velocity)
-        if moved and accelerated:
-            self.state.touch("position", "velocity")
-        else:
-            self.state.touch("position" if moved else "velocity")
+        versions = self.state.versions
+        versions["position"] += moved
+        versions["velocity"] += accelerated
         measured.position = position
         measured.velocity = velocity
-        measured.updates += 1
+        measured.points.updates += 1
         return True
 
     def follow(self) -> None:
@@ -304,7 +291,7 @@ class Robot:
             elements of dynamics that were not requested are left out.
         """
         measured = self._measured
-        counts = {"kinematics": measured.updates, **measured.points.computed}
+        counts = {"kinematics": measured.points.updates, **measured.points.computed}
         return counts | (measured.dynamics.manager.computations() if "dynamics" in vars(measured) else {})
 
     def observe(self, listener: Callable[[str], None]) -> list[End]:

@@ -19,6 +19,7 @@ class RobotPoints:
         contacts: Its contacts.
 
     Attributes:
+        updates: Number of the Robot's newest update; who updates it counts.
         computed: How often each of them was computed, by its name.
 
     Raises:
@@ -40,35 +41,39 @@ class RobotPoints:
         self._center_of_mass: CenterOfMass | None = None
         self._contacts: Contacts | None = None
         self._center_of_pressure: CenterOfPressure | None = None
+        self.updates = 0
         self._center_update = self._contacts_update = -1
         self.computed = dict.fromkeys(("center_of_mass", "contacts", "center_of_pressure"), 0)
 
-    def center_of_mass(self, update: int) -> "CenterOfMass":
-        """Return the centre of mass at the Robot's update number `update`."""
+    @property
+    def center_of_mass(self) -> "CenterOfMass":
+        """Centre of mass at the Robot's newest update."""
         if self._center_of_mass is None:
             # the compiled kernel behind points takes a while to load
             from solfer.points import CenterOfMass
 
             self._center_of_mass = CenterOfMass(self._robot)
-        if self._center_update != update:
+        if self._center_update != self.updates:
             self.compute("center_of_mass", self._center_of_mass)
-            self._center_update = update
+            self._center_update = self.updates
         return self._center_of_mass
 
-    def contacts(self, update: int) -> "Contacts":
-        """Return the contacts at the Robot's update number `update`."""
+    @property
+    def contacts(self) -> "Contacts":
+        """Contacts at the Robot's newest update."""
         if self._contacts is None:
             from solfer.robot.contacts import Contacts
 
             self._contacts = Contacts(self._robot, self._records)
-        if self._contacts_update != update:
+        if self._contacts_update != self.updates:
             self.compute("contacts", self._contacts)
-            self._contacts_update = update
+            self._contacts_update = self.updates
         return self._contacts
 
-    def center_of_pressure(self, update: int) -> "CenterOfPressure":
-        """Return the centre of pressure at the Robot's update number `update`, for the contacts' present forces."""
-        contacts = self.contacts(update)
+    @property
+    def center_of_pressure(self) -> "CenterOfPressure":
+        """Centre of pressure at the Robot's newest update, for the contacts' present forces."""
+        contacts = self.contacts
         if self._center_of_pressure is None:
             from solfer.points import CenterOfPressure
 

@@ -1,5 +1,7 @@
 """Tasks of strict priority by null spaces."""
 
+from functools import partial
+
 import numpy as np
 
 from solfer.numerics.blocks import MemoryBlock
@@ -20,6 +22,7 @@ class Descent:
             term, shape (levels,); empty without checks.
         basis: Orthonormal rows that span those of the levels but the last, with zeros for dependent ones, shape
             (rows, n).
+        update: Computes all levels at the last update of the stack.
     """
 
     def __init__(self, stack: Stack, checks: bool):
@@ -48,10 +51,7 @@ class Descent:
             reached=self.reached,
             slopes=self.slopes,
         )
-
-    def update(self) -> None:
-        """Compute all levels at the last update of the stack."""
-        descend(self._block.address)
+        self.update = partial(descend, self._block.address)
 
 
 class Hierarchy:

@@ -39,11 +39,15 @@ class Inequalities:
                 raise SizeMismatch(
                     f"a matrix of {constraint.matrix.shape[1]} columns for {size} DoFs", where=constraint.where
                 )
-        self._constraints = tuple(constraints)
         rows = sum(constraint.rows for constraint in constraints)
         self.matrix = np.zeros((rows, size))
         self.lower = np.zeros(rows)
         self.upper = np.zeros(rows)
+        ends = np.cumsum([constraint.rows for constraint in constraints]).tolist()
+        self._constraints = tuple(
+            (one, self.matrix[end - one.rows : end], self.lower[end - one.rows : end], self.upper[end - one.rows : end])
+            for one, end in zip(constraints, ends, strict=True)
+        )
         self.weights = np.array(
             [np.inf if one.weight is None else one.weight for one in constraints for _ in range(one.rows)], dtype=float
         )
@@ -57,13 +61,11 @@ class Inequalities:
 
     def update(self) -> None:
         """Compute all constraints at the state of the last update of the Robot."""
-        start = 0
-        for constraint in self._constraints:
+        for constraint, matrix, lower, upper in self._constraints:
             constraint.update()
-            rows = slice(start, start + constraint.rows)
-            self.matrix[rows] = constraint.matrix
-            self.lower[rows], self.upper[rows] = constraint.lower, constraint.upper
-            start = rows.stop
+            matrix[:] = constraint.matrix
+            lower[:] = constraint.lower
+            upper[:] = constraint.upper
 
 
 class QpLevel:

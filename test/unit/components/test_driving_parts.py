@@ -59,7 +59,7 @@ def test_only_moved_joints_are_commanded():
     joints.start(np.full(4, 0.5))
     joints.integrate(np.array([1.0, 2.0, -3.0, 4.0]), 0.1, np.zeros(4))
     command = SimpleNamespace(position=np.zeros(4), velocity=np.zeros(4))
-    joints.send(command)
+    joints.send(command.position, command.velocity)
     assert_allclose(command.position, (0.0, 0.7, 0.2, 0.0))
     assert_allclose(command.velocity, (0.0, 2.0, -3.0, 0.0))
     joints.stop(command)

@@ -215,7 +215,7 @@ def test_a_simulation_slower_than_real_time_has_one_clock(speed):
         stamp = 1.0 + 0.001 * step
         clock += 0.001 / (speed if (step // 4000) % 2 else 1.0) + (0.5 if draw.uniform() < 5e-4 else 0.0)
         if step % 5 == 0:
-            joints.begin_cycle()
+            joints.before = joints.newest
             assert joints.accepts(stamp, clock + draw.uniform(0.0, 0.02), 0.0, "")
         if step % 2 == 0 and step:
             assert imu.accepts(stamp - 0.001, clock + draw.uniform(0.0, 0.02), 0.0, "")
@@ -227,7 +227,7 @@ def test_what_arrives_together_after_a_gap_has_one_clock():
     joints = StampCheck()
     imu = StampCheck(joints)
     assert joints.accepts(1.0, 0.0, 0.0, "") and imu.accepts(1.0, 0.0, 0.0, "")
-    joints.begin_cycle()
+    joints.before = joints.newest
     assert all(joints.accepts(1.0 + 0.005 * step, 0.5, 0.0, "") for step in range(1, 100))
     assert all(imu.accepts(1.0 + 0.002 * step, 0.5, 0.0, "") for step in range(1, 250))
 
@@ -238,7 +238,7 @@ def test_what_has_waited_for_the_start_has_one_clock(ahead, warning):
     joints = StampCheck()
     imu = StampCheck(joints)
     for check in (joints, imu):
-        check.begin_cycle()
+        check.before = check.newest
     times = 7.0 + 0.005 * np.arange(80)
     assert all(joints.accepts(float(time), float(time) - 6.999, 0.0, "") for time in times)
     accepted = [imu.accepts(float(time) + ahead, float(time) - 6.999, 0.0, "imu") for time in times]
@@ -257,7 +257,7 @@ def test_an_imu_whose_clock_is_set_counts_as_another():
     assert all(imu.accepts(0.997 + 0.002 * step, 0.002 * step, -math.inf, "") for step in range(500))
     assert joints.accepts(1.998, 0.998, -math.inf, "")
     for time in 1.0 + 0.002 * np.arange(200):
-        joints.begin_cycle()
+        joints.before = joints.newest
         assert joints.accepts(1.0 + time, time, -math.inf, "")
         assert not imu.accepts(0.797 + time, time, -math.inf, "imu")
     assert imu.refused["of another clock"] == pytest.approx(100, abs=1) and imu.warning.startswith("a stamp of imu is")

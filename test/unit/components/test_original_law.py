@@ -10,7 +10,7 @@ from support.estimation import part
 from support.robots import centauro
 
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.kernel import steer
+from solfer.components.wheeled_motion.kernel import find_errors
 from solfer.config import load
 
 PERIOD, LOWER, CLOSE = 0.005, 30, 1e-6  # [s], DoFs of the base and the legs, [rad]
@@ -143,7 +143,7 @@ def test_directions_turn_round_as_those_of_the_equations(component):
         component.references.vertex_velocity[:, :2] = velocities[:, None].view(float)
         component.wheels.offsets.errors[:, :2] = errors[:, None].view(float)
         steering.before[:2] = pose[:2] - (way, 0.0)
-        steer(component.tasks.numbers.address)
+        find_errors(component.tasks.numbers.address, True)
         angles = [wheel.update(*each, way / PERIOD) for wheel, *each in zip(plain, velocities, errors, strict=True)]
         found.append(np.abs(steering.angles - angles))
     assert np.max(found) <= 1e-9, f"in cycle {np.argmax(np.max(found, axis=1) > 1e-9)}"

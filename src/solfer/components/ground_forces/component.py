@@ -31,7 +31,7 @@ class GroundForces(Component):
 
     The method `projection` computes the forces that keep the contacts in place, or rolling, as the paper does
     (`ContactForces`). They may pull, and forces that the constraints do not allow for are forced upon them. The method
-    `weighted` takes those that explain the torques best (`WeightedForces` of a `MomentumObserver`): a wheel in the air
+    `weighted` takes those that explain the torques best (`WeightedForces`): a wheel in the air
     gets none, whatever its constraint, and what is left at the base is a push from outside.
 
     The State has two interfaces more: `bias_force`, J^T f - h, and `overall_force`, to which the torques are added: the
@@ -132,6 +132,7 @@ class GroundForces(Component):
         robot = self.model
         tags = self.tags
         robot.dynamics.subscribe(BIAS)
+        self._bias = robot.dynamics.bias
         if tags.method == "projection":
             return ProjectedLaw(self._pushed.contacts, self._torque)
         return WeightedLaw(robot, self._pushed, self._torque, tags=tags)
@@ -238,7 +239,8 @@ class GroundForces(Component):
             pushed.ports[index].value[:] = forces[index]
         self.checks.add(forces)
         np.dot(forces.reshape(-1), pushed.jacobian, out=self._bias_force)
-        self._bias_force -= self.model.dynamics.bias
+        self.model.dynamics.manager.use(BIAS)
+        self._bias_force -= self._bias
         np.add(self._bias_force, self._torque, out=self._overall_force)
         self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value
         self.outputs["external_wrench"].value[:] = self.law.push

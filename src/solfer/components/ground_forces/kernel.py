@@ -1,8 +1,13 @@
 """Compiled steps of the parts of `GroundForces`, number by number. Arrays are described there."""
 
+from pathlib import Path
+
+from solfer.numerics import base_chart
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, part
+from solfer.numerics.compilation import cached, exact_part, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
+
+_moment_of = exact_part(base_chart.moment_of)
 
 
 @part
@@ -20,7 +25,8 @@ def _normal_matrix(jacobian, weights, columns, diagonal, factor):
     cholesky(factor)
 
 
-def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
+@exact_part
+def _fit(weights, columns, diagonal, factor, forces, rest, jacobian, world):
     """Write the forces that explain the world best, and what they leave."""
     _normal_matrix(jacobian, weights, columns, diagonal, factor)
     for i in range(len(forces)):
@@ -36,6 +42,7 @@ def _fit(jacobian, world, weights, columns, diagonal, factor, forces, rest):
             rest[column] -= jacobian[i, column] * forces[i]
 
 
+@exact_part
 def _observe(bias, torque, inertia, velocity, before, period, coefficient, value):
     """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference."""
     count = len(value)
@@ -46,6 +53,65 @@ def _observe(bias, torque, inertia, velocity, before, period, coefficient, value
         value[i] += coefficient * (world - value[i])
     for i in range(count):
         before[i] = velocity[i]
+
+
+EXPLANATION = BlockLayout(
+    "Explanation",
+    row_count=int,
+    dofs=int,
+    # dynamics and torques, whether accelerations count, and what the world does
+    bias=(float, "dofs"),
+    torque=(float, "dofs"),
+    observes=int,
+    inertia=(float, "dofs", "dofs"),
+    velocity=(float, "dofs"),
+    before=(float, "dofs"),
+    world=(float, "dofs"),
+    # the same with offsets, and the forces that explain it best
+    offsets=(float, "dofs"),
+    corrected=(float, "dofs"),
+    jacobian=(float, "row_count", "dofs"),
+    weights=(float, "dofs"),
+    column_count=int,
+    columns=(int, "column_count"),
+    diagonal=float,
+    factor=(float, "row_count", "row_count"),
+    forces=(float, "row_count"),
+    rest=(float, "dofs"),
+    # what is left at a floating base, in the axes of its chart and in those of the world
+    is_floating=int,
+    position=(float, "dofs"),
+    rotation=(float, 3, 3),
+    push=(float, 6),
+)
+"""What `explain` reads and writes."""
+
+_explanation_at = EXPLANATION.at
+
+
+def _explain(start, period, coefficient):
+    """Write what the world does, the forces that explain it, and the push on the base; see `WeightedForces`."""
+    block = _explanation_at(start)
+    bias = block.bias
+    torque = block.torque
+    world = block.world
+    rest = block.rest
+    corrected = block.corrected
+    if block.observes:
+        _observe(bias, torque, block.inertia, block.velocity, block.before, period, coefficient, world)
+    else:
+        for i in range(block.dofs):
+            world[i] = bias[i] - torque[i]
+    for i in range(block.dofs):
+        corrected[i] = world[i] + block.offsets[i]
+    _fit(block.weights, block.columns, block.diagonal, block.factor, block.forces, rest, block.jacobian, corrected)
+    if block.is_floating:
+        moment = _moment_of(block.position[3], block.position[4], rest[3], rest[4], rest[5])
+        for axis in range(3):
+            block.push[axis] = block.push[3 + axis] = 0.0
+            for k in range(3):
+                block.push[axis] += block.rotation[axis, k] * rest[k]
+                block.push[3 + axis] += block.rotation[axis, k] * moment[k]
 
 
 def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
@@ -60,18 +126,18 @@ def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
             normal_forces[i] += normals[i, axis] * forces[i, axis]
 
 
-def _touch(forces, speeds, period, limits, touching, lifted, times):
+def _touch(limits, touching, lifted, times, forces, speeds, period):
     """Decide which contacts touch, see `Touch`.
 
     Args:
-        forces: Their normal forces [N].
-        speeds: Their speeds along the normal [m/s].
-        period: Time since the cycle before [s].
         limits: Force from which on one touches, below which it ends [N], time until it changes [s], and reduction of
             the force by the speed [Ns/m].
         touching: Which touch; written.
         lifted: Which are in the air for sure; written.
         times: For how long each was about to change, and has not touched [s]; written.
+        forces: Their normal forces [N].
+        speeds: Their speeds along the normal [m/s].
+        period: Time since the cycle before [s].
     """
     begin, end, delay, reduction = limits
     for i in range(len(forces)):
@@ -89,7 +155,9 @@ OFFSETS = BlockLayout(
     "Offsets",
     row_count=int,
     dofs=int,
-    jacobian=(float, "row_count", "dofs"),
+    # weights while nothing pushes the base, and while something does
+    calm=(float, "dofs"),
+    pushed=(float, "dofs"),
     # columns that count, the first of them that is a joint, and a number on the diagonal of J S J^T
     column_count=int,
     columns=(int, "column_count"),
@@ -104,7 +172,9 @@ OFFSETS = BlockLayout(
     information=(float, "size", "size"),
     moments=(float, "size"),
     offsets=(float, "size"),
-    # work space
+    value=(float, "dofs"),  # those of all DoFs
+    # work space: the Jacobian of contacts that are not lifted
+    jacobian=(float, "row_count", "dofs"),
     factor=(float, "row_count", "row_count"),
     spread=(float, "size", "row_count"),
     needed=(float, "row_count"),
@@ -115,10 +185,14 @@ OFFSETS = BlockLayout(
 _offsets_at = OFFSETS.at
 
 
-def _learn(start, world, weights):
+def _learn(start, contacts, world, lifted, pushed):
     """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     block = _offsets_at(start)
+    weights = block.pushed if pushed else block.calm
     jacobian = block.jacobian
+    for i in range(block.row_count):
+        for k in range(block.dofs):
+            jacobian[i, k] = 0.0 if lifted[i // 3] else contacts[i, k]
     columns = block.columns
     fraction = block.fraction
     decay = block.decay
@@ -155,21 +229,17 @@ def _learn(start, world, weights):
         offsets[a] = block.moments[a]
     forward(solved, offsets)
     backward(solved, offsets)
+    for a in range(block.size):
+        block.value[columns[block.first + a]] = offsets[a]
 
 
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
-_INDICES = "int64[::1]"
 
-fit = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR})",
-    _fit,
-    sources=[DENSE],
-)
-learn = cached(f"void(int64, {_VECTOR}, {_VECTOR})", _learn, sources=[DENSE])
-observe = cached(f"void({_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _observe)
+explain = cached("void(int64, float64, float64)", _explain, sources=[DENSE, Path(base_chart.__file__)])
+learn = cached(f"void(int64, {_MATRIX}, {_VECTOR}, boolean[::1], boolean)", _learn, sources=[DENSE])
 measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
 touch = cached(
-    f"void({_VECTOR}, {_VECTOR}, float64, {_VECTOR}, boolean[::1], boolean[::1], {_MATRIX})",
+    f"void({_VECTOR}, boolean[::1], boolean[::1], {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
     _touch,
 )

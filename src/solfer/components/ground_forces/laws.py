@@ -4,12 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.ground_forces.momentum import MomentumObserver
 from solfer.components.ground_forces.offsets import TorqueOffsets
 from solfer.components.ground_forces.pushed_contacts import PushedContacts
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.weighted_forces import WeightedForces
-from solfer.numerics.base_chart import moment_of
 from solfer.points.contact.contact_forces import ContactForces
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -72,26 +70,30 @@ class WeightedLaw:
 
     def __init__(self, robot: Robot, pushed: PushedContacts, torque: np.ndarray, tags: GroundForcesTags):
         contacts = pushed.contacts
-        self._robot = robot
         self._pushed = pushed
-        self._torque = torque
-        self._floating = robot.kinematics.base is not None
+        floating = robot.kinematics.base is not None
         deviations = np.full(robot.size, tags.torque_deviation)
-        if self._floating:
+        if floating:
             deviations[:6] = tags.push_deviation
-        self._world, self._forces = MomentumObserver(robot, tags.observer), WeightedForces(contacts, deviations)
-        self._corrected = np.zeros(robot.size)
-        self.push = np.zeros(6)
-        self._moment = np.zeros(3)
         self.offsets = None
         self._largest = 0.0
         if tags.offsets is not None:
-            self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, base=self._floating)
+            self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, base=floating)
             self._largest = tags.offsets.largest_push
+        self._forces = WeightedForces(
+            robot,
+            contacts,
+            deviations,
+            cut_off=tags.observer,
+            jacobian=pushed.jacobian,
+            torque=torque,
+            offsets=np.zeros(robot.size) if self.offsets is None else self.offsets.value,
+        )
+        self.push = self._forces.push
 
     def start(self, period: float) -> None:
         """Begin, not accelerated, with cycles of `period` [s]; known offsets stay."""
-        self._world.start(self._torque)
+        self._forces.start()
         if self.offsets is not None:
             self.offsets.start(period)
 
@@ -103,24 +105,9 @@ class WeightedLaw:
             lifted: Which contacts are in the air for sure, shape (k,).
             passed: Time since the last cycle [s].
         """
-        world = self._world.update(self._torque, passed)
-        if self.offsets is None:
-            forces = self._forces.update(jacobian, world)
-        else:
-            np.add(world, self.offsets.value, out=self._corrected)
-            forces = self._forces.update(jacobian, self._corrected)
-        self._pushed.write_forces(forces)
-        if self._floating:
-            self._write_push()
+        forces = self._forces
+        forces.update(passed)
+        self._pushed.write_forces(forces.value)
         if self.offsets is not None:
             x, y, z = self.push[:3].tolist()
-            self.offsets.update(jacobian, world, lifted, x * x + y * y + z * z > self._largest**2)
-
-    def _write_push(self) -> None:
-        """Turn the forces along the base's six numbers into a wrench."""
-        chart = self._robot.kinematics.base
-        rest = self._forces.rest
-        rx, ry = self._robot.state.position[3:5].tolist()
-        self._moment[:] = moment_of(rx, ry, *rest[3:6].tolist())
-        np.dot(chart.rotation, rest[:3], out=self.push[:3])
-        np.dot(chart.rotation, self._moment, out=self.push[3:])
+            self.offsets.update(jacobian, forces.world, lifted, x * x + y * y + z * z > self._largest**2)

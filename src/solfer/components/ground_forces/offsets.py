@@ -1,6 +1,7 @@
 """What torque sensors show where there is no torque, from the forces that nothing else explains."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -28,28 +29,31 @@ class TorqueOffsets:
 
     Attributes:
         value: The offsets, shape (n,), zero where none is estimated [Nm, N]; live.
+        update: update(jacobian, world, lifted, pushed) learns from a cycle. It takes the Jacobian of the contacts,
+            shape (3k, n); what the world seems to do along the DoFs by the torques as they are measured, shape (n,);
+            which contacts are in the air for sure, shape (k,); and whether something pushes the base.
     """
 
     def __init__(self, contacts: Sequence[Contact], deviations: np.ndarray, tags: OffsetTags, base: bool):
         rows = 3 * len(contacts)
         size = len(deviations)
         self._tags = tags
-        self._calm = deviations**-2
-        self._pushed = self._calm.copy()
+        calm = deviations**-2
+        pushed = calm.copy()
         if base:
-            self._calm[:6] = tags.push**-2
-            self._pushed[:6] = 0.0
+            calm[:6] = tags.push**-2
+            pushed[:6] = 0.0
         columns = weighed(contacts, deviations**-2)
         first = int(np.count_nonzero(columns < 6)) if base else 0
-        self._joints = columns[first:]
-        count = len(self._joints)
-        self._jacobian = np.zeros((rows, size))
-        self._offsets = np.zeros(count)
+        count = len(columns) - first
+        self.value = np.zeros(size)
         self._block = MemoryBlock(
             kernel.OFFSETS,
             row_count=rows,
             dofs=size,
-            jacobian=self._jacobian,
+            calm=calm,
+            pushed=pushed,
+            jacobian=np.zeros((rows, size)),
             column_count=len(columns),
             columns=columns,
             first=first,
@@ -57,13 +61,14 @@ class TorqueOffsets:
             size=count,
             information=np.zeros((count, count)),
             moments=np.zeros(count),
-            offsets=self._offsets,
+            offsets=np.zeros(count),
+            value=self.value,
             factor=np.zeros((rows, rows)),
             spread=np.zeros((count, rows)),
             needed=np.zeros(rows),
             solved=np.zeros((count, count)),
         )
-        self.value = np.zeros(size)
+        self.update = partial(kernel.learn, self._block.address)
 
     def start(self, period: float) -> None:
         """Begin with cycles of `period` [s]; what is known stays."""
@@ -71,19 +76,3 @@ class TorqueOffsets:
         record["fraction"] = period / self._tags.interval
         record["decay"] = period / self._tags.memory
         record["prior"] = self._tags.deviation**-2
-
-    def update(self, jacobian: np.ndarray, world: np.ndarray, lifted: np.ndarray, pushed: bool) -> None:
-        """Learn from a cycle.
-
-        Args:
-            jacobian: Of the contacts, shape (3k, n).
-            world: What the world seems to do along the DoFs by the torques as they are measured, shape (n,).
-            lifted: Which contacts are in the air for sure, shape (k,).
-            pushed: Whether something pushes the base.
-        """
-        np.copyto(self._jacobian, jacobian)
-        for index in range(len(lifted)):
-            if lifted[index]:
-                self._jacobian[3 * index : 3 * index + 3] = 0.0
-        kernel.learn(self._block.address, world, self._pushed if pushed else self._calm)
-        self.value[self._joints] = self._offsets

@@ -1,5 +1,7 @@
 """Which contacts touch the ground, with hysteresis."""
 
+from functools import partial
+
 import numpy as np
 
 from solfer.components.ground_forces import kernel
@@ -22,6 +24,8 @@ class Touch:
     Attributes:
         touching: Which contacts touch, shape (k,).
         lifted: Which have not touched for 0.1 s: they are in the air for sure, shape (k,).
+        update: update(forces, speeds, period) finds out both by normal forces [N] and speeds along the normal [m/s],
+            shape (k,) each, after `period` [s] more.
     """
 
     def __init__(self, count: int, above: float, below: float, delay: float, speed: float = 0.0):
@@ -29,6 +33,7 @@ class Touch:
         self.set(above, below, delay, speed=speed)
         self.touching, self.lifted = np.zeros((2, count), dtype=bool)
         self._times = np.zeros((2, count))
+        self.update = partial(kernel.touch, self._limits, self.touching, self.lifted, self._times)
 
     def set(self, above: float, below: float, delay: float, speed: float = 0.0) -> None:
         """Set when contacts touch, see above; those that touch do so until they end."""
@@ -39,14 +44,3 @@ class Touch:
         np.greater(forces, self._limits[0], out=self.touching)
         self._times[:] = 0.0
         self.lifted[:] = False
-
-    def update(self, forces: np.ndarray, speeds: np.ndarray, period: float) -> np.ndarray:
-        """Return which contacts touch after `period` [s] more.
-
-        Args:
-            forces: Their normal forces, shape (k,) [N].
-            speeds: Their speeds along the normal, shape (k,) [m/s].
-            period: See above.
-        """
-        kernel.touch(forces, speeds, period, self._limits, self.touching, self.lifted, self._times)
-        return self.touching

@@ -198,7 +198,7 @@ class FilteredOdometry:
         self._imu.rate_before[:] = base.angular
         self.ground.start_map()
         base.subtract_tilt(*kalman.tilt.tolist())
-        wheels.subtract_tilt(*kalman.tilt.tolist())
+        filter_kernel.subtract_tilt(wheels.arms, wheels.jacobian, *kalman.tilt.tolist())
         self.position[:] = 0.0, 0.0, -motion.mean_height()
         base.angular[:2] = 0.0
         self._motion.remember()
@@ -239,14 +239,12 @@ class FilteredOdometry:
         self._base.read(measured)
         motion.wheels.update(self._base.heading)
         self._imu.period = period
-        motion.find_step()
-        keep = REST_TIME / (REST_TIME + period)
-        moved, legs, sway = filter_kernel.joint_motion(motion.step, motion.wheels.legs, self._imu.sway, keep)
+        moved, legs, sway = motion.find_step(self._imu.sway, REST_TIME / (REST_TIME + period))
         shaken, sample = self._follow_imu(legs / period)
         if motion.feet is not None:
             self._push()
         self._weigh()
-        motion.measure(self._base.turned)
+        filter_kernel.measure_displacements(motion.block.address, self._base.turned)
         yaw, imu_time, unknown = self._measure_yaw()
         self._note_rest(moved, sway, imu_time)
         self.kalman.predict(
@@ -330,7 +328,8 @@ class FilteredOdometry:
         base.angular[1] = base.turned[1] / time
         base.turned[:2] -= imu.assumed
         imu.assumed[:] = 0.0
-        self._motion.wheels.subtract_tilt(*kalman.tilt.tolist())
+        wheels = self._motion.wheels
+        filter_kernel.subtract_tilt(wheels.arms, wheels.jacobian, *kalman.tilt.tolist())
         return shaken, sample
 
     def _push(self) -> None:

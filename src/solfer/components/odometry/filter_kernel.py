@@ -12,7 +12,7 @@ _rates_of = part(chart.rates_of)
 _rotation_of = part(chart.rotation_of)
 
 
-def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
+def _turn_back(places, origin, jacobian, arms, turned, cosine, sine):
     """Write arms and Jacobians in axes that are turned about the vertical, without the six columns of a base."""
     for i in range(len(places)):
         x = places[i, 0] - origin[0]
@@ -157,10 +157,11 @@ def _turn_twist(rotation, heading, covariance, turned, half, out):
                 out[i, k] += half[i, block + j] * turned[j, k - block]
 
 
-def _joint_motion(step, legs, sway, keep):
-    """Smooth the steps of the joints as `sway`; return the largest step of all, of legs, and the largest sway [rad]."""
+def _joint_motion(position, before, step, legs, sway, keep):
+    """Write the steps of the joints, and smooth them as `sway`; see `WheelMotion.find_step` for what it returns."""
     largest = largest_leg = largest_sway = 0.0
     for k in range(len(step)):
+        step[k] = position[k] - before[k]
         sway[k] = keep * sway[k] + (1.0 - keep) * step[k]
         largest = max(largest, abs(step[k]))
         largest_sway = max(largest_sway, abs(sway[k]))
@@ -555,9 +556,9 @@ _V = "float64[::1]"
 _M = "float64[:, ::1]"
 _B = "boolean[::1]"
 
-turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
+turn_back = cached(f"void({_M}, {_V}, {_M}, {_M}, {_M}, {_F}, {_F})", _turn_back)
 subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
-joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
+joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_V}, {_V}, {_B}, {_V}, {_F})", _joint_motion)
 mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_M}, {_M})", _mean_rate)
 measure_displacements = cached(f"void(int64, {_V})", _measure_displacements)
 measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)

@@ -1,6 +1,7 @@
 """The error-state Kalman filter of the base: wheels that roll, a gyroscope, and an IMU's tilt."""
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -104,6 +105,10 @@ class WheelInertialFilter:
         innovations: Innovation of each wheel's velocity, shape (k, 3) [m/s]; live.
         slide: Variance of the position after a metre by wheels that slide [m^2/m].
         pushed: What an accelerometer measures in the interval, see `push`, shape (5,); live.
+        write_covariances: Writes the covariances of the pose of the base's origin, in W, and of its twist, in H. Takes
+            the heading [rad]; the `arm`, see `predict`; the interval for which the angular velocity is a mean [s]; the
+            covariance of the velocity by the wheels in H, shape (3, 3) [m^2/s^2]; and where it writes those of position
+            and rotations, shape (6, 6) [m, rad], and of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
     """
 
     def __init__(
@@ -147,7 +152,7 @@ class WheelInertialFilter:
             half=half,
             pushed=self.pushed,
         )
-        self._address = self._block.address
+        self.write_covariances = partial(kernel.write_covariances, self._block.address, self._variances.noise)
         self._velocity_noise = 0.0
         self.start()
 
@@ -246,7 +251,7 @@ class WheelInertialFilter:
             FLOOR_DEVIATION**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
         )
         kernel.predict(
-            self._address,
+            self._block.address,
             _ORIGIN if arm is None else arm,
             heading,
             (yaw, tilt_yaw),
@@ -275,14 +280,11 @@ class WheelInertialFilter:
         """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
         if self._variances.tilt:
             variance = 2.0 * TILT_TIME_CONSTANT / time * self._variances.tilt
-            for which in (TILT, TILT + 1):
-                kernel.measure(self._address, which, 0.0, variance)
+            kernel.measure(self._block.address, TILT, _NO_TILT, variance)
 
     def rest(self, angular: np.ndarray, time: float) -> None:
         """Measure the bias about the base's first axes by the gyroscope at rest, in B, shape (2,) or (3,)."""
-        variance = self._variances.noise / time
-        for axis in range(len(angular)):
-            kernel.measure(self._address, GYRO_BIAS + axis, float(angular[axis]), variance)
+        kernel.measure(self._block.address, GYRO_BIAS, angular, self._variances.noise / time)
 
     def level(self, x: float, y: float) -> bool:
         """Measure the tilt by the plane through the contacts, which is turned about x and y of H by the IMU [rad].
@@ -290,7 +292,7 @@ class WheelInertialFilter:
         Returns:
             Whether it passes for level ground.
         """
-        return not self._variances.tilt or bool(kernel.level(self._address, x, y, PLANE_DEVIATION**2))
+        return not self._variances.tilt or bool(kernel.level(self._block.address, x, y, PLANE_DEVIATION**2))
 
     def allow_scrubbing(self, variance: float) -> None:
         """Let scrubbing have at least a variance [rad^2/s^2]."""
@@ -321,7 +323,7 @@ class WheelInertialFilter:
         """
         steps = height is not None
         kernel.correct(
-            self._address, speeds, arms, rate, covered, variances, inliers, height if steps else math.nan, steps
+            self._block.address, speeds, arms, rate, covered, variances, inliers, height if steps else math.nan, steps
         )
 
     def lose_velocity(self, variance: float) -> None:
@@ -351,40 +353,17 @@ class WheelInertialFilter:
         """
         x, y, _ = self.velocity.tolist()
         variances = (self.slide * math.hypot(x, y) * period, unknown, self._variances.walk * period)
-        kernel.integrate(self._address, heading, period, imu_time, variances)
+        kernel.integrate(self._block.address, heading, period, imu_time, variances)
 
     def settle_height(self, deviation: float) -> None:
         """Measure the height, which is as expected, with a standard deviation [m]."""
-        kernel.condition(self._address, 2, deviation * deviation)
+        kernel.condition(self._block.address, 2, deviation * deviation)
 
     @property
     def velocity_covariance(self) -> np.ndarray:
         """Covariance of v, shape (3, 3) [m^2/s^2]; a new array."""
         return np.ascontiguousarray(self.covariance[VELOCITY:GYRO_BIAS, VELOCITY:GYRO_BIAS])
 
-    def write_covariances(
-        self,
-        heading: float,
-        arm: np.ndarray,
-        period: float,
-        velocity: np.ndarray,
-        *,
-        pose: np.ndarray,
-        twist: np.ndarray,
-    ) -> None:
-        """Write the covariances of the pose of the base's origin, in W, and of its twist, in H.
-
-        Args:
-            heading: Heading [rad].
-            arm: From the base's origin to the ground point in H, shape (3,) [m].
-            period: Interval for which the angular velocity is a mean [s].
-            velocity: Covariance of the velocity by the wheels in H, shape (3, 3) [m^2/s^2].
-            pose: Of position and rotations, shape (6, 6) [m, rad].
-            twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
-        """
-        kernel.write_covariances(
-            self._address, heading, arm, self._variances.noise / period, velocity, pose, twist,
-        )  # fmt: skip
-
 
 _ORIGIN = np.zeros(3)
+_NO_TILT = np.zeros(2)

@@ -421,9 +421,11 @@ def _level(start, about_x, about_y, variance):
     return update_sum(kalman, TILT + 1, SLOPE + 1, about_y, variance, 0) and passes
 
 
-def _measure(start, which, measured, variance):
-    """Measure one number of the state; position is not corrected."""
-    return update_sum(_filter_at(start), which, -1, measured, variance, HEADING)
+def _measure(start, first, measured, variance):
+    """Measure numbers of the state from the `first` on, one after the other; position is not corrected."""
+    kalman = _filter_at(start)
+    for index in range(len(measured)):
+        update_sum(kalman, first + index, -1, measured[index], variance, HEADING)
 
 
 def _condition(start, which, variance):
@@ -439,13 +441,14 @@ def _condition(start, which, variance):
             covariance[i, k] -= column[i] * column[k] / spread
 
 
-def _write_covariances(start, heading, arm, white, velocity, pose, twist):
+def _write_covariances(start, density, heading, arm, period, velocity, pose, twist):
     """Write the covariances of a pose and of a twist; see `WheelInertialFilter.write_covariances`.
 
-    The angular velocity errs by the gyroscope's variance `white` and by its biases, and the base's origin moves by that
-    and by the arm. The velocity errs by its covariance, and leads uphill by the error of the tilt.
+    The angular velocity errs by the gyroscope's white noise with a `density` and by its biases, and the base's origin
+    moves by that and by the arm. The velocity errs by its covariance, and leads uphill by the error of the tilt.
     """
     kalman = _filter_at(start)
+    white = density / period
     errors = kalman.covariance
     ahead = kalman.state[VELOCITY]
     left = kalman.state[VELOCITY + 1]
@@ -501,6 +504,6 @@ predict = cached(f"void(int64, {_V}, {_F}, {_PAIR}, {_F}, {_PAIR}, UniTuple(floa
 correct = cached(f"void(int64, {_M}, {_M}, {_F}, {_F}, {_V}, boolean[::1], {_F}, boolean)", _correct, sources=[DENSE])
 integrate = cached(f"void(int64, {_F}, {_F}, {_F}, UniTuple(float64, 3))", _integrate)
 level = cached(f"boolean(int64, {_F}, {_F}, {_F})", _level)
-measure = cached(f"boolean(int64, int64, {_F}, {_F})", _measure)
+measure = cached(f"void(int64, int64, {_V}, {_F})", _measure)
 condition = cached(f"void(int64, int64, {_F})", _condition)
-write_covariances = cached(f"void(int64, {_F}, {_V}, {_F}, {_M}, {_M}, {_M})", _write_covariances)
+write_covariances = cached(f"void(int64, {_F}, {_F}, {_V}, {_F}, {_M}, {_M}, {_M})", _write_covariances)

@@ -1,5 +1,7 @@
 """How wheels and base move between two measurements of the joints."""
 
+from functools import partial
+
 import numpy as np
 
 from solfer.components.odometry import filter_kernel
@@ -28,6 +30,9 @@ class WheelMotion:
         variances: Variance of each wheel's speed, shape (k,) [m^2/s^2].
         feet: Which of them stand, if they are feet; None: they are wheels.
         block: What compiled functions get of these.
+        find_step: find_step(sway, keep) computes the steps of the joints since the last `remember`, and smooths them as
+            `sway`, which keeps a ratio of what it was; returns the largest step of all, of those of legs, and the
+            largest sway [rad].
     """
 
     def __init__(self, wheels: Wheels):
@@ -61,10 +66,7 @@ class WheelMotion:
             speeds=self.speeds,
         )
         self.feet = Feet(count, self.block, wheels.weight) if wheels.steps else None
-
-    def find_step(self) -> None:
-        """Compute the steps of the joints since the last `remember`."""
-        np.subtract(self.wheels.position, self._before[0], out=self.step)
+        self.find_step = partial(filter_kernel.joint_motion, wheels.position, joints_before, self.step, wheels.legs)
 
     def weigh(self, lifted: np.ndarray, touch: float | None) -> None:
         """Weigh the wheels: those that are lifted do not count, unless fewer than two would be left.
@@ -80,10 +82,6 @@ class WheelMotion:
             self.weights *= self.weights > touch
         if np.count_nonzero(self.weights) < 2:
             self.weights[:] = 1.0
-
-    def measure(self, turned: np.ndarray) -> None:
-        """Compute the displacements by a rotation of the base, shape (3,) [rad]."""
-        filter_kernel.measure_displacements(self.block.address, turned)
 
     def mean_height(self) -> float:
         """Return the height of the contacts above the base's origin, mean of the wheels that touch [m].

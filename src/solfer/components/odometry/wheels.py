@@ -1,6 +1,7 @@
 """The wheels of a robot as an odometry sees them: contacts, their arms from the base, and how joints move them."""
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,9 +40,8 @@ class _Ground:
 
     def rotate(self, cosine: float, sine: float) -> None:
         """Let the contacts have the normal, turned about the vertical."""
-        if not self.is_level:
-            x, y, z = self.normal.tolist()
-            self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
+        x, y, z = self.normal.tolist()
+        self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
 
     def _tilt(self, normal: ArrayLike) -> None:
         for contact in self._contacts:
@@ -113,8 +113,10 @@ class Wheels:
         self.legs = np.ones(joints, dtype=bool)
         rolling = [each.link for each in made if not _is_foot(each)]
         self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in rolling]] = False
-        self._link = robot.kinematics.base_link or ""
         self._origin = np.zeros(3)
+        # the Handler is this object's own: its arrays stay where they are
+        measured = self._contacts.value.reshape(-1, 3), self._origin, self._contacts.jacobian
+        self._turn_back = partial(filter_kernel.turn_back, *measured, self.arms, self.jacobian)
         self.ground = _Ground([each for each in made if isinstance(each, RollingContact)])
         self._forces = np.zeros(count)
         self.position = robot.state.position[6:]
@@ -159,16 +161,12 @@ class Wheels:
         """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
         cosine = math.cos(heading)
         sine = math.sin(heading)
-        self.ground.rotate(cosine, sine)
+        if not self.ground.is_level:
+            self.ground.rotate(cosine, sine)
         self._contacts.update()
-        np.copyto(self._origin, self._robot.kinematics.position(self._link))
-        places = self._contacts.value.reshape(-1, 3)
-        jacobian = self._contacts.jacobian
-        filter_kernel.turn_back(places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
-
-    def subtract_tilt(self, x: float, y: float) -> None:
-        """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
-        filter_kernel.subtract_tilt(self.arms, self.jacobian, x, y)
+        kinematics = self._robot.kinematics
+        np.copyto(self._origin, kinematics.position(kinematics.base_link or ""))
+        self._turn_back(cosine, sine)
 
     @property
     def forces(self) -> np.ndarray:

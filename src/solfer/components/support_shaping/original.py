@@ -139,7 +139,7 @@ class OriginalShaping:
         self._references.step(step)
         stack.update()
         steering.measure(self._wheels.offsets.directions)
-        tasks.find_errors()
+        tasks.find_errors(False)
         self._solve(self._before_camber @ self._robot.state.velocity)
         self._aims += step * (self._before_steering @ self.program.velocity)
         self._keep_jacobians()
@@ -148,7 +148,7 @@ class OriginalShaping:
         find_soft(steering.measured, self._aims, ROUNDED_PI, ANGLE_ERRORS[STEERING], error[tasks.rows[STEERING]])
         np.multiply(tasks.gain, error, out=stack.velocity)
         velocity = tasks.descent.update(stack.jacobian, stack.velocity, stack.numbers[:, DAMPING])
-        self._joints.move(velocity, step)
+        self._joints.integrate(velocity, step)
 
     def _keep_jacobians(self) -> None:
         """Keep Jacobians for the next cycle."""

@@ -109,6 +109,7 @@ class WheeledMotion(Component):
             margin=tags.lift_margin,
         )
         self._delay = ClockDelay()
+        self._publisher = PacePublisher(self._published_pace)
 
     def _balance(self) -> LoadBalance:
         """Make what lets wheels on steps share the weight."""
@@ -154,7 +155,7 @@ class WheeledMotion(Component):
         self._pace = PathPace(references, self._steering, wheels.offsets, error=base_error)
         self._pace.limit(tags.speeds, tags.acceleration, tags.furthest)
         self._pace.is_found = tags.is_paced
-        self._publisher = PacePublisher(self._published_pace, self.period)
+        self._publisher.set_period(self.period)
         self.tasks.prepare(tags, self.period, references, steering=self._steering, joints=self.joints)
         self._guard = MotionGuard(
             self._lifting.polygon,
@@ -271,8 +272,7 @@ class WheeledMotion(Component):
         self.tasks.stack.update_jacobian()
         if self.joints.is_first and self.tags.is_original:
             self.wheels.offsets.errors[:] = 0.0
-        self.tasks.steer()
-        self.tasks.find_errors()
+        self.tasks.find_errors(True)
 
     def _hold_back(self, step: float) -> None:
         """Shorten a motion that may not go on, and log why where it comes to rest."""
@@ -292,7 +292,8 @@ class WheeledMotion(Component):
 
     def send(self) -> None:
         """Write positions and velocities of the DoFs that it moves."""
-        self.joints.send(self.model.command)
+        command = self.model.command
+        self.joints.send(command.position, command.velocity)
 
     def stop(self) -> None:
         """Hold the joints where they are commanded, and the wheels still."""
@@ -324,9 +325,7 @@ class WheeledMotion(Component):
                 handler=self.targets.receive,
                 stream="places",
             ),
-            TopicOut(
-                "pace", "std_msgs/Float64", MotionPace, collect=lambda: self._publisher.collect(), rest=MotionPace(0.0)
-            ),
+            TopicOut("pace", "std_msgs/Float64", MotionPace, collect=self._publisher.collect, rest=MotionPace(0.0)),
         )
 
     def services(self) -> tuple[Service, ...]:
@@ -382,6 +381,4 @@ class WheeledMotion(Component):
     def _published_pace(self) -> float:
         """Return the ratio of the received velocities with which the motion goes on."""
         received = self.received
-        if self.references.waits:
-            return 0.0
-        return self.references.pace * received.ratio * self._delay.ratio * received.drive.progress
+        return self.references.going * received.ratio * self._delay.ratio * received.drive.progress

@@ -1,5 +1,7 @@
 """Positions and velocities of the joints that are commanded."""
 
+from functools import partial
+
 import numpy as np
 
 from solfer.components.wheeled_motion.kernel import move, write_command
@@ -21,6 +23,7 @@ class CommandedJoints:
         position: Commanded positions, shape (n,) [rad, m]; live.
         velocity: Commanded velocities, shape (n,) [rad/s, m/s]; live.
         is_first: Whether nothing has been commanded yet.
+        send: send(position, velocity) writes both of the joints that move to a command.
     """
 
     def __init__(self, moved: np.ndarray, size: int, steering: np.ndarray, resteering: Resteering | None):
@@ -29,6 +32,7 @@ class CommandedJoints:
         self.position, self.velocity = np.zeros((2, size))
         self._resteering = resteering
         self.is_first = True
+        self.send = partial(write_command, moved, self.position, self.velocity)
 
     def start(self, position: np.ndarray) -> None:
         """Begin at rest at a position, shape (n,) [rad, m]."""
@@ -38,28 +42,20 @@ class CommandedJoints:
         if self._resteering is not None:
             self._resteering.start()
 
-    def integrate(self, rates: np.ndarray, step: float, measured: np.ndarray) -> None:
+    def integrate(self, rates: np.ndarray, step: float, measured: np.ndarray | None = None) -> None:
         """Take over joint velocities for a time, and turn wheels back where they are at their ends.
 
         Args:
             rates: Joint velocities, shape (n,) [rad/s, m/s].
             step: The time [s].
-            measured: Measured positions, shape (n,) [rad, m].
+            measured: Measured positions, shape (n,) [rad, m]; None: no wheel turns back.
         """
-        self.move(rates, step)
-        if self._resteering is not None:
+        move(self.moved, rates, step, self.velocity, self.position)
+        self.is_first = False
+        if self._resteering is not None and measured is not None:
             commanded = self.position[self._steering]
             self._resteering.update(measured[self._steering], commanded)
             self.position[self._steering] = commanded
-
-    def move(self, rates: np.ndarray, step: float) -> None:
-        """Take over joint velocities, shape (n,) [rad/s, m/s], for a time [s]; no wheel turns back."""
-        move(self.moved, rates, step, self.velocity, self.position)
-        self.is_first = False
-
-    def send(self, command: State) -> None:
-        """Write positions and velocities of the joints that move."""
-        write_command(self.moved, self.position, self.velocity, command.position, command.velocity)
 
     def stop(self, command: State) -> None:
         """Write that all joints are still."""

@@ -8,7 +8,7 @@ import numpy as np
 from solfer.components.wheeled_motion.original import kernel as original
 from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, REST_ERROR, merge, nearest
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, part
+from solfer.numerics.compilation import cached, exact_part, part
 
 REST_DISTANCE = 2.5e-3
 """Error of a vertex that its wheel rests with, where no motion is desired [m]."""
@@ -181,9 +181,9 @@ def _keep(wheel, law, wx, wy, ex, ey):
     wheel.angle -= math.expm1(-law.rate * math.hypot(x, y)) * (wheel.aim - wheel.angle)
 
 
-def _steer(start):
+@exact_part
+def _steer(block):
     """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
-    block = _wheels_at(start)
     law = block.law[0]
     before = block.before
     steered = block.steered
@@ -319,13 +319,15 @@ def _choose_rotations(block, angles):
         block.aims[index] = angles[index] + min(max(rotation_left, -most), most)
 
 
-def _find_errors(start):
-    """Write the errors of all tasks.
+def _find_errors(start, steers):
+    """Write the errors of all tasks, and before, where it `steers`, where wheels are to point.
 
     Those of base, vertices, steering, camber, and caster; aims of the steering are the angles of `steered`, with
     joints that have ranges the ones within them, and references of camber and caster follow where they are too far.
     """
     block = _wheels_at(start)
+    if steers:
+        _steer(block)
     half = block.half
     error = block.error
     largest_errors = block.largest_errors
@@ -521,8 +523,7 @@ def _write_command(columns, position, velocity, commanded_position, commanded_ve
 _VECTOR = "float64[::1]"
 _INDICES = "int64[::1]"
 
-steer = cached("void(int64)", _steer, sources=[Path(original.__file__)])
-find_errors = cached("void(int64)", _find_errors)
+find_errors = cached("void(int64, boolean)", _find_errors, sources=[Path(original.__file__)])
 find_rates = cached("int64(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)
 move = cached(f"void({_INDICES}, {_VECTOR}, float64, {_VECTOR}, {_VECTOR})", _move)

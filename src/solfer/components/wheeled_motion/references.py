@@ -76,6 +76,11 @@ class References:
         self.numbers[WAITS] = value
 
     @property
+    def going(self) -> float:
+        """The pace; 0 while velocities do not count."""
+        return 0.0 if self.numbers[WAITS] else float(self.numbers[PACE])
+
+    @property
     def rise(self) -> float:
         """How much higher the ground is than where it began [m]."""
         return float(self.numbers[GROUND] - self.numbers[FLOOR])

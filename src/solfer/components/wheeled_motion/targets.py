@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -91,7 +92,10 @@ class Targets:
         ports: What the component receives by pipes: the pose `base` in the world, `vertices` and `vertex_velocities`
             seen from the heading of the base.
         ratio: Factor that scales the newest velocities, or those to the newest places, to their limits.
+        has_base: Whether the base goes to a pose.
     """
+
+    has_base: bool = property(attrgetter("_base.is_followed"))  # type: ignore[assignment]  # read in each cycle
 
     def __init__(self, count: int, speeds: tuple[float, float, float], accelerations: tuple[float, float, float]):
         self._count = count
@@ -112,11 +116,6 @@ class Targets:
         self._limits[:3, 0] = speeds
         self._limits[:3, 1] = accelerations
         self._limits[3:] = self._limits[2]
-
-    @property
-    def has_base(self) -> bool:
-        """Whether the base goes to a pose."""
-        return self._base.is_followed
 
     @property
     def is_active(self) -> bool:

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from solfer.components.wheeled_motion.joints import CommandedJoints
-from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, steer
+from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates
 from solfer.components.wheeled_motion.original.kernel import HALF_REVOLUTION, ROUNDED_PI
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
@@ -54,8 +54,8 @@ class DrivingTasks:
         bounds: Bounds of these; from `prepare` on.
         aims: Directions that wheels turn to, within the ranges of their joints, shape (count,) [rad]; live.
         numbers: What the compiled functions read and write; from `prepare` on.
-        steer: Finds where wheels are to point, at the rows of this cycle; from `prepare` on.
-        find_errors: Finds the errors of all tasks; from `prepare` on.
+        find_errors: Finds the errors of all tasks, and before, if its argument is true, where wheels are to point, at
+            the rows of this cycle; from `prepare` on.
 
     Raises:
         SolferError: A tag does not fit the robot.
@@ -144,7 +144,6 @@ class DrivingTasks:
             forward=self.rates.forward,
             half=HALF_REVOLUTION if self._feeds_forward else ROUNDED_PI,
         )
-        self.steer = partial(steer, self.numbers.address)
         self.find_errors = partial(find_errors, self.numbers.address)
         self.limit(tags.speeds, tags.accelerations, (tags.correction, tags.turn_correction, tags.furthest))
 

@@ -45,4 +45,4 @@ class FloatingBase:
         if not self.floats:
             return
         self._robot.read_base(self._motion)
-        self._in_chart.write(self._whole, q, v)
+        self._in_chart.write(q, v, self._whole)

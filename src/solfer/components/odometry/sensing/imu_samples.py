@@ -67,11 +67,15 @@ class ImuSamples:
         samples = self.sorted
         messages = history.history
         for index, stamp in history.accepted(self.stamps, -math.inf):
-            given = NO_NUMBERS, messages.values[index], history.rows, history.places
-            row = samples.insert(stamp + self._offset, *given)
-            if row >= 0:
-                force = messages.forces[index]
-                samples_kernel.integrate(samples.stamps, samples.rows, row, samples.count, force, self._origin)
+            samples.insert(
+                stamp + self._offset,
+                NO_NUMBERS,
+                messages.values[index],
+                history.rows,
+                places=history.places,
+                force=messages.forces[index],
+                origin=self._origin,
+            )
 
     def turned_since(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the base's angles at the measurement of a time [s], and the newest ones; None: not known."""

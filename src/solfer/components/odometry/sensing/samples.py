@@ -44,7 +44,10 @@ class SortedSamples:
         known: np.ndarray = NO_NUMBERS,
         values: np.ndarray = NO_VALUES,
         which: np.ndarray = NO_PLACES,
+        *,
         places: np.ndarray = NO_PLACES,
+        force: np.ndarray = NO_NUMBERS,
+        origin: np.ndarray = NO_VALUES,
     ) -> int:
         """Insert a sample; return its row, or -1 where there is one with that stamp, or it is too old.
 
@@ -54,8 +57,12 @@ class SortedSamples:
             values: Numbers of its message, one row for each interface.
             which: `SensorHistory.rows`, those of `values` that it has.
             places: `SensorHistory.places`, where they belong.
+            force: Specific force of a sample of an IMU, shape (3,) [m/s^2], see `samples_kernel`; empty: it is none.
+            origin: Rotation from the axes of the base's chart to the world, shape (3, 3).
         """
-        row = samples_kernel.insert(self.stamps, self.rows, self.count, stamp, known, values, which, places)
+        row = samples_kernel.insert(
+            self.stamps, self.rows, self.count, stamp, known, values, which, places, force, origin,
+        )  # fmt: skip
         if row >= 0:
             self.count = min(self.count + 1, len(self.stamps))
             self.newest = max(self.newest, stamp)

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 from solfer.numerics import base_chart
-from solfer.numerics.compilation import cached, part
+from solfer.numerics.compilation import cached, exact_part, part
 
 _rotation_of = part(base_chart.rotation_of)
 
@@ -48,20 +48,6 @@ def copy_message(values, which, places, out):
                 out[half * size + places[k]] = value
 
 
-def _insert(stamps, rows, count, stamp, known, values, which, places):
-    """Insert a sample, see `make_room` and `copy_message`; it begins with what is `known`. Returns its row, or -1."""
-    row = make_room(stamps, rows, count, stamp)
-    if row >= 0:
-        rows[row, : len(known)] = known
-        copy_message(values, which, places, rows[row])
-    return row
-
-
-def _copy(values, which, places, out):
-    """See `copy_message`."""
-    copy_message(values, which, places, out)
-
-
 @part
 def turned_at(stamps, rows, before, after, fraction, out):
     """Write the integrals of rates and acceleration at a fraction of the time from one sample to the next, shape (6,).
@@ -83,11 +69,7 @@ def turned_at(stamps, rows, before, after, fraction, out):
         out[k] = rows[before, 9 + k] + displacement
 
 
-def _turned_at(stamps, rows, before, after, fraction, out):
-    """See `turned_at`."""
-    turned_at(stamps, rows, before, after, fraction, out)
-
-
+@exact_part
 def _integrate(stamps, rows, first, count, force, origin):
     """Write the acceleration of the sample `first`, and integrate it and the rates up to each sample from there on.
 
@@ -117,10 +99,37 @@ def _integrate(stamps, rows, first, count, force, origin):
             rows[later, 12:15] = 0.0  # integrate again from here: the accelerometer is back
 
 
+def _insert(stamps, rows, count, stamp, known, values, which, places, force, origin):
+    """Insert a sample, see `make_room` and `copy_message`; it begins with what is `known`. Returns its row, or -1.
+
+    One of an IMU has a specific `force`; it is integrated then.
+    """
+    row = make_room(stamps, rows, count, stamp)
+    if row >= 0:
+        rows[row, : len(known)] = known
+        copy_message(values, which, places, rows[row])
+        if len(force):
+            _integrate(stamps, rows, row, min(count + 1, len(stamps)), force, origin)
+    return row
+
+
+def _copy(values, which, places, out):
+    """See `copy_message`."""
+    copy_message(values, which, places, out)
+
+
+def _turned_at(stamps, rows, before, after, fraction, out):
+    """See `turned_at`."""
+    turned_at(stamps, rows, before, after, fraction, out)
+
+
 _V = "float64[::1]"
 _M = "float64[:, ::1]"
 _I = "int64[::1]"
-insert = cached(f"int64({_V}, {_M}, int64, float64, {_V}, {_M}, {_I}, {_I})", _insert)
+insert = cached(
+    f"int64({_V}, {_M}, int64, float64, {_V}, {_M}, {_I}, {_I}, {_V}, {_M})",
+    _insert,
+    sources=[Path(base_chart.__file__)],
+)
 copy = cached(f"void({_M}, {_I}, {_I}, {_V})", _copy)
 find_turned = cached(f"void({_V}, {_M}, int64, int64, float64, {_V})", _turned_at)
-integrate = cached(f"void({_V}, {_M}, int64, int64, {_V}, {_M})", _integrate, sources=[Path(base_chart.__file__)])

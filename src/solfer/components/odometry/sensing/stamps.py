@@ -20,7 +20,8 @@ class StampCheck:
         warning: What was wrong last, and the publisher; empty: nothing since it was emptied.
         first: The first stamp that was accepted [s].
         newest: Latest stamp that was accepted [s].
-        before: The same when this cycle began [s].
+        before: The same when this cycle began [s]; written by who reads the messages of a cycle, which may be those of
+            a long gap.
         arrival: When the message with that stamp arrived [s].
     """
 
@@ -35,10 +36,6 @@ class StampCheck:
         """Forget the clock."""
         self._apart = StampFault()
         self.first = self.newest = self.before = self.arrival = math.nan
-
-    def begin_cycle(self) -> None:
-        """Note what is known before the messages of a cycle, which may be those of a long gap."""
-        self.before = self.newest
 
     def accepts(self, stamp: float, arrival: float, after: float, sender: str) -> bool:
         """Check a stamp.

@@ -269,7 +269,7 @@ class Streams:
         begin = -math.inf if math.isnan(self._begin) else self._begin
         after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
         joint_check, imu_check = self.stamp_checks
-        joint_check.begin_cycle()
+        joint_check.before = joint_check.newest
         newest = imu_check.newest
         if joints.history.count:
             self._measurements.receive(joints, begin, after)

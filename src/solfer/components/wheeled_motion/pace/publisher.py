@@ -16,14 +16,17 @@ class PacePublisher:
 
     Args:
         pace: Returns the present one.
-        period: Period of the control cycle [s].
     """
 
-    def __init__(self, pace: Callable[[], float], period: float):
+    def __init__(self, pace: Callable[[], float]):
         self._pace = pace
-        self._cycles = max(1, round(0.1 / period))  # [s] between two messages at most
+        self._cycles = 1
         self._left = 0
         self._published = 1.0
+
+    def set_period(self, period: float) -> None:
+        """Set the period of the control cycle [s]."""
+        self._cycles = max(1, round(0.1 / period))  # [s] between two messages at most
 
     def start(self) -> None:
         """Publish the pace of the next cycle in any case."""
