@@ -30,6 +30,9 @@ SHORT = 0.06
 WRONG_HEIGHT = 0.02
 """Difference of the felt height below a wheel from the map's that is too large [m]."""
 
+STALL_TIME = 20.0
+"""Longest time without getting nearer to the end of a move [s]."""
+
 
 class _Rolling:
     """A move on the ground: of the base to a waypoint, and of the wheels along with it.
@@ -51,7 +54,8 @@ class _Rolling:
         self._change = change
         self._length = math.dist(place, (goal.x, goal.y))
         self._duration = float(np.abs(change).max()) / SPEED
-        self._done = self._passed = self._rested = 0.0
+        self._done = self._passed = self._rested = self._stalled = 0.0
+        self._least = math.inf
 
     def vertices(self, place: tuple[float, float], period: float) -> np.ndarray:
         """Return where the vertices are to be after a period [s], with the base at a place; shape (n, 3) [m]."""
@@ -61,6 +65,24 @@ class _Rolling:
         if self._length > 0.05:  # [m]
             self._done = min(self._done, max(0.0, 1.0 - max(0.0, left - 0.01) / self._length))
         return self._vertices + self._done * self._change
+
+    def require_progress(self, place: tuple[float, float], heading: float, period: float) -> None:
+        """Check that base or wheels get nearer to their ends.
+
+        Raises:
+            ComponentError: They have not for `STALL_TIME`.
+        """
+        apart = math.dist(place, (self._goal.x, self._goal.y))
+        yaw = abs(math.remainder((self._goal.heading or 0.0) - heading, math.tau))
+        left = apart + yaw + 1.0 - self._done
+        self._stalled = 0.0 if left < self._least - 0.005 else self._stalled + period
+        if not self._stalled:
+            self._least = left
+        if self._stalled > STALL_TIME:
+            raise ComponentError(
+                f"the base stays {apart:.3f} m and {yaw:.2f} rad from where it is to go, for {STALL_TIME:g} s",
+                expected="a robot that follows `cmd_vel`; its health in /diagnostics has the reason",
+            )
 
     def is_over(self, moves: bool, still: float, period: float) -> bool:
         """Return whether base and wheels have come to rest."""
@@ -246,6 +268,7 @@ class CrossingCourse(Course):
         x, y, rate = rolling.follower.velocity
         vertices = rolling.vertices(place, period * pace)
         self._target.move((*seen_from(pose.heading, x, y), rate), vertices)
+        rolling.require_progress(place, pose.heading, period)
         if rolling.is_over(moves, pose.still, period):
             self._target.vertices = vertices
             self._rolling = None

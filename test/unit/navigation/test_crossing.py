@@ -134,7 +134,7 @@ class SteppingRobot:
         self._felt = self._node.writer("odometry/ground", GROUND)
         self.pose, self.vertices = np.zeros(3), np.column_stack((WHEELS, np.zeros(4)))
         self.requests, self.errors, self.reply = [], [], LiftReply()
-        self.is_silent = False
+        self.is_silent = self.is_stuck = False
         services = (
             Service("step", "solfer/StepContact", StepContact, LiftReply, self._step),
             Service("get_reference", "solfer/GetReference", GetReference, ReferenceReply, self._reference),
@@ -152,7 +152,7 @@ class SteppingRobot:
 
     def cycle(self):
         self._inbox.apply()
-        if self._twist.read() and self._twist.age() < 0.5:
+        if self._twist.read() and self._twist.age() < 0.5 and not self.is_stuck:
             linear, rate = self._twist.message.fields["linear"], self._twist.message.fields["angular"]["z"]
             self.pose += 0.01 * np.array((*turned(self.pose[2], linear["x"], linear["y"]), rate))
         if self._support.read() is MessageStatus.NEW:
@@ -228,6 +228,12 @@ def test_what_goes_wrong_ends_it_with_the_reason(begun):
     with pytest.raises(ComponentError, match=r"below 'front_left' is 0\.030 m from that of the map"):
         go(bus, navigation)
     assert abs(robot.pose).max() == 0.0
+    bus, robot, navigation = begun()
+    go(bus, navigation, until=6.0)
+    robot.is_stuck = True
+    with pytest.raises(ComponentError, match=r"the base stays \d\.\d+ m and 0\.\d+ rad from where it is to go"):
+        go(bus, navigation)
+    assert bus.time == pytest.approx(26.0, abs=1.0)
 
 
 def test_it_rests_without_odometry_and_in_a_pause(begun):
