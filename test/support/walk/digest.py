@@ -55,14 +55,11 @@ UNSTEADY = (
     "client",
     "_client",
     "_program",
-    "scatter",
-    "_collect",
-    "collect",
-    "find",
-    "_address",
-    "address",
 )
-"""Attributes that count what happened in this process before, or have addresses of what is elsewhere."""
+"""Attributes that count what happened in this process before."""
+
+LEAST_ADDRESS = 0x400000
+"""Whole numbers from here on are addresses of what is elsewhere, or times."""
 
 
 class Digest:
@@ -88,8 +85,12 @@ class Digest:
             self._put(value.dtype.str, value.shape)
             if value.dtype == object:
                 return value.ravel().tolist()
+            if value.dtype == np.int64:
+                value = np.where(value < LEAST_ADDRESS, value, LEAST_ADDRESS)
             self._hash.update(np.ascontiguousarray(value).tobytes())
             return []
+        if isinstance(value, int | np.integer) and value >= LEAST_ADDRESS:
+            value = LEAST_ADDRESS
         if isinstance(value, str):
             value = PLACE.sub("", value)
         if value is None or isinstance(value, bool | int | float | complex | str | bytes | np.generic | Enum | Path):
@@ -122,10 +123,9 @@ class Digest:
             return [value.func, value.args, value.keywords]
         if isinstance(value, types.MethodType):
             return [value.__func__.__qualname__, value.__self__]
-        if isinstance(value, MemoryBlock):  # its record has addresses, too
+        if isinstance(value, MemoryBlock):  # its record has addresses of its arrays
             numbers = [name for name in value.record.dtype.names if name not in value.arrays]
-            arrays = {name: array for name, array in value.arrays.items() if "address" not in name}
-            return [[float(value.record[name]) for name in numbers if "address" not in name], arrays]
+            return [[value.record[name].item() for name in numbers], value.arrays]
         if isinstance(value, types.FunctionType):
             cells = [cell.cell_contents for cell in value.__closure__ or () if _full(cell)]
             return [value.__qualname__, cells, value.__defaults__]
