@@ -129,6 +129,7 @@ def test_a_tag_without_effect_is_reported(build, caplog):
         (", ARMS: 0.5", "", "{ratio", "no gain of 'ARMS'"),
         (" damping: 0.0001,", "", "{ratio", "no damping of 'ARMS'"),
         ("  track: manipulation\n", "", "hands:", "the key 'track' is missing"),
+        ("arm_base", "manipulation", "manipulation\n  ref", "near itself"),
     ],
 )
 def test_mistakes_are_reported_at_their_place(build, tmp_path, before, after, place, message):

@@ -78,6 +78,10 @@ def hands(tags: OriginalStackTags) -> StackRecord:
     task = TaskRecord(point="position", link=tags.track, **seen)
     limits = StackLimitsRecord()
     if tags.workspace_init is not None:
+        if tags.workspace_init == tags.track:
+            raise ConfigError(
+                f"'{tags.track}' is to stay near itself", where=tags.where("workspace_init"), expected="another group"
+            )
         reach = math.sqrt(0.53)  # [m] of a hand from its base; the original limits its square
         workspace = WorkspaceRecord(link=tags.track, relative=tags.workspace_init, farthest=reach).placed_as(tags)
         limits = StackLimitsRecord(workspace={"ARMS": workspace})
