@@ -43,16 +43,22 @@ def _fit(weights, columns, diagonal, factor, forces, rest, jacobian, world):
 
 
 @exact_part
-def _observe(bias, torque, inertia, velocity, before, period, coefficient, value):
-    """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference."""
+def _observe(bias, torque, inertia, velocity, before, period, coefficient, seen, value):
+    """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference.
+
+    `seen` is work space. M is symmetric: its rows are its columns, and sums run through memory in its order.
+    """
     count = len(value)
     for i in range(count):
-        world = bias[i] - torque[i]
-        for k in range(count):
-            world += inertia[i, k] * ((velocity[k] - before[k]) / period)
-        value[i] += coefficient * (world - value[i])
+        seen[i] = bias[i] - torque[i]
+    for k in range(count):
+        acceleration = (velocity[k] - before[k]) / period
+        before[k] = velocity[k]
+        row = inertia[k]
+        for i in range(count):
+            seen[i] += row[i] * acceleration
     for i in range(count):
-        before[i] = velocity[i]
+        value[i] += coefficient * (seen[i] - value[i])
 
 
 EXPLANATION = BlockLayout(
@@ -98,7 +104,7 @@ def _explain(start, period, coefficient):
     rest = block.rest
     corrected = block.corrected
     if block.observes:
-        _observe(bias, torque, block.inertia, block.velocity, block.before, period, coefficient, world)
+        _observe(bias, torque, block.inertia, block.velocity, block.before, period, coefficient, rest, world)
     else:
         for i in range(block.dofs):
             world[i] = bias[i] - torque[i]
@@ -176,7 +182,7 @@ OFFSETS = BlockLayout(
     # work space: the Jacobian of contacts that are not lifted
     jacobian=(float, "row_count", "dofs"),
     factor=(float, "row_count", "row_count"),
-    spread=(float, "size", "row_count"),
+    spread=(float, "row_count", "size"),
     needed=(float, "row_count"),
     solved=(float, "size", "size"),
 )
@@ -185,14 +191,33 @@ OFFSETS = BlockLayout(
 _offsets_at = OFFSETS.at
 
 
+@exact_part
+def _spread_weights(block, weights, lifted, contacts):
+    """Write the Jacobian without lifted contacts, and L^-1 J S of the joints, with the factor L of J S J^T."""
+    jacobian = block.jacobian
+    factor = block.factor
+    spread = block.spread
+    columns = block.columns
+    for i in range(block.row_count):
+        for k in range(block.dofs):
+            jacobian[i, k] = 0.0 if lifted[i // 3] else contacts[i, k]
+    _normal_matrix(jacobian, weights, columns, block.diagonal, factor)
+    for i in range(block.row_count):
+        row = spread[i]
+        for a in range(block.size):
+            column = columns[block.first + a]
+            row[a] = jacobian[i, column] * weights[column]
+        for k in range(i):
+            for a in range(block.size):
+                row[a] -= factor[i, k] * spread[k, a]
+        for a in range(block.size):
+            row[a] /= factor[i, i]
+
+
 def _learn(start, contacts, world, lifted, pushed):
     """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     block = _offsets_at(start)
     weights = block.pushed if pushed else block.calm
-    jacobian = block.jacobian
-    for i in range(block.row_count):
-        for k in range(block.dofs):
-            jacobian[i, k] = 0.0 if lifted[i // 3] else contacts[i, k]
     columns = block.columns
     fraction = block.fraction
     decay = block.decay
@@ -200,30 +225,27 @@ def _learn(start, contacts, world, lifted, pushed):
     needed = block.needed
     solved = block.solved
     offsets = block.offsets
-    _normal_matrix(jacobian, weights, columns, block.diagonal, block.factor)
+    _spread_weights(block, weights, lifted, contacts)
     for i in range(block.row_count):
         needed[i] = 0.0
         for column in columns:
-            needed[i] += jacobian[i, column] * weights[column] * world[column]
-        for a in range(block.size):
-            column = columns[block.first + a]
-            spread[a, i] = jacobian[i, column] * weights[column]
+            needed[i] += block.jacobian[i, column] * weights[column] * world[column]
     forward(block.factor, needed)
-    for a in range(block.size):
-        forward(block.factor, spread[a])
     for a in range(block.size):
         column = columns[block.first + a]
         left = weights[column] * world[column]
+        row = solved[a]
+        row[:] = 0.0
+        row[a] = weights[column]
         for i in range(block.row_count):
-            left -= spread[a, i] * needed[i]
+            left -= spread[i, a] * needed[i]
+            for b in range(a + 1):
+                row[b] -= spread[i, a] * spread[i, b]
         block.moments[a] += -fraction * left - decay * block.moments[a]
         for b in range(a + 1):
-            left = weights[column] if a == b else 0.0
-            for i in range(block.row_count):
-                left -= spread[a, i] * spread[b, i]
-            block.information[a, b] += fraction * left - decay * block.information[a, b]
-            solved[a, b] = block.information[a, b]
-        solved[a, a] += block.prior
+            block.information[a, b] += fraction * row[b] - decay * block.information[a, b]
+            row[b] = block.information[a, b]
+        row[a] += block.prior
     cholesky(solved)
     for a in range(block.size):
         offsets[a] = block.moments[a]
