@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
-from solfer.numerics import base_chart
+from solfer.numerics import base_chart, pointers
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, exact_part, part
+from solfer.numerics.compilation import REORDERED, cached, exact_part, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
+from solfer.numerics.pointers import matrix_at, vector_at
+
+POINTERS = Path(pointers.__file__)
 
 _moment_of = exact_part(base_chart.moment_of)
 
@@ -120,16 +123,86 @@ def _explain(start, period, coefficient):
                 block.push[3 + axis] += block.rotation[axis, k] * moment[k]
 
 
-def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
-    """Write force and speed of each contact along its normal."""
-    for i in range(len(normals)):
-        normal_forces[i] = speeds[i] = 0.0
+PUSHED = BlockLayout(
+    "Pushed",
+    count=int,
+    dofs=int,
+    # addresses of the Jacobians, the wrenches and the published forces of contacts
+    sources=(int, "count"),
+    wrenches=(int, "count"),
+    ports=(int, "count"),
+    normals=(float, "count", 3),
+    velocity=(float, "dofs"),
+    jacobian=(float, "3 * count", "dofs"),
+    forces=(float, "count", 3),
+    normal_forces=(float, "count"),
+    speeds=(float, "count"),
+    sums=(float, "count", 3),
+    # J^T f - h, and the torques besides
+    bias=(float, "dofs"),
+    torque=(float, "dofs"),
+    bias_force=(float, "dofs"),
+    overall_force=(float, "dofs"),
+)
+"""What `gather`, `push`, `measure` and `publish` read and write."""
+
+_pushed_at = PUSHED.at
+
+
+def _gather(start):
+    """Read the Jacobians of the contacts."""
+    block = _pushed_at(start)
+    for i in range(block.count):
+        source = matrix_at(block.sources[i], 3, block.dofs)
         for axis in range(3):
+            block.jacobian[3 * i + axis] = source[axis]
+
+
+def _push(start, forces):
+    """Write forces without torques to the contacts."""
+    block = _pushed_at(start)
+    for i in range(block.count):
+        wrench = vector_at(block.wrenches[i], 6)
+        for axis in range(3):
+            wrench[axis] = forces[i, axis]
+            wrench[3 + axis] = 0.0
+
+
+def _measure(start):
+    """Read the force of each contact; write its force and speed along its normal."""
+    block = _pushed_at(start)
+    for i in range(block.count):
+        wrench = vector_at(block.wrenches[i], 6)
+        block.normal_forces[i] = block.speeds[i] = 0.0
+        for axis in range(3):
+            row = block.jacobian[3 * i + axis]
             speed = 0.0
-            for k in range(len(velocity)):
-                speed += jacobian[3 * i + axis, k] * velocity[k]
-            speeds[i] += normals[i, axis] * speed
-            normal_forces[i] += normals[i, axis] * forces[i, axis]
+            for k in range(block.dofs):
+                speed += row[k] * block.velocity[k]
+            block.forces[i, axis] = wrench[axis]
+            block.speeds[i] += block.normals[i, axis] * speed
+            block.normal_forces[i] += block.normals[i, axis] * wrench[axis]
+
+
+def _publish(start, touching):
+    """Take forces of contacts that do not touch away; publish and sum up the others, and what they do to the DoFs."""
+    block = _pushed_at(start)
+    effect = block.bias_force
+    effect[:] = 0.0
+    for i in range(block.count):
+        if not touching[i]:
+            vector_at(block.wrenches[i], 6)[:] = 0.0
+            block.forces[i] = 0.0
+        vector_at(block.ports[i], 3)[:] = block.forces[i]
+        for axis in range(3):
+            force = block.forces[i, axis]
+            block.sums[i, axis] += force
+            row = block.jacobian[3 * i + axis]
+            for k in range(block.dofs):
+                effect[k] += row[k] * force
+    for k in range(block.dofs):
+        effect[k] -= block.bias[k]
+        block.overall_force[k] = effect[k] + block.torque[k]
 
 
 def _touch(limits, touching, lifted, times, forces, speeds, period):
@@ -260,7 +333,10 @@ _VECTOR = "float64[::1]"
 
 explain = cached("void(int64, float64, float64)", _explain, sources=[DENSE, Path(base_chart.__file__)])
 learn = cached(f"void(int64, {_MATRIX}, {_VECTOR}, boolean[::1], boolean)", _learn, sources=[DENSE])
-measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
+gather = cached("void(int64)", _gather, sources=[POINTERS])
+push = cached(f"void(int64, {_MATRIX})", _push, sources=[POINTERS])
+measure = cached("void(int64)", _measure, REORDERED, sources=[POINTERS])
+publish = cached("void(int64, boolean[::1])", _publish, sources=[POINTERS])
 touch = cached(
     f"void({_VECTOR}, boolean[::1], boolean[::1], {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
     _touch,
