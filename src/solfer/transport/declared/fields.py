@@ -115,7 +115,8 @@ def value_of(cls: type, message: Message) -> Any:
 
 def plain(value: Any) -> Any:
     """Convert a dataclass to a mapping of its fields, nested ones as well; arrays become tuples."""
-    names = _names(type(value))
+    kind: Any = type(value)
+    names = _names(kind)
     if names is not None:
         fields = {}
         for name in names:
