@@ -154,7 +154,7 @@ def _align(rows):
 
 @part
 def _solve_weakly(matrix, weak, rows, load, part):
-    """Solve A x = b in place, with s / weak^2 in place of 1 / s for eigenvalues s below `weak`; return how many are not.
+    """Solve A x = b in place; for eigenvalues s below `weak`, s / weak^2 counts. Return how many are above.
 
     With s u u^T = r r^T, u u^T / s = r r^T / s^2. The matrix is overwritten.
     """

@@ -77,9 +77,8 @@ class GroundForces(Component):
         self.law = self._make_law()
         self._filter: LowPass | None = None
         weight = None if robot.kinematics.base is None else robot.kinematics.mass * robot.gravity
-        self.checks = ContactChecks(
-            names, self._pushed.normals, self._pushed.sums, friction=tags.friction, weight=weight
-        )
+        pushed = self._pushed
+        self.checks = ContactChecks(names, pushed.normals, pushed.sums, friction=tags.friction, weight=weight)
         self.touch = None if tags.touch is None else Touch(count, **dict(tags.touch))
         self._pushes = np.ones(count, dtype=bool) if self.touch is None else self.touch.touching
         self.outputs["center_of_pressure"] = Port("position")

@@ -9,7 +9,6 @@ from solfer.components.ground_forces import kernel
 from solfer.interfaces.port import Port
 from solfer.numerics.blocks import MemoryBlock
 from solfer.numerics.pointers import address
-from solfer.points.contact.contacts import Contact
 from solfer.points.contact.support_vertex import UP
 from solfer.robot import Robot
 from solfer.robot.contacts import Contacts
