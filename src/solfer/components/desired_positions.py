@@ -1,7 +1,10 @@
 """Positions that others request of a Robot, kept apart from those that a component commands."""
 
+from functools import partial
+
 import numpy as np
 
+from solfer.numerics.kernels import take_changes
 from solfer.robot import Robot
 
 
@@ -17,13 +20,15 @@ class DesiredPositions:
 
     Attributes:
         values: Desired position of each DoF, shape (n,) [rad, m].
+        read: read() takes what pipes have written since `send`.
     """
 
     def __init__(self, robot: Robot):
         self._robot = robot
         self._command = robot.command.position
         self.values, self._sent = np.full((2, robot.size), np.nan)
-        self._own, self._changed = np.zeros((2, robot.size), dtype=bool)
+        self._own = np.zeros(robot.size, dtype=bool)
+        self.read = partial(take_changes, self._command, self._sent, self.values, self._own)
         self._command[:] = np.nan
 
     def start(self) -> None:
@@ -33,12 +38,6 @@ class DesiredPositions:
         self.values[self._own] = self._robot.state.position[self._own]
         self._robot.command.velocity[self._own] = 0.0
         self.send(self.values)
-
-    def read(self) -> None:
-        """Take what pipes have written since `send`."""
-        np.not_equal(self._command, self._sent, out=self._changed)
-        np.copyto(self.values, self._command, where=self._changed)
-        np.copyto(self._own, False, where=self._changed)
 
     def send(self, positions: np.ndarray) -> None:
         """Command positions, shape (n,) [rad, m]."""

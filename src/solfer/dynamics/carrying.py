@@ -1,9 +1,8 @@
 """Torques that carry a robot on its contacts, by a QR decomposition of their Jacobian."""
 
 import numpy as np
-from scipy.linalg import lapack
 
-from solfer.dynamics.carrying_kernel import CARRYING, bear, carry
+from solfer.dynamics.carrying_kernel import CARRYING, carry
 from solfer.dynamics.dynamic_model import DynamicModel
 from solfer.dynamics.elements import BIAS
 from solfer.errors import SizeMismatch
@@ -50,9 +49,6 @@ class CarryingTorques:
         self._bias = model.bias
         self.torque = np.zeros(size)
         self.rank = self.carried = 0
-        self._held = np.zeros((count, count))
-        self._load, self._parts, self._ratios = np.zeros((3, count))
-        self._well = np.zeros(count, dtype=bool)
         self._block = MemoryBlock(
             CARRYING,
             dofs=size,
@@ -60,11 +56,13 @@ class CarryingTorques:
             free=np.array(free, dtype=np.int64),
             span=np.zeros((size, size)),
             along=np.zeros(size),
-            held=self._held,
-            load=self._load,
+            held=np.zeros((count, count)),
+            load=np.zeros(count),
             torque=self.torque,
             squares=np.zeros((2, size)),
             factor=np.zeros((count, count)),
+            rows=np.zeros((count, count)),
+            part=np.zeros(count),
         )
 
     def update(self, jacobian: np.ndarray) -> np.ndarray:
@@ -81,21 +79,5 @@ class CarryingTorques:
         size = len(self.torque)
         if jacobian.ndim != 2 or jacobian.shape[1] != size or len(jacobian) > size:
             raise SizeMismatch(f"a matrix of shape {jacobian.shape}, expected (k, {size}), k <= {size}")
-        self.rank, is_held = carry(self._block.address, jacobian, bias, RANK_TOLERANCE, WEAK)
-        self.carried = len(self._load) if self.rank else 0
-        if not is_held:
-            self._bear_weakly()
-            bear(self._block.address, bias, self.rank)
+        self.rank, self.carried = carry(self._block.address, jacobian, bias, RANK_TOLERANCE, WEAK)
         return self.torque
-
-    def _bear_weakly(self) -> None:
-        """Solve for `load` by the eigenvectors of what holds the DoFs `free`; those that little holds fade out."""
-        # a symmetric matrix is its transpose, so LAPACK can work on its memory as it is
-        eigenvalues, vectors, _ = lapack.dsyev(self._held.T, overwrite_a=1)
-        np.dot(self._load, vectors, out=self._parts)
-        np.greater(eigenvalues, WEAK, out=self._well)
-        self.carried = int(np.count_nonzero(self._well))
-        np.divide(eigenvalues, WEAK**2, out=self._ratios)
-        np.divide(1.0, eigenvalues, out=self._ratios, where=self._well)
-        self._parts *= self._ratios
-        np.dot(vectors, self._parts, out=self._load)

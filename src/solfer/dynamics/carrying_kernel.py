@@ -24,10 +24,15 @@ CARRYING = BlockLayout(
     # work space
     squares=(float, 2, "dofs"),
     factor=(float, "free_count", "free_count"),
+    rows=(float, "free_count", "free_count"),
+    part=(float, "free_count"),
 )
-"""What `carry` and `bear` write."""
+"""What `carry` writes."""
 
 _carrying_at = CARRYING.at
+
+ROUNDING = 1e-16
+"""Errors of products of unit vectors."""
 
 
 @part
@@ -91,6 +96,81 @@ def _span(jacobian, tolerance, span, squares):
 
 
 @part
+def _split(matrix, rows):
+    """Write rows whose products with themselves, r r^T, add up to a semidefinite matrix; return how many are not zero.
+
+    Cholesky's method with the largest pivot first; what is left of the matrix is rounding errors.
+    """
+    size = len(matrix)
+    for r in range(size):
+        best = 0
+        for i in range(1, size):
+            if matrix[i, i] > matrix[best, best]:
+                best = i
+        pivot = matrix[best, best]
+        if not pivot > ROUNDING:
+            return r
+        row = rows[r]
+        root = math.sqrt(pivot)
+        for i in range(size):
+            row[i] = matrix[best, i] / root
+        for i in range(size):
+            _add(-row[i], row, matrix[i])
+        matrix[best, best] = 0.0
+    return size
+
+
+@part
+def _turn(row, other, product):
+    """Turn two rows in their plane, so that they are at right angles; `product` is theirs."""
+    half = 0.5 * (_dot(other, other) - _dot(row, row)) / product
+    tangent = math.copysign(1.0, half) / (abs(half) + math.sqrt(1.0 + half * half))
+    cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+    sine = cosine * tangent
+    for k in range(len(row)):
+        before = row[k]
+        row[k] = cosine * before - sine * other[k]
+        other[k] = sine * before + cosine * other[k]
+
+
+@part
+def _align(rows):
+    """Turn rows until each is at right angles to the others; the sum of their r r^T stays.
+
+    They then are eigenvectors of that sum, of the length sqrt(eigenvalue). Jacobi's method from one side. Source:
+    K. Veselic, V. Hari, "A note on a one-sided Jacobi algorithm", Numerische Mathematik 56, 1989.
+    """
+    for _ in range(30):  # five are usual
+        is_done = True
+        for i in range(len(rows)):
+            for j in range(i + 1, len(rows)):
+                product = _dot(rows[i], rows[j])
+                if abs(product) > 10.0 * ROUNDING:
+                    _turn(rows[i], rows[j], product)
+                    is_done = False
+        if is_done:
+            return
+
+
+@part
+def _solve_weakly(matrix, weak, rows, load, part):
+    """Solve A x = b in place; for eigenvalues s below `weak`, s / weak^2 counts. Return how many are above.
+
+    With s u u^T = r r^T, u u^T / s = r r^T / s^2. The matrix is overwritten.
+    """
+    rows = rows[: _split(matrix, rows)]
+    _align(rows)
+    part[:] = load
+    load[:] = 0.0
+    strong = 0
+    for row in rows:
+        eigenvalue = _dot(row, row)
+        strong += eigenvalue > weak
+        _add(_dot(row, part) / max(eigenvalue, weak) ** 2, row, load)
+    return strong
+
+
+@part
 def _write_torque(block, bias, rank):
     """Write tau = h - Q x, with x = `along` + B^T `load`; zero for the DoFs `free`."""
     free = block.free
@@ -105,8 +185,27 @@ def _write_torque(block, bias, rank):
         torque[free[i]] = 0.0
 
 
+@part
+def _solve(block, weak):
+    """Solve B B^T x = `load` in place; return how many DoFs are held well."""
+    factor = block.factor
+    load = block.load
+    size = block.free_count
+    factor[:] = block.held
+    for i in range(size):
+        factor[i, i] -= weak
+    is_held = cholesky(factor)
+    factor[:] = block.held
+    if not is_held:
+        return _solve_weakly(factor, weak, block.rows, load, block.part)
+    cholesky(factor)
+    forward(factor, load)
+    backward(factor, load)
+    return size
+
+
 def _carry(start, jacobian, bias, tolerance, weak):
-    """Write the torques where contacts hold the DoFs `free` well; see `solfer.dynamics.carrying.CarryingTorques`.
+    """Write the torques with which contacts bear a robot; see `solfer.dynamics.carrying.CarryingTorques`.
 
     Args:
         start: Address of a `CARRYING`.
@@ -116,7 +215,7 @@ def _carry(start, jacobian, bias, tolerance, weak):
         weak: Least eigenvalue of B B^T where all is held well.
 
     Returns:
-        The rank, and whether all is held well; if not, `torque` is not written, and `load` is what has to be borne.
+        The rank, and the number of DoFs `free` that are held.
     """
     block = _carrying_at(start)
     free = block.free
@@ -124,7 +223,6 @@ def _carry(start, jacobian, bias, tolerance, weak):
     along = block.along
     held = block.held
     load = block.load
-    factor = block.factor
     size = block.free_count
     rank = _span(jacobian, tolerance, span, block.squares)
     for r in range(rank):
@@ -138,29 +236,14 @@ def _carry(start, jacobian, bias, tolerance, weak):
             for r in range(rank):
                 entry += span[r, free[i]] * span[r, free[j]]
             held[i, j] = held[j, i] = entry
-    if rank and size:
-        factor[:] = held
-        for i in range(size):
-            factor[i, i] -= weak
-        if not cholesky(factor):
-            return rank, False
-        factor[:] = held
-        cholesky(factor)
-        forward(factor, load)
-        backward(factor, load)
+    carried = _solve(block, weak) if rank else 0
     _write_torque(block, bias, rank)
-    return rank, True
-
-
-def _bear(start, bias, rank):
-    """Write the torques where contacts hold the DoFs `free` weakly, with `load` solved."""
-    _write_torque(_carrying_at(start), bias, rank)
+    return rank, carried
 
 
 carry = cached(
-    "Tuple((int64, boolean))(int64, float64[:, ::1], float64[::1], float64, float64)",
+    "UniTuple(int64, 2)(int64, float64[:, ::1], float64[::1], float64, float64)",
     _carry,
     REORDERED,
     sources=[DENSE],
 )
-bear = cached("void(int64, float64[::1], int64)", _bear, REORDERED)

@@ -42,6 +42,17 @@ def _finite(values):
 finite = cached("boolean(float64[::1])", _finite)
 
 
+def _take_changes(values, before, kept, is_own):
+    """Keep the values that differ from those before, NaN always, and note that they are not one's own any more."""
+    for index in range(len(values)):
+        if values[index] != before[index]:
+            kept[index] = values[index]
+            is_own[index] = False
+
+
+take_changes = cached("void(float64[::1], float64[::1], float64[::1], boolean[::1])", _take_changes)
+
+
 def _tables_finite(first, second):
     """Return whether all values of two tables are finite."""
     total = 0.0

@@ -11,6 +11,7 @@ from support.robots import centauro
 
 from solfer import Robot
 from solfer.dynamics import CarryingTorques
+from solfer.dynamics.carrying import WEAK
 from solfer.points import Handler, PointContact
 from solfer.points.contact.contact_constraint import ContactConstraint
 
@@ -75,6 +76,24 @@ def test_wheels_without_torque_leave_legs_to_carry(robot):
     carrying = CarryingTorques(robot.dynamics, free)
     assert_allclose(carrying.update(jacobian), least_torques(robot, jacobian, free), rtol=0, atol=1e-8)
     assert carrying.carried == len(free) and not carrying.torque[free].any()
+
+
+def test_what_parallel_wheels_hold_weakly_fades(robot):
+    free = np.union1d(BASE, robot.selectors["wheels"].indices)
+    robot.state.position[BASE] = robot.state.velocity[:] = 0.0
+    robot.update()
+    jacobian, bias = rows_of(wheels(robot)), robot.dynamics.bias
+    carrying = CarryingTorques(robot.dynamics, free)
+    torque, span = carrying.update(jacobian), np.linalg.qr(jacobian.T)[0]
+    held, along = span[free], span.T @ bias
+    eigenvalues, vectors = np.linalg.eigh(held @ held.T)
+    is_held = eigenvalues > WEAK
+    ratios = np.where(is_held, 1.0 / eigenvalues, eigenvalues / WEAK**2)
+    load = vectors @ (ratios * (vectors.T @ (bias[free] - held @ along)))
+    expected = bias - span @ (along + held.T @ load)
+    expected[free] = 0.0
+    assert 6 <= carrying.carried == np.count_nonzero(is_held) < len(free)
+    assert_allclose(torque, expected, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("links", [("wheel_1",), ("ankle2_3",)])

@@ -16,42 +16,44 @@ logger = logging.getLogger(__name__)
 
 
 class ContactChecks:
-    """Sums up the forces of contacts, and reports those that the ground cannot have.
+    """Reports forces of contacts that the ground cannot have, in the mean of many cycles.
 
     Args:
         names: Names of the contacts k.
         normals: Their normals, world axes, shape (k, 3).
+        sums: Sums of the forces since the last report, world axes, shape (k, 3) [N]; live, a report sets them to zero.
         friction: Coefficient of friction of the ground; None: not known.
         weight: Weight of the robot, world axes, shape (3,) [N]; None: contacts do not carry it.
 
     Attributes:
         friction: As above; may be set.
+        count: Cycles whose forces are in the sums.
     """
 
     def __init__(
-        self, names: Sequence[str], normals: np.ndarray, friction: float | None, weight: np.ndarray | None = None
+        self,
+        names: Sequence[str],
+        normals: np.ndarray,
+        sums: np.ndarray,
+        friction: float | None,
+        weight: np.ndarray | None = None,
     ):
         self._names = tuple(names)
         self._normals = normals
         self.friction = friction
         self._weight = weight
         self._throttle = Throttle(logger, interval=10.0)
-        self._sum = np.zeros((len(self._names), 3))
-        self._count = 0
+        self._sums = sums
+        self.count = 0
 
     def start(self) -> None:
         """Begin without forces."""
-        self._sum[:] = 0.0
-        self._count = 0
-
-    def add(self, forces: np.ndarray) -> None:
-        """Add the forces of a cycle, world axes, shape (k, 3) [N]."""
-        self._sum += forces
-        self._count += 1
+        self._sums[:] = 0.0
+        self.count = 0
 
     def report(self, owner: str) -> Statuses:
         """Return what each contact does in the mean since the last report; `owner` is the name of the component."""
-        means = self._sum / max(self._count, 1)
+        means = self._sums / max(self.count, 1)
         along = np.sum(means * self._normals, axis=1)
         across = np.linalg.norm(means - along[:, None] * self._normals, axis=1)
         wrong = []
@@ -72,7 +74,7 @@ class ContactChecks:
     def _evaluate_load(self, means: np.ndarray) -> str:
         """Return what is wrong with the load that the contacts carry together; empty if nothing is."""
         weight = self._weight
-        if weight is None or not self._count:
+        if weight is None or not self.count:
             return ""
         ratio = -float(means.sum(axis=0) @ weight) / float(weight @ weight)
         if 0.5 <= ratio <= 2.0:

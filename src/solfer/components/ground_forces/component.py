@@ -63,18 +63,24 @@ class GroundForces(Component):
         tags = self.tags
         names = self._tracked()
         count = len(names)
-        self._pushed = PushedContacts(names, [robot.contacts[name] for name in names], robot.size)
         self._torque = np.zeros(robot.size)
-        self._bias_force, self._overall_force = (
-            robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
+        robot.dynamics.subscribe(BIAS)
+        self._pushed = PushedContacts(
+            names,
+            robot,
+            self._torque,
+            bias_force=robot.state.add(f"{tags.prefix}bias_force"),
+            overall_force=robot.state.add(f"{tags.prefix}overall_force"),
         )
         self._none = np.zeros(count, dtype=bool)
         self._touching = np.ones(count)
         self.law = self._make_law()
         self._filter: LowPass | None = None
         weight = None if robot.kinematics.base is None else robot.kinematics.mass * robot.gravity
-        self.checks = ContactChecks(names, self._pushed.normals, tags.friction, weight=weight)
+        pushed = self._pushed
+        self.checks = ContactChecks(names, pushed.normals, pushed.sums, friction=tags.friction, weight=weight)
         self.touch = None if tags.touch is None else Touch(count, **dict(tags.touch))
+        self._pushes = np.ones(count, dtype=bool) if self.touch is None else self.touch.touching
         self.outputs["center_of_pressure"] = Port("position")
         self.outputs["external_wrench"] = Port("wrench")
         self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(names, self._pushed.ports, strict=True)}
@@ -131,8 +137,6 @@ class GroundForces(Component):
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
         robot = self.model
         tags = self.tags
-        robot.dynamics.subscribe(BIAS)
-        self._bias = robot.dynamics.bias
         if tags.method == "projection":
             return ProjectedLaw(self._pushed.contacts, self._torque)
         return WeightedLaw(robot, self._pushed, self._torque, tags=tags)
@@ -227,21 +231,13 @@ class GroundForces(Component):
         pushed = self._pushed
         pushed.read_jacobians(self.model.contacts)
         self.law.update(pushed.jacobian, self._none if self.touch is None else self.touch.lifted, self.passed)
-        pushed.read_forces(self.model.state.velocity)
+        pushed.measure()
 
     def _finish(self) -> None:
         """Take the forces of contacts that do not touch away, and publish what follows from them."""
-        pushed = self._pushed
-        forces = pushed.forces
-        for index, contact in enumerate(pushed.contacts):
-            if self.touch is not None and not self.touch.touching[index]:
-                contact.wrench[:] = forces[index] = 0.0
-            pushed.ports[index].value[:] = forces[index]
-        self.checks.add(forces)
-        np.dot(forces.reshape(-1), pushed.jacobian, out=self._bias_force)
         self.model.dynamics.manager.use(BIAS)
-        self._bias_force -= self._bias
-        np.add(self._bias_force, self._torque, out=self._overall_force)
+        self._pushed.publish(self._pushes)
+        self.checks.count += 1
         self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value
         self.outputs["external_wrench"].value[:] = self.law.push
 

@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
-from solfer.numerics import base_chart
+from solfer.numerics import base_chart, pointers
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, exact_part, part
+from solfer.numerics.compilation import REORDERED, cached, exact_part, part
 from solfer.numerics.dense import DENSE, backward, cholesky, forward
+from solfer.numerics.pointers import matrix_at, vector_at
+
+POINTERS = Path(pointers.__file__)
 
 _moment_of = exact_part(base_chart.moment_of)
 
@@ -43,16 +46,22 @@ def _fit(weights, columns, diagonal, factor, forces, rest, jacobian, world):
 
 
 @exact_part
-def _observe(bias, torque, inertia, velocity, before, period, coefficient, value):
-    """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference."""
+def _observe(bias, torque, inertia, velocity, before, period, coefficient, seen, value):
+    """Let what the world does come nearer to h + M dv/dt - torque by a ratio of the difference.
+
+    `seen` is work space. M is symmetric: its rows are its columns, and sums run through memory in its order.
+    """
     count = len(value)
     for i in range(count):
-        world = bias[i] - torque[i]
-        for k in range(count):
-            world += inertia[i, k] * ((velocity[k] - before[k]) / period)
-        value[i] += coefficient * (world - value[i])
+        seen[i] = bias[i] - torque[i]
+    for k in range(count):
+        acceleration = (velocity[k] - before[k]) / period
+        before[k] = velocity[k]
+        row = inertia[k]
+        for i in range(count):
+            seen[i] += row[i] * acceleration
     for i in range(count):
-        before[i] = velocity[i]
+        value[i] += coefficient * (seen[i] - value[i])
 
 
 EXPLANATION = BlockLayout(
@@ -98,7 +107,7 @@ def _explain(start, period, coefficient):
     rest = block.rest
     corrected = block.corrected
     if block.observes:
-        _observe(bias, torque, block.inertia, block.velocity, block.before, period, coefficient, world)
+        _observe(bias, torque, block.inertia, block.velocity, block.before, period, coefficient, rest, world)
     else:
         for i in range(block.dofs):
             world[i] = bias[i] - torque[i]
@@ -114,16 +123,86 @@ def _explain(start, period, coefficient):
                 block.push[3 + axis] += block.rotation[axis, k] * moment[k]
 
 
-def _measure(jacobian, velocity, normals, forces, normal_forces, speeds):
-    """Write force and speed of each contact along its normal."""
-    for i in range(len(normals)):
-        normal_forces[i] = speeds[i] = 0.0
+PUSHED = BlockLayout(
+    "Pushed",
+    count=int,
+    dofs=int,
+    # addresses of the Jacobians, the wrenches and the published forces of contacts
+    sources=(int, "count"),
+    wrenches=(int, "count"),
+    ports=(int, "count"),
+    normals=(float, "count", 3),
+    velocity=(float, "dofs"),
+    jacobian=(float, "3 * count", "dofs"),
+    forces=(float, "count", 3),
+    normal_forces=(float, "count"),
+    speeds=(float, "count"),
+    sums=(float, "count", 3),
+    # J^T f - h, and the torques besides
+    bias=(float, "dofs"),
+    torque=(float, "dofs"),
+    bias_force=(float, "dofs"),
+    overall_force=(float, "dofs"),
+)
+"""What `gather`, `push`, `measure` and `publish` read and write."""
+
+_pushed_at = PUSHED.at
+
+
+def _gather(start):
+    """Read the Jacobians of the contacts."""
+    block = _pushed_at(start)
+    for i in range(block.count):
+        source = matrix_at(block.sources[i], 3, block.dofs)
         for axis in range(3):
+            block.jacobian[3 * i + axis] = source[axis]
+
+
+def _push(start, forces):
+    """Write forces without torques to the contacts."""
+    block = _pushed_at(start)
+    for i in range(block.count):
+        wrench = vector_at(block.wrenches[i], 6)
+        for axis in range(3):
+            wrench[axis] = forces[i, axis]
+            wrench[3 + axis] = 0.0
+
+
+def _measure(start):
+    """Read the force of each contact; write its force and speed along its normal."""
+    block = _pushed_at(start)
+    for i in range(block.count):
+        wrench = vector_at(block.wrenches[i], 6)
+        block.normal_forces[i] = block.speeds[i] = 0.0
+        for axis in range(3):
+            row = block.jacobian[3 * i + axis]
             speed = 0.0
-            for k in range(len(velocity)):
-                speed += jacobian[3 * i + axis, k] * velocity[k]
-            speeds[i] += normals[i, axis] * speed
-            normal_forces[i] += normals[i, axis] * forces[i, axis]
+            for k in range(block.dofs):
+                speed += row[k] * block.velocity[k]
+            block.forces[i, axis] = wrench[axis]
+            block.speeds[i] += block.normals[i, axis] * speed
+            block.normal_forces[i] += block.normals[i, axis] * wrench[axis]
+
+
+def _publish(start, touching):
+    """Take forces of contacts that do not touch away; publish and sum up the others, and what they do to the DoFs."""
+    block = _pushed_at(start)
+    effect = block.bias_force
+    effect[:] = 0.0
+    for i in range(block.count):
+        if not touching[i]:
+            vector_at(block.wrenches[i], 6)[:] = 0.0
+            block.forces[i] = 0.0
+        vector_at(block.ports[i], 3)[:] = block.forces[i]
+        for axis in range(3):
+            force = block.forces[i, axis]
+            block.sums[i, axis] += force
+            row = block.jacobian[3 * i + axis]
+            for k in range(block.dofs):
+                effect[k] += row[k] * force
+    for k in range(block.dofs):
+        effect[k] -= block.bias[k]
+        block.overall_force[k] = effect[k] + block.torque[k]
 
 
 def _touch(limits, touching, lifted, times, forces, speeds, period):
@@ -176,7 +255,7 @@ OFFSETS = BlockLayout(
     # work space: the Jacobian of contacts that are not lifted
     jacobian=(float, "row_count", "dofs"),
     factor=(float, "row_count", "row_count"),
-    spread=(float, "size", "row_count"),
+    spread=(float, "row_count", "size"),
     needed=(float, "row_count"),
     solved=(float, "size", "size"),
 )
@@ -185,14 +264,33 @@ OFFSETS = BlockLayout(
 _offsets_at = OFFSETS.at
 
 
+@exact_part
+def _spread_weights(block, weights, lifted, contacts):
+    """Write the Jacobian without lifted contacts, and L^-1 J S of the joints, with the factor L of J S J^T."""
+    jacobian = block.jacobian
+    factor = block.factor
+    spread = block.spread
+    columns = block.columns
+    for i in range(block.row_count):
+        for k in range(block.dofs):
+            jacobian[i, k] = 0.0 if lifted[i // 3] else contacts[i, k]
+    _normal_matrix(jacobian, weights, columns, block.diagonal, factor)
+    for i in range(block.row_count):
+        row = spread[i]
+        for a in range(block.size):
+            column = columns[block.first + a]
+            row[a] = jacobian[i, column] * weights[column]
+        for k in range(i):
+            for a in range(block.size):
+                row[a] -= factor[i, k] * spread[k, a]
+        for a in range(block.size):
+            row[a] /= factor[i, i]
+
+
 def _learn(start, contacts, world, lifted, pushed):
     """Add what a cycle reports of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
     block = _offsets_at(start)
     weights = block.pushed if pushed else block.calm
-    jacobian = block.jacobian
-    for i in range(block.row_count):
-        for k in range(block.dofs):
-            jacobian[i, k] = 0.0 if lifted[i // 3] else contacts[i, k]
     columns = block.columns
     fraction = block.fraction
     decay = block.decay
@@ -200,30 +298,27 @@ def _learn(start, contacts, world, lifted, pushed):
     needed = block.needed
     solved = block.solved
     offsets = block.offsets
-    _normal_matrix(jacobian, weights, columns, block.diagonal, block.factor)
+    _spread_weights(block, weights, lifted, contacts)
     for i in range(block.row_count):
         needed[i] = 0.0
         for column in columns:
-            needed[i] += jacobian[i, column] * weights[column] * world[column]
-        for a in range(block.size):
-            column = columns[block.first + a]
-            spread[a, i] = jacobian[i, column] * weights[column]
+            needed[i] += block.jacobian[i, column] * weights[column] * world[column]
     forward(block.factor, needed)
-    for a in range(block.size):
-        forward(block.factor, spread[a])
     for a in range(block.size):
         column = columns[block.first + a]
         left = weights[column] * world[column]
+        row = solved[a]
+        row[:] = 0.0
+        row[a] = weights[column]
         for i in range(block.row_count):
-            left -= spread[a, i] * needed[i]
+            left -= spread[i, a] * needed[i]
+            for b in range(a + 1):
+                row[b] -= spread[i, a] * spread[i, b]
         block.moments[a] += -fraction * left - decay * block.moments[a]
         for b in range(a + 1):
-            left = weights[column] if a == b else 0.0
-            for i in range(block.row_count):
-                left -= spread[a, i] * spread[b, i]
-            block.information[a, b] += fraction * left - decay * block.information[a, b]
-            solved[a, b] = block.information[a, b]
-        solved[a, a] += block.prior
+            block.information[a, b] += fraction * row[b] - decay * block.information[a, b]
+            row[b] = block.information[a, b]
+        row[a] += block.prior
     cholesky(solved)
     for a in range(block.size):
         offsets[a] = block.moments[a]
@@ -238,7 +333,10 @@ _VECTOR = "float64[::1]"
 
 explain = cached("void(int64, float64, float64)", _explain, sources=[DENSE, Path(base_chart.__file__)])
 learn = cached(f"void(int64, {_MATRIX}, {_VECTOR}, boolean[::1], boolean)", _learn, sources=[DENSE])
-measure = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})", _measure)
+gather = cached("void(int64)", _gather, sources=[POINTERS])
+push = cached(f"void(int64, {_MATRIX})", _push, sources=[POINTERS])
+measure = cached("void(int64)", _measure, REORDERED, sources=[POINTERS])
+publish = cached("void(int64, boolean[::1])", _publish, sources=[POINTERS])
 touch = cached(
     f"void({_VECTOR}, boolean[::1], boolean[::1], {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
     _touch,

@@ -107,7 +107,7 @@ class WeightedLaw:
         """
         forces = self._forces
         forces.update(passed)
-        self._pushed.write_forces(forces.value)
+        self._pushed.write(forces.value)
         if self.offsets is not None:
             x, y, z = self.push[:3].tolist()
             self.offsets.update(jacobian, forces.world, lifted, x * x + y * y + z * z > self._largest**2)

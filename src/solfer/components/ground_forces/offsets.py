@@ -64,7 +64,7 @@ class TorqueOffsets:
             offsets=np.zeros(count),
             value=self.value,
             factor=np.zeros((rows, rows)),
-            spread=np.zeros((count, rows)),
+            spread=np.zeros((rows, count)),
             needed=np.zeros(rows),
             solved=np.zeros((count, count)),
         )

@@ -115,10 +115,11 @@ def value_of(cls: type, message: Message) -> Any:
 
 def plain(value: Any) -> Any:
     """Convert a dataclass to a mapping of its fields, nested ones as well; arrays become tuples."""
-    kind = type(value)
-    if dataclasses.is_dataclass(kind):
+    kind: Any = type(value)
+    names = _names(kind)
+    if names is not None:
         fields = {}
-        for name in _names(kind):
+        for name in names:
             each = getattr(value, name)
             fields[name] = each if type(each) in _SCALARS else plain(each)
         return fields
@@ -130,8 +131,9 @@ def plain(value: Any) -> Any:
 
 
 @functools.cache
-def _names(cls: type) -> tuple[str, ...]:
-    return tuple(field.name for field in dataclasses.fields(cls))
+def _names(cls: type) -> tuple[str, ...] | None:
+    """Return the names of the fields of a dataclass; None for another class."""
+    return tuple(field.name for field in dataclasses.fields(cls)) if dataclasses.is_dataclass(cls) else None
 
 
 def made(cls: type, fields: Mapping[str, Any]) -> Any:

@@ -307,19 +307,21 @@ class XbotWriter(Writer):
         """
         if message is not self._last:
             self.prepare(message)
-        now = self._now()
         record = self._record
-        front = record.front
-        front[SENT_COLUMN] = now
-        front[STAMP_COLUMN] = message.stamp
         block = record.block
         if block is not None and message.block is not None and message.rows == record.rows:
             block[...] = message.block
         elif record.views:
             for name, view in record.views:
                 view[...] = getattr(message, name)
-        else:
+        elif not record.encode(message):  # no room: only writing it out shows how long a text is
+            self._lay_out(message)
+            record = self._record
             record.encode(message)
+        now = self._now()
+        front = record.front
+        front[SENT_COLUMN] = now
+        front[STAMP_COLUMN] = message.stamp
         self._end.put(int(1e9 * now))
 
     def close(self) -> None:

@@ -23,6 +23,8 @@ WIRE_COLUMNS = 2
 SEPARATE_FIELDS = ("stamp", "sender", "rows", "block")
 """Fields that are kept apart: those that every message has, and how its numbers lie."""
 
+_written = json.JSONEncoder().encode
+
 
 class WireRecord(abc.ABC):
     """One message in an array of float64.
@@ -48,8 +50,8 @@ class WireRecord(abc.ABC):
         self.message = message
         self.attributes: dict[str, Any] = vars(message)
 
-    def encode(self, message: Message) -> None:
-        """Write a message of the same layout, behind the columns in front, where it has no `views`."""
+    def encode(self, message: Message) -> bool:
+        """Write a message behind the columns in front, where it has no `views`; return whether there is room for it."""
         raise NotImplementedError
 
     def decode(self) -> Message:
@@ -136,12 +138,13 @@ class TextWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return dataclasses.replace(self.decode())
 
-    def encode(self, message: Message) -> None:
+    def encode(self, message: Message) -> bool:
         """See `WireRecord.encode`."""
         parts = [list(getattr(message, name)) for name in self._fields]
         while len(text := json.dumps(parts).encode()) > self._text.size:
             parts = [part[:-1] for part in parts]
         self._text.write(text)
+        return True
 
     def update(self) -> None:
         """See `WireRecord.update`."""
@@ -162,9 +165,13 @@ class FieldsWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return dataclasses.replace(self.decode())
 
-    def encode(self, message: Message) -> None:
+    def encode(self, message: Message) -> bool:
         """See `WireRecord.encode`."""
-        self._text.write(fields_text(message))
+        text = fields_text(message)
+        has_room = len(text) <= self._text.size
+        if has_room:
+            self._text.write(text)
+        return has_room
 
     def update(self) -> None:
         """See `WireRecord.update`."""
@@ -173,4 +180,4 @@ class FieldsWireRecord(WireRecord):
 
 def fields_text(message: Message) -> bytes:
     """Write out the fields of a FieldsMessage."""
-    return json.dumps(cast(FieldsMessage, message).fields).encode()
+    return _written(cast(FieldsMessage, message).fields).encode()
