@@ -7,6 +7,7 @@ from solfer.dynamics import BIAS, INERTIA, DynamicModel
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
 from solfer.numerics.bounds.velocity import VelocityBounds
+from solfer.numerics.compilation import cached
 from solfer.points import Handler, Point
 from solfer.tasks.task import as_numbers, updated_in_order
 
@@ -192,12 +193,28 @@ class WorkspaceLimit(Constraint):
     def update(self) -> None:
         """Compute the row at the state of the last update of the Robot."""
         self._points.update()
-        x = self._point.value
-        np.dot(x, self._point.jacobian, out=self.matrix[0])
-        self.matrix *= 2.0
-        square = float(np.dot(x, x))
-        self.lower[0] = min(self._least - square, 0.0) * self._rate
-        self.upper[0] = max(self._largest - square, 0.0) * self._rate
+        self.lower[0], self.upper[0] = _limit(
+            self._point.value, self._point.jacobian, self._least, self._largest, self._rate, self.matrix
+        )
+
+
+def _limit_square(x, jacobian, least, largest, rate, matrix):
+    """See `WorkspaceLimit`: write 2 x' J, and return the bounds."""
+    square = 0.0
+    for i in range(len(x)):
+        square += x[i] * x[i]
+    for k in range(matrix.shape[1]):
+        entry = 0.0
+        for i in range(len(x)):
+            entry += x[i] * jacobian[i, k]
+        matrix[0, k] = 2.0 * entry
+    return min(least - square, 0.0) * rate, max(largest - square, 0.0) * rate
+
+
+_MATRIX = "float64[:, ::1]"
+_limit = cached(
+    f"UniTuple(float64, 2)(float64[::1], {_MATRIX}, float64, float64, float64, {_MATRIX})", _limit_square
+)
 
 
 def require_positive(value: float, what: str, where: str) -> float:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from solfer.components.following.quantity import PoseNumbers
+from solfer.numerics.compilation import cached
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import ReferenceFilter
 from solfer.points import Constant
@@ -71,7 +72,6 @@ class FeedForward:
         # live; assigning to `task.velocity` would check it
         self._velocity = task.velocity
         self._own = task.velocity.copy()
-        self._fed = np.zeros(task.rows)
         self._rows = task.selected
         self._rate = np.zeros(0)
         self.is_used = False
@@ -83,9 +83,16 @@ class FeedForward:
 
     def write(self, pace: float) -> None:
         """Write the velocity of the task, at a pace of its reference."""
-        np.take(self._rate, self._rows, out=self._fed, mode="clip")
-        np.multiply(self._fed, pace, out=self._fed)
-        np.add(self._fed, self._own, out=self._velocity)
+        _feed(self._rate, self._rows, self._own, pace, self._velocity)
+
+
+def _feed_forward(rate, rows, own, pace, out):
+    """See `FeedForward.write`."""
+    for k in range(len(out)):
+        out[k] = rate[rows[k]] * pace + own[k]
+
+
+_feed = cached("void(float64[::1], int64[::1], float64[::1], float64, float64[:])", _feed_forward)
 
 
 class HeldPlace:
