@@ -7,8 +7,8 @@ from solfer.dynamics import BIAS, INERTIA, DynamicModel
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
 from solfer.numerics.bounds.velocity import VelocityBounds
-from solfer.numerics.compilation import cached
 from solfer.points import Handler, Point
+from solfer.tasks.kernel import limit_square
 from solfer.tasks.task import as_numbers, updated_in_order
 
 
@@ -193,28 +193,9 @@ class WorkspaceLimit(Constraint):
     def update(self) -> None:
         """Compute the row at the state of the last update of the Robot."""
         self._points.update()
-        self.lower[0], self.upper[0] = _limit(
+        self.lower[0], self.upper[0] = limit_square(
             self._point.value, self._point.jacobian, self._least, self._largest, self._rate, self.matrix
         )
-
-
-def _limit_square(x, jacobian, least, largest, rate, matrix):
-    """See `WorkspaceLimit`: write 2 x' J, and return the bounds."""
-    square = 0.0
-    for i in range(len(x)):
-        square += x[i] * x[i]
-    for k in range(matrix.shape[1]):
-        entry = 0.0
-        for i in range(len(x)):
-            entry += x[i] * jacobian[i, k]
-        matrix[0, k] = 2.0 * entry
-    return min(least - square, 0.0) * rate, max(largest - square, 0.0) * rate
-
-
-_MATRIX = "float64[:, ::1]"
-_limit = cached(
-    f"UniTuple(float64, 2)(float64[::1], {_MATRIX}, float64, float64, float64, {_MATRIX})", _limit_square
-)
 
 
 def require_positive(value: float, what: str, where: str) -> float:

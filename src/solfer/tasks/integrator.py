@@ -1,13 +1,16 @@
 """Joint positions that follow joint velocities, within the limits of the joints."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import SizeMismatch, TaskError
 from solfer.model.view import RobotView
 from solfer.numerics.blocks import BlockLayout, MemoryBlock
+from solfer.numerics.bounds import velocity as velocity_bounds
 from solfer.numerics.bounds.velocity import VelocityBounds
-from solfer.numerics.compilation import cached
+from solfer.numerics.compilation import cached, exact_part
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.task import as_numbers
 
@@ -56,6 +59,7 @@ class ReferenceIntegrator:
             size=size,
             has_lead=bool(np.isfinite(lead).any()),
             lead=np.full(size, lead),
+            rate=bounds.rate,
             limits=bounds.limits,
             lower_position=bounds.lower_position,
             upper_position=bounds.upper_position,
@@ -88,7 +92,6 @@ class ReferenceIntegrator:
         Returns:
             The desired velocities within all limits, shape (n,): those of the Robot's desired state, live.
         """
-        self._bounds.update(self._command.position)
         _integrate(self._block.address, velocity, self.period)
         return self._command.velocity
 
@@ -104,6 +107,7 @@ INTEGRATION = BlockLayout(
     "Integration",
     size=int,
     has_lead=bool,
+    rate=(float, 1),
     lead=(float, "size"),
     # lower and upper bounds of velocities, and speeds
     limits=(float, 3, "size"),
@@ -117,6 +121,7 @@ INTEGRATION = BlockLayout(
 """What `_integrate_all` reads and writes."""
 
 _integration_at = INTEGRATION.at
+_bound = exact_part(velocity_bounds.bound_velocities)
 
 
 def _integrate_all(address, velocity, period):
@@ -126,6 +131,7 @@ def _integrate_all(address, velocity, period):
     """
     block = _integration_at(address)
     position = block.position
+    _bound(block.lower_position, block.upper_position, block.rate, block.limits, position)
     for k in range(block.size):
         low = block.limits[0, k]
         high = block.limits[1, k]
@@ -140,4 +146,4 @@ def _integrate_all(address, velocity, period):
         position[k] = np.minimum(np.maximum(desired, block.lower_position[k]), block.upper_position[k])
 
 
-_integrate = cached("void(int64, float64[::1], float64)", _integrate_all)
+_integrate = cached("void(int64, float64[::1], float64)", _integrate_all, sources=[Path(velocity_bounds.__file__)])

@@ -411,6 +411,19 @@ def _objective(jacobian, velocity, numbers, before, hessian, gradient):
                     hessian[m, k] += entry * jacobian[i, k]
 
 
+def _limit_square(x, jacobian, least, largest, rate, matrix):
+    """See `solfer.tasks.constraints.WorkspaceLimit`: write 2 x' J, and return the bounds."""
+    square = 0.0
+    for i in range(len(x)):
+        square += x[i] * x[i]
+    for k in range(matrix.shape[1]):
+        entry = 0.0
+        for i in range(len(x)):
+            entry += x[i] * jacobian[i, k]
+        matrix[0, k] = 2.0 * entry
+    return min(least - square, 0.0) * rate, max(largest - square, 0.0) * rate
+
+
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
 
@@ -428,3 +441,6 @@ count_kept = cached(
 )
 span = cached(f"void({_MATRIX}, int64, int64, {_MATRIX})", _span, REORDERED)
 objective = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})", _objective, REORDERED)
+limit_square = cached(
+    f"UniTuple(float64, 2)({_VECTOR}, {_MATRIX}, float64, float64, float64, {_MATRIX})", _limit_square
+)

@@ -194,7 +194,7 @@ class WheelInertialFilter:
     @property
     def excess(self) -> float:
         """What the gyroscope measures too much about the vertical in this interval: bias and noise [rad/s]."""
-        return self.bias + float(self.state[kernel.GYRO_NOISE])
+        return float(self._vertical.dot(self._bias_of_base)) + float(self.state[kernel.GYRO_NOISE])
 
     @property
     def bias_variance(self) -> float:
