@@ -88,7 +88,6 @@ class QpHierarchy:
         weights = self._inequalities.weights
         forbidden = np.full_like(weights, np.inf)
         self._descent = Descent(self.stack, checks=True)
-        self._steps = self._descent.reached[1:]
         basis = self._descent.basis
         none = np.zeros(0)
         self._velocity_bounds = (none, none) if bounds is None else (bounds.lower, bounds.upper)
@@ -153,7 +152,7 @@ class QpHierarchy:
         slopes = self._descent.slopes.tolist()
         free = [
             Solution(QpStatus.SOLVED, x.copy(), 0, problem=None, residual=slope)
-            for x, slope in zip(self._steps[: self._free], slopes, strict=False)
+            for x, slope in zip(self._descent.steps[: self._free], slopes, strict=False)
         ]
         return [*free, *self._solved[self._free :]]
 
@@ -171,7 +170,7 @@ class QpHierarchy:
         inequalities = self._inequalities
         descent.update()
         count = count_kept(
-            self._steps,
+            descent.steps,
             descent.slopes,
             *self._velocity_bounds,
             inequalities.matrix,
@@ -182,7 +181,7 @@ class QpHierarchy:
         if self._failing:
             self._failing.difference_update(range(count))
         if count:
-            self._store(self._steps[count - 1])
+            self._store(descent.steps[count - 1])
         return count
 
     def _store(self, x: np.ndarray) -> None:

@@ -132,7 +132,6 @@ class WheelInertialFilter:
         self.velocity = self.state[VELOCITY:GYRO_BIAS]
         self.tilt = self.state[TILT:SLOPE]
         self.axes = np.eye(3)
-        self._vertical = self.axes[2]
         self._bias_of_base = self.state[GYRO_BIAS : GYRO_BIAS + 3]
         self.pushed = np.zeros(5)
         self.rolling = np.ones(count)
@@ -189,12 +188,12 @@ class WheelInertialFilter:
     @property
     def bias(self) -> float:
         """Bias of the gyroscope about the vertical [rad/s]."""
-        return float(self._vertical.dot(self._bias_of_base))
+        return float(self.axes[2].dot(self._bias_of_base))
 
     @property
     def excess(self) -> float:
         """What the gyroscope measures too much about the vertical in this interval: bias and noise [rad/s]."""
-        return float(self._vertical.dot(self._bias_of_base)) + float(self.state[kernel.GYRO_NOISE])
+        return float(self.axes[2].dot(self._bias_of_base)) + float(self.state[kernel.GYRO_NOISE])
 
     @property
     def bias_variance(self) -> float:
