@@ -25,6 +25,7 @@ KERNELS = {
     "approach",
     "count_kept",
     "gather",
+    "limit_square",
     "objective",
     "self._check",
     "self._receive",

@@ -206,7 +206,9 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
         quaternion = (zx + xz, zy + yz, 1.0 + zz - xx - yy, yx - xy)
     else:
         quaternion = (zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz)
-    return np.array(quaternion) / math.copysign(math.hypot(*quaternion), quaternion[3])
+    x, y, z, w = quaternion
+    length = math.copysign(math.hypot(x, y, z, w), w)
+    return np.array((x / length, y / length, z / length, w / length))
 
 
 def rotation_onto(axis: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.points import Handler, Point
+from solfer.tasks.kernel import limit_square
 from solfer.tasks.task import as_numbers, updated_in_order
 
 
@@ -192,12 +193,9 @@ class WorkspaceLimit(Constraint):
     def update(self) -> None:
         """Compute the row at the state of the last update of the Robot."""
         self._points.update()
-        x = self._point.value
-        np.dot(x, self._point.jacobian, out=self.matrix[0])
-        self.matrix *= 2.0
-        square = float(np.dot(x, x))
-        self.lower[0] = min(self._least - square, 0.0) * self._rate
-        self.upper[0] = max(self._largest - square, 0.0) * self._rate
+        self.lower[0], self.upper[0] = limit_square(
+            self._point.value, self._point.jacobian, self._least, self._largest, self._rate, self.matrix
+        )
 
 
 def require_positive(value: float, what: str, where: str) -> float:

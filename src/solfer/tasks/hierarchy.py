@@ -18,6 +18,7 @@ class Descent:
 
     Attributes:
         reached: Zeros, then the joint velocities after each level, shape (levels + 1, n); live.
+        steps: The same without these zeros, shape (levels, n); live.
         slopes: What is left of the slope of each level's cost beside the levels before, as a ratio of its largest
             term, shape (levels,); empty without checks.
         basis: Orthonormal rows that span those of the levels but the last, with zeros for dependent ones, shape
@@ -30,6 +31,7 @@ class Descent:
         slopes = levels if checks else 0
         largest = int(np.diff(stack.ends).max())
         self.reached = np.zeros((levels + 1, cols))
+        self.steps = self.reached[1:]
         self.slopes = np.zeros(slopes)
         self.basis = np.zeros((rows, cols))
         self._block = MemoryBlock(

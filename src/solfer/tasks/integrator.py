@@ -1,11 +1,16 @@
 """Joint positions that follow joint velocities, within the limits of the joints."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import SizeMismatch, TaskError
 from solfer.model.view import RobotView
+from solfer.numerics.blocks import BlockLayout, MemoryBlock
+from solfer.numerics.bounds import velocity as velocity_bounds
 from solfer.numerics.bounds.velocity import VelocityBounds
+from solfer.numerics.compilation import cached, exact_part
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.task import as_numbers
 
@@ -49,8 +54,19 @@ class ReferenceIntegrator:
         self._state = robot.state
         self._command = robot.command
         self.period = period
-        self._lead, self._has_lead = np.full(size, lead), bool(np.isfinite(lead).any())
-        self._work = np.zeros(size)
+        self._block = MemoryBlock(
+            INTEGRATION,
+            size=size,
+            has_lead=bool(np.isfinite(lead).any()),
+            lead=np.full(size, lead),
+            rate=bounds.rate,
+            limits=bounds.limits,
+            lower_position=bounds.lower_position,
+            upper_position=bounds.upper_position,
+            measured=robot.state.position,
+            position=robot.command.position,
+            velocity=robot.command.velocity,
+        )
 
     def set_period(self, period: float) -> None:
         """Set the time by which the next cycle goes on [s]."""
@@ -76,17 +92,8 @@ class ReferenceIntegrator:
         Returns:
             The desired velocities within all limits, shape (n,): those of the Robot's desired state, live.
         """
-        position = self._command.position
-        desired = self._command.velocity
-        self._bounds.update(position)
-        np.maximum(velocity, self._bounds.lower, out=desired)
-        np.minimum(desired, self._bounds.upper, out=desired)
-        if self._has_lead:
-            self._follow(position, desired)
-        np.multiply(desired, self.period, out=self._work)
-        position += self._work
-        self._stay_inside()
-        return desired
+        _integrate(self._block.address, velocity, self.period)
+        return self._command.velocity
 
     def _stay_inside(self) -> None:
         """Bring references into their ranges, also by what rounding adds."""
@@ -95,13 +102,48 @@ class ReferenceIntegrator:
         np.maximum(position, bounds.lower_position, out=position)
         np.minimum(position, bounds.upper_position, out=position)
 
-    def _follow(self, position: np.ndarray, desired: np.ndarray) -> None:
-        """Limit velocities so that references stay near the measured positions, or come back to there."""
-        for sign, ahead, behind in ((1.0, np.minimum, np.maximum), (-1.0, np.maximum, np.minimum)):
-            np.multiply(self._lead, sign, out=self._work)
-            self._work += self._state.position
-            self._work -= position
-            self._work /= self.period
-            # not faster than the joint may go back
-            behind(self._work, self._bounds.lower if sign > 0.0 else self._bounds.upper, out=self._work)
-            ahead(desired, self._work, out=desired)
+
+INTEGRATION = BlockLayout(
+    "Integration",
+    size=int,
+    has_lead=bool,
+    rate=(float, 1),
+    lead=(float, "size"),
+    # lower and upper bounds of velocities, and speeds
+    limits=(float, 3, "size"),
+    lower_position=(float, "size"),
+    upper_position=(float, "size"),
+    measured=(float, "size"),
+    # desired
+    position=(float, "size"),
+    velocity=(float, "size"),
+)
+"""What `_integrate_all` reads and writes."""
+
+_integration_at = INTEGRATION.at
+_bound = exact_part(velocity_bounds.bound_velocities)
+
+
+def _integrate_all(address, velocity, period):
+    """See `ReferenceIntegrator.update`; with a lead, velocities let references stay near the measured positions.
+
+    They are not faster than the joint may go back; a NaN stays one.
+    """
+    block = _integration_at(address)
+    position = block.position
+    _bound(block.lower_position, block.upper_position, block.rate, block.limits, position)
+    for k in range(block.size):
+        low = block.limits[0, k]
+        high = block.limits[1, k]
+        desired = np.minimum(np.maximum(velocity[k], low), high)
+        if block.has_lead:
+            most = (block.lead[k] + block.measured[k] - position[k]) / period
+            least = (-block.lead[k] + block.measured[k] - position[k]) / period
+            desired = np.minimum(desired, np.maximum(most, low))
+            desired = np.maximum(desired, np.minimum(least, high))
+        block.velocity[k] = desired
+        desired = position[k] + desired * period
+        position[k] = np.minimum(np.maximum(desired, block.lower_position[k]), block.upper_position[k])
+
+
+_integrate = cached("void(int64, float64[::1], float64)", _integrate_all, sources=[Path(velocity_bounds.__file__)])

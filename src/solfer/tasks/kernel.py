@@ -248,7 +248,8 @@ def _leave(column, free, factors, count):
 def _finish(block, start, end, count, out):
     """Add the step of the last level in the coordinates z of what is left: (A' D^-2 A + 1) z = A' D^-2 (r - J dq).
 
-    With A = J F, where F are the free columns, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F z.
+    With A = J F, where F are the free columns, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F z. Of the only level all
+    columns are free: F = 1.
     """
     jacobian = block.jacobian
     free = block.projected
@@ -268,17 +269,24 @@ def _finish(block, start, end, count, out):
             entry = jacobian[i, k]
             if entry != 0.0:  # of a posture, and of hands, most are
                 left -= entry * out[k]
-                for j in range(count):
-                    row[j] += entry * free[k, j]
+                if start:
+                    for j in range(count):
+                        row[j] += entry * free[k, j]
+                else:
+                    row[k] = entry
         for j in range(count):
             factor = weight * row[j]
-            right[j] += factor * left
-            for k in range(j + 1):
-                square[j, k] += factor * row[k]
+            if factor != 0.0:
+                right[j] += factor * left
+                for k in range(j + 1):
+                    square[j, k] += factor * row[k]
     matrix = square[:count, :count]
     cholesky(matrix)
     forward(matrix, right)
     backward(matrix, right)
+    if not start:
+        out[:] = right
+        return
     for k in range(cols):
         entry = out[k]
         for j in range(count):
@@ -328,9 +336,9 @@ def _descend(address):
         out = block.reached[level + 1]
         out[:] = before
         is_last = level == block.levels - 1
-        if is_last and start and end - start > _dimensions(basis, start):
+        if is_last and end - start > _dimensions(basis, start):
             # `projected` is not needed any more
-            count = _complete(basis, start, projected, block.work)
+            count = _complete(basis, start, projected, block.work) if start else block.cols
             _finish(block, start, end, count, out)
         else:
             _project(block, start, end, residual, out)
@@ -403,6 +411,19 @@ def _objective(jacobian, velocity, numbers, before, hessian, gradient):
                     hessian[m, k] += entry * jacobian[i, k]
 
 
+def _limit_square(x, jacobian, least, largest, rate, matrix):
+    """See `solfer.tasks.constraints.WorkspaceLimit`: write 2 x' J, and return the bounds."""
+    square = 0.0
+    for i in range(len(x)):
+        square += x[i] * x[i]
+    for k in range(matrix.shape[1]):
+        entry = 0.0
+        for i in range(len(x)):
+            entry += x[i] * jacobian[i, k]
+        matrix[0, k] = 2.0 * entry
+    return min(least - square, 0.0) * rate, max(largest - square, 0.0) * rate
+
+
 _MATRIX = "float64[:, ::1]"
 _VECTOR = "float64[::1]"
 
@@ -420,3 +441,6 @@ count_kept = cached(
 )
 span = cached(f"void({_MATRIX}, int64, int64, {_MATRIX})", _span, REORDERED)
 objective = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})", _objective, REORDERED)
+limit_square = cached(
+    f"UniTuple(float64, 2)({_VECTOR}, {_MATRIX}, float64, float64, float64, {_MATRIX})", _limit_square
+)

@@ -60,7 +60,6 @@ class QpHierarchy:
         stack: The levels.
         policy: Reaction to a failed QP.
         velocity: Joint velocities as of the last `update`, shape (n,) [rad/s, m/s]; live.
-        solutions: Solution of each level in the last `update`; None for levels after one that failed.
         relaxed: Solution of the first level with these slacks, None where that was not needed.
 
     Raises:
@@ -89,7 +88,6 @@ class QpHierarchy:
         weights = self._inequalities.weights
         forbidden = np.full_like(weights, np.inf)
         self._descent = Descent(self.stack, checks=True)
-        self._steps = self._descent.reached[1:]
         basis = self._descent.basis
         none = np.zeros(0)
         self._velocity_bounds = (none, none) if bounds is None else (bounds.lower, bounds.upper)
@@ -112,7 +110,8 @@ class QpHierarchy:
                 self.stack, 0, bounds, inequalities=self._inequalities, weights=weights, basis=basis
             )
         self.velocity = np.zeros(size)
-        self.solutions: list[Solution | None] = [None] * len(self._levels)
+        self._solved: list[Solution | None] = [None] * len(self._levels)
+        self._free = 0  # levels whose steps are those of the null spaces
         self.relaxed: Solution | None = None
         self._throttle, self._failing = Throttle(log), set[int]()
         # the first QP may come late: it shall take no longer than the others, and no memory
@@ -132,10 +131,12 @@ class QpHierarchy:
         self._inequalities.update()
         self.velocity[:] = 0.0
         self.relaxed = None
-        self.solutions[:] = [None] * len(self._levels)
-        free = self._free_levels()
+        self._free = free = self._free_levels()
+        if free == len(self._levels):
+            return self.velocity
+        self._solved[:] = [None] * len(self._levels)
         for index, level in enumerate(self._levels[free:], free):
-            solution = self.solutions[index] = level.solve(self.velocity)
+            solution = self._solved[index] = level.solve(self.velocity)
             if not solution.is_solved:
                 solution = self._after_failure(index, solution)
                 if solution is None:
@@ -144,6 +145,16 @@ class QpHierarchy:
                 self._failing.discard(index)
             self._store(solution.x)
         return self.velocity
+
+    @property
+    def solutions(self) -> list[Solution | None]:
+        """Solution of each level in the last `update`; None for levels after one that failed; a new list."""
+        slopes = self._descent.slopes.tolist()
+        free = [
+            Solution(QpStatus.SOLVED, x.copy(), 0, problem=None, residual=slope)
+            for x, slope in zip(self._descent.steps[: self._free], slopes, strict=False)
+        ]
+        return [*free, *self._solved[self._free :]]
 
     @property
     def smallest_singular_values(self) -> np.ndarray:
@@ -159,7 +170,7 @@ class QpHierarchy:
         inequalities = self._inequalities
         descent.update()
         count = count_kept(
-            self._steps,
+            descent.steps,
             descent.slopes,
             *self._velocity_bounds,
             inequalities.matrix,
@@ -167,14 +178,10 @@ class QpHierarchy:
             inequalities.upper,
             1e-9,  # tolerance, as that of a `QpSolver`
         )
-        for index in range(count):
-            x = self._steps[index]
-            self._failing.discard(index)
-            self.solutions[index] = Solution(
-                QpStatus.SOLVED, x.copy(), 0, problem=None, residual=float(descent.slopes[index])
-            )
+        if self._failing:
+            self._failing.difference_update(range(count))
         if count:
-            self._store(self._steps[count - 1])
+            self._store(descent.steps[count - 1])
         return count
 
     def _store(self, x: np.ndarray) -> None:

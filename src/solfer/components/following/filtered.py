@@ -1,8 +1,12 @@
 """What a task follows in a cycle: one reference of a filter, its velocity, or the place where it has come to rest."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from solfer.components.following.quantity import PoseNumbers
+from solfer.numerics.compilation import cached
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import ReferenceFilter
 from solfer.points import Constant
@@ -65,27 +69,31 @@ class FeedForward:
 
     Attributes:
         is_used: Whether the velocity of the reference counts.
+        write: write(pace) writes the velocity of the task, at a pace of its reference; from `connect` on.
     """
+
+    write: Callable[[float], None]
 
     def __init__(self, task: Task):
         # live; assigning to `task.velocity` would check it
         self._velocity = task.velocity
         self._own = task.velocity.copy()
-        self._fed = np.zeros(task.rows)
         self._rows = task.selected
-        self._rate = np.zeros(0)
         self.is_used = False
 
     def connect(self, rate: np.ndarray, is_used: bool) -> None:
         """Let the velocity of the reference be `rate`; live."""
-        self._rate = rate
         self.is_used = is_used
+        self.write = partial(_feed, rate, self._rows, self._own, self._velocity)
 
-    def write(self, pace: float) -> None:
-        """Write the velocity of the task, at a pace of its reference."""
-        np.take(self._rate, self._rows, out=self._fed, mode="clip")
-        np.multiply(self._fed, pace, out=self._fed)
-        np.add(self._fed, self._own, out=self._velocity)
+
+def _feed_forward(rate, rows, own, out, pace):
+    """See `FeedForward.write`."""
+    for k in range(len(out)):
+        out[k] = rate[rows[k]] * pace + own[k]
+
+
+_feed = cached("void(float64[::1], int64[::1], float64[::1], float64[:], float64)", _feed_forward)
 
 
 class HeldPlace:

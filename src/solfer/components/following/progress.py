@@ -38,10 +38,8 @@ class Residual:
 
     def measure(self) -> None:
         """Measure them."""
-        place = self._place
-        turn = self._turn
-        self.values[0] = math.sqrt(float(place.dot(place))) if len(place) else 0.0
-        self.values[1] = math.sqrt(float(turn.dot(turn))) if len(turn) else 0.0
+        self.values[0] = math.hypot(*self._place.tolist())
+        self.values[1] = math.hypot(*self._turn.tolist())
 
     def is_beyond(self) -> bool:
         """Return whether one of them is beyond its tolerance."""

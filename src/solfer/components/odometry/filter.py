@@ -509,15 +509,13 @@ class FilteredOdometry:
         kalman.integrate(self.heading + 0.5 * yaw, period, imu_time, unknown)
         if motion.feet is None:
             ground.settle(self._tags.settle, period)
-        self.position += kalman.correction[:3]
-        yaw += float(kalman.correction[3])
-        kalman.correction[:] = 0.0
+        yaw = filter_kernel.move_base(
+            self.position, kalman.correction, kalman.velocity, kalman.pushed, motion.tilting, self.heading, yaw, period
+        )  # fmt: skip
         imu.pending += yaw
         if base.fresh:
             imu.offset += imu.pending - float(base.turned[2])
             imu.pending = imu.since = 0.0
-        displacement = (kalman.velocity - 0.5 * kalman.pushed[:3]) * period - motion.tilting
-        self.position += about_vertical(displacement, self.heading + 0.5 * yaw)
         self.heading = base.heading + imu.offset if base.fresh else self.heading + yaw
         if motion.feet is not None:
             return

@@ -299,6 +299,25 @@ def _learn_spreads(start, velocity, yaw_rate, inliers, keep):
             trusted[i] = weights[i]
 
 
+def _move_base(position, correction, velocity, pushed, tilting, heading, yaw, period):
+    """Move the base by a correction, which is done then, and by its velocity in the middle of a yaw; return the yaw.
+
+    Half of what an accelerometer `pushed` in the interval was not there in its middle.
+    """
+    for axis in range(3):
+        position[axis] += correction[axis]
+    yaw += correction[3]
+    correction[:] = 0.0
+    cosine = math.cos(heading + 0.5 * yaw)
+    sine = math.sin(heading + 0.5 * yaw)
+    x = (velocity[0] - 0.5 * pushed[0]) * period - tilting[0]
+    y = (velocity[1] - 0.5 * pushed[1]) * period - tilting[1]
+    position[0] += cosine * x - sine * y
+    position[1] += sine * x + cosine * y
+    position[2] += (velocity[2] - 0.5 * pushed[2]) * period - tilting[2]
+    return yaw
+
+
 @part
 def fit_plane(weights, arms, without, slope):
     """Write the slopes of the plane through the contacts that count, without one of them; return whether there is one.
@@ -565,6 +584,7 @@ measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})",
 learn_spreads = cached(f"void(int64, {_V}, {_F}, {_B}, {_F})", _learn_spreads)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
 follow_plane = cached(f"int64(int64, int64, {_F}, {_V}, {_V}, boolean, {_F})", _follow_plane)
+move_base = cached(f"float64({_V}, {_V}, {_V}, {_V}, {_V}, {_F}, {_F}, {_F})", _move_base)
 find_lifted = cached(f"void(int64, int64, {_F}, {_V}, {_V}, {_F}, {_F})", _find_lifted)
 velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V}, {_M}, {_F}, {_M})", _velocity_of_base)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)

@@ -183,17 +183,17 @@ class WheelInertialFilter:
     @property
     def biases(self) -> np.ndarray:
         """Bias of the gyroscope in H, shape (3,) [rad/s]; a new array."""
-        return np.asarray(self.axes @ self._bias_of_base)
+        return self.axes.dot(self._bias_of_base)
 
     @property
     def bias(self) -> float:
         """Bias of the gyroscope about the vertical [rad/s]."""
-        return float(self.axes[2] @ self._bias_of_base)
+        return float(self.axes[2].dot(self._bias_of_base))
 
     @property
     def excess(self) -> float:
         """What the gyroscope measures too much about the vertical in this interval: bias and noise [rad/s]."""
-        return float(self.axes[2] @ self._bias_of_base) + float(self.state[kernel.GYRO_NOISE])
+        return float(self.axes[2].dot(self._bias_of_base)) + float(self.state[kernel.GYRO_NOISE])
 
     @property
     def bias_variance(self) -> float:

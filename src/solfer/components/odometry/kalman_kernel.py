@@ -3,7 +3,7 @@
 import math
 
 from solfer.numerics.blocks import BlockLayout
-from solfer.numerics.compilation import cached, part
+from solfer.numerics.compilation import cached, exact_part, part
 from solfer.numerics.dense import DENSE, cholesky, forward
 
 POSITION = 0
@@ -200,7 +200,7 @@ def set_wheel_rows(kalman, wheel, arm, covered, expected):
 
 @part
 def propagate(kalman):
-    """Write F P F^T + Q over P; zeros of F are left out."""
+    """Write F P F^T + Q over P, symmetric to the bit; zeros of F are left out."""
     covariance = kalman.covariance
     transition = kalman.transition
     half = kalman.half
@@ -213,20 +213,23 @@ def propagate(kalman):
                 for k in range(size):
                     half[i, k] += factor * covariance[j, k]
     for k in range(size):
-        for i in range(size):
+        for i in range(k + 1):
             covariance[k, i] = kalman.noise[k, i]
         for j in range(size):
             factor = transition[k, j]
             if factor != 0.0:
-                for i in range(size):
+                for i in range(k + 1):
                     covariance[k, i] += factor * half[i, j]
+        for i in range(k):
+            covariance[i, k] = covariance[k, i]
 
 
-@part
+@exact_part
 def apply_gain(kalman, innovation, variance, first):
     """Correct the state by an innovation of a variance; its covariance with the state is in the work space.
 
-    What precedes `first` and the radii are considered and not corrected (Schmidt).
+    What precedes `first` and the radii are considered and not corrected (Schmidt). Whole rows are several numbers at
+    once; as sums and products are as they are written, the covariance stays symmetric to the bit.
     """
     covariance = kalman.covariance
     state = kalman.state
@@ -237,10 +240,10 @@ def apply_gain(kalman, innovation, variance, first):
         gain[i] = mapped[i] / variance if first <= i < RADIUS else 0.0
         state[i] += gain[i] * innovation
     for i in range(size):
-        for k in range(i + 1):
-            change = variance * gain[i] * gain[k] - gain[i] * mapped[k] - mapped[i] * gain[k]
-            covariance[i, k] += change
-            covariance[k, i] = covariance[i, k]
+        one = gain[i]
+        other = mapped[i]
+        for k in range(size):
+            covariance[i, k] += variance * (one * gain[k]) - (one * mapped[k] + other * gain[k])
 
 
 @part

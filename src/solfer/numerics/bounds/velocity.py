@@ -31,6 +31,7 @@ class VelocityBounds:
         upper: Upper bounds as of the last `update` [rad/s, m/s], shape (n,).
         speed: Largest speeds, as above.
         limits: All three in one array, shape (3, n).
+        rate: 1 / T, or of a longer period, shape (1,) [1/s]; live.
         update: Computes the bounds at a position [rad, m], shape (n,); allocates nothing.
 
     Raises:
@@ -53,17 +54,17 @@ class VelocityBounds:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
         self.lower_position, self.upper_position, speed = limits
         self._horizon = horizon
-        self._rate = np.array([1.0 / horizon])
+        self.rate = np.array([1.0 / horizon])
         self.limits = np.stack((-speed, speed, speed))
         self.lower, self.upper, self.speed = self.limits
-        self.update = partial(_bound, self.lower_position, self.upper_position, self._rate, self.limits)
+        self.update = partial(_bound, self.lower_position, self.upper_position, self.rate, self.limits)
 
     def set_period(self, period: float) -> None:
         """Set the time for which the next velocities hold [s]: no joint leaves its range within a longer one either."""
-        self._rate[0] = 1.0 / max(self._horizon, period)
+        self.rate[0] = 1.0 / max(self._horizon, period)
 
 
-def _bound_all(lower_position, upper_position, rates, limits, position):
+def bound_velocities(lower_position, upper_position, rates, limits, position):
     """See `VelocityBounds.update`; a NaN stays one."""
     rate = rates[0]
     speed = limits[2]
@@ -77,7 +78,7 @@ def _bound_all(lower_position, upper_position, rates, limits, position):
 
 
 _VECTOR = "float64[::1]"
-_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64[:, ::1], {_VECTOR})", _bound_all)
+_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64[:, ::1], {_VECTOR})", bound_velocities)
 
 
 def _check(joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray) -> None:

@@ -8,6 +8,9 @@ from solfer.numerics.blocks import BlockLayout, MemoryBlock
 from solfer.numerics.bounds.velocity import VelocityBounds
 from solfer.numerics.compilation import REORDERED, cached, part
 
+LANES = 16
+"""Rows have a multiple of so many columns: compiled loops take them so many at once, and what is left one by one."""
+
 
 @part
 def _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers):
@@ -171,21 +174,22 @@ DESCENT = BlockLayout(
     level_count=int,
     row_count=int,
     width=int,  # number of DoFs that move
+    padded=int,  # columns of the rows: those behind the DoFs are zero, see `LANES`
     dofs=int,
     rigid=int,
     ends=(int, "level_count + 1"),
     columns=(int, "width"),
     # rows that count: their entries, S, L; rates, squares of dampings, weights; and where levels end
-    rows=(float, "row_count", "width"),
-    solved=(float, "row_count", "width"),
+    rows=(float, "row_count", "padded"),
+    solved=(float, "row_count", "padded"),
     factor=(float, "row_count", "row_count"),
     numbers=(float, 3, "row_count"),
     used=(int, "level_count + 1"),
     # velocities of the columns: by all levels, where they are held, those without bounds, and which are free
-    found=(float, "width"),
+    found=(float, "padded"),
     held=(float, "width"),
-    first=(float, "width"),
-    is_free=(bool, "width"),
+    first=(float, "padded"),
+    is_free=(bool, "padded"),
     out=(float, "dofs"),
 )
 """What `descend` computes in, and its result."""
@@ -301,6 +305,7 @@ class DampedDescent:
     def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray, rigid: int = 0):
         rows = int(ends[-1])
         width = len(columns)
+        padded = -(-width // LANES) * LANES
         self._unbounded = np.zeros((0, size))
         self.velocity = np.zeros(size)
         self._block = MemoryBlock(
@@ -308,19 +313,20 @@ class DampedDescent:
             level_count=len(ends) - 1,
             row_count=rows,
             width=width,
+            padded=padded,
             dofs=size,
             rigid=rigid,
             ends=ends.astype(np.int64),
             columns=columns.astype(np.int64),
-            rows=np.zeros((rows, width)),
-            solved=np.zeros((rows, width)),
+            rows=np.zeros((rows, padded)),
+            solved=np.zeros((rows, padded)),
             factor=np.zeros((rows, rows)),
             numbers=np.zeros((3, rows)),
             used=np.zeros(len(ends), dtype=np.int64),
-            found=np.zeros(width),
+            found=np.zeros(padded),
             held=np.zeros(width),
-            first=np.zeros(width),
-            is_free=np.zeros(width, dtype=np.bool_),
+            first=np.zeros(padded),
+            is_free=np.zeros(padded, dtype=np.bool_),
             out=self.velocity,
         )
         self.count = 0

@@ -138,7 +138,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
             )
             if history is not None:
                 history.contradiction = ""
-                np.matmul(self._mount.rotation, reading.force, out=history.force)
+                np.dot(self._mount.rotation, reading.force, out=history.force)
             if oddity:
                 self.warnings.warn("force", oddity)
         self._mount.update()
