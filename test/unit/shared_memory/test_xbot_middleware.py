@@ -76,6 +76,14 @@ def test_every_message_arrives_as_it_was_sent(world, kind, queued):
             assert isinstance(value, np.ndarray) or getattr(received, name) == value
 
 
+def test_a_message_of_joints_without_numbers_arrives(world):
+    sender, receiver = world.node("sender"), world.node("receiver")
+    reader = receiver.reader("topic", JOINT_STATE)
+    sender.writer("topic", JOINT_STATE).write(JointMessage(("a", "b")))
+    assert reader.read() is MessageStatus.NEW
+    assert reader.message.names == ("a", "b") and reader.message.position is None
+
+
 def test_no_message_is_lost_at_a_new_layout(world):
     reader = world.node("a").reader("t", JOINT_STATE)
     queue = world.node("b").queue("t", JOINT_STATE)

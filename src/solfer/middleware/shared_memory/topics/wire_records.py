@@ -41,7 +41,6 @@ class WireRecord(abc.ABC):
 
     block: np.ndarray | None = None
     rows: tuple[str, ...] = ()
-
     views: Sequence[tuple[str, np.ndarray]] = ()
     changes = True
 
@@ -50,9 +49,9 @@ class WireRecord(abc.ABC):
         self.message = message
         self.attributes: dict[str, Any] = vars(message)
 
+    @abc.abstractmethod
     def encode(self, message: Message) -> bool:
         """Write a message behind the columns in front, where it has no `views`; return whether there is room for it."""
-        raise NotImplementedError
 
     def decode(self) -> Message:
         """Bring `message` up to date and return it."""
@@ -106,6 +105,10 @@ class NumbersWireRecord(WireRecord):
         self.changes = bool(self._tuples)
         if isinstance(self.message, JointMessage):
             self._lay(self.message, values[WIRE_COLUMNS:start])
+
+    def encode(self, _message: Message) -> bool:
+        """See `WireRecord.encode`: a message without `views` has no numbers."""
+        return True
 
     def copy(self) -> Message:
         """See `WireRecord.copy`."""
