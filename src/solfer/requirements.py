@@ -7,6 +7,7 @@ from solfer.errors import MissingDependency
 
 PACKAGES = {
     "mcap": "mcap",
+    "msgspec": "msgspec",
     "numba": "numba",
     "numpy": "numpy",
     "pinocchio": "pin",

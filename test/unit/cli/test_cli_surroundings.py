@@ -148,8 +148,8 @@ def test_missing_packages_are_one_error():
     done = subprocess.run([sys.executable, "-S", *COMMAND[1:], "check"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     first, second, *rest = done.stderr.splitlines()
-    assert first.startswith(f"error: {sys.executable} has no mcap, numba, ") and not rest
-    assert "python3 -m pip install mcap numba numpy pin pydantic" in second
+    assert first.startswith(f"error: {sys.executable} has no mcap, msgspec, numba, ") and not rest
+    assert "python3 -m pip install mcap msgspec numba numpy pin pydantic" in second
 
 
 @pytest.mark.parametrize("file", ["centauro.urdf", "centauro.srdf"])

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+import msgspec
 import numpy as np
 
 from solfer.segments.text import Text
@@ -23,7 +24,8 @@ WIRE_COLUMNS = 2
 SEPARATE_FIELDS = ("stamp", "sender", "rows", "block")
 """Fields that are kept apart: those that every message has, and how its numbers lie."""
 
-_written = json.JSONEncoder().encode
+_pack = msgspec.msgpack.Encoder().encode
+_unpack = msgspec.msgpack.Decoder(ext_hook=lambda _code, text: json.loads(bytes(text))).decode
 
 
 class WireRecord(abc.ABC):
@@ -156,7 +158,7 @@ class TextWireRecord(WireRecord):
 
 
 class FieldsWireRecord(WireRecord):
-    """A message of fields, written out. See `TextWireRecord`."""
+    """A message of fields, packed by MessagePack."""
 
     message: FieldsMessage
 
@@ -178,9 +180,13 @@ class FieldsWireRecord(WireRecord):
 
     def update(self) -> None:
         """See `WireRecord.update`."""
-        self.message.fields = json.loads(self._text.read())
+        self.message.fields = _unpack(self._text.read())
 
 
 def fields_text(message: Message) -> bytes:
-    """Write out the fields of a FieldsMessage."""
-    return _written(cast(FieldsMessage, message).fields).encode()
+    """Pack the fields of a FieldsMessage; what MessagePack does not hold, such as wide integers, is JSON in it."""
+    fields = cast(FieldsMessage, message).fields
+    try:
+        return _pack(fields)
+    except (OverflowError, TypeError, UnicodeEncodeError):
+        return _pack(msgspec.msgpack.Ext(0, json.dumps(fields).encode()))
