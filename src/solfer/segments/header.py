@@ -9,7 +9,7 @@ from pathlib import Path
 from solfer.errors import MiddlewareError
 
 MAGIC = int.from_bytes(b"solferRT", "little")
-VERSION = 1
+VERSION = 2
 LAYOUT_OFFSET = 128
 """Size of the header, behind which the layout lies as a text [B]."""
 
