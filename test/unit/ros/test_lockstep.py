@@ -8,11 +8,12 @@ import rospy
 
 from solfer.errors import ConfigError, MiddlewareError
 from solfer.middleware.ros.endpoints import RosReader, RosWriter
-from solfer.middleware.ros.lockstep import client, server, step_clock
-from solfer.middleware.ros.lockstep.client import LockstepClient, followers
-from solfer.middleware.ros.lockstep.server import LockstepServer
-from solfer.middleware.ros.lockstep.step_clock import StepClock
-from solfer.middleware.ros.node.waiting import ShutdownRequested
+from solfer.middleware.ros.lockstep import followers
+from solfer.transport.lockstep import client
+from solfer.transport.lockstep.client import LockstepCall, LockstepClient, LockstepNetwork
+from solfer.transport.lockstep.server import LockstepServer
+from solfer.transport.lockstep.step_clock import StepClock
+from solfer.transport.waiting import ShutdownRequested
 
 PERIOD = 0.005  # [s]
 BOUND = 60.0  # [s]
@@ -40,9 +41,8 @@ class SleepingLoop:
 
 
 @pytest.fixture
-def alive(monkeypatch):
+def alive():
     """Event that lets nodes go on; ROS time stays as it is."""
-    monkeypatch.setattr(step_clock, "set_ros_time", lambda stamp: None)
     event = threading.Event()
     event.set()
     yield event
@@ -52,7 +52,7 @@ def alive(monkeypatch):
 @pytest.fixture
 def loop(alive):
     """Run a loop on a StepClock."""
-    clock = StepClock(alive.is_set)
+    clock = StepClock(alive.is_set, lambda time: None)
     made = SleepingLoop(clock, clock.sleep_until, alive.is_set)
     yield made, clock
     alive.clear()
@@ -81,7 +81,7 @@ def test_no_time_passes_when_the_simulation_goes_back(loop):
 
 
 def test_a_node_that_ends_lets_the_simulation_go(alive):
-    clock = StepClock(alive.is_set)
+    clock = StepClock(alive.is_set, lambda time: None)
     alive.clear()
     clock.sleep_until(1.0)
     with pytest.raises(ShutdownRequested):
@@ -108,33 +108,42 @@ def reader(topic, received):
     )
 
 
-class Network:
-    """Stands in for the master and for rospy's services: handlers by the service's name."""
+class Network(LockstepNetwork):
+    """Stands in for the middleware of all nodes: what answers, by the node's name."""
 
-    def __init__(self, monkeypatch):
-        self.handlers = {}
-        state = ([["/joint_states", ["/simulator"]]], [["/desired", ["/simulator"]]], [])
-        monkeypatch.setattr(client.rosgraph, "Master", lambda name: SimpleNamespace(getSystemState=lambda: state))
-        monkeypatch.setattr(rospy, "Service", self._serve)
-        monkeypatch.setattr(rospy, "ServiceProxy", lambda name, kind, persistent: Proxy(self.handlers, name))
-        monkeypatch.setattr(server, "provider", lambda name: "uri" if name in self.handlers else None)
-        monkeypatch.setattr(server, "alive", lambda name, uri: True)
+    def __init__(self):
+        self.answers = {}
 
-    def _serve(self, name, kind, handler):
-        self.handlers[name] = handler
-        return SimpleNamespace(shutdown=lambda: self.handlers.pop(name))
+    def of(self, name):
+        """Return the middleware of one node."""
+        made = Network()
+        made.name, made.answers = name, self.answers
+        return made
+
+    def others(self, endpoints):
+        """All topics are the simulator's."""
+        return [{"/simulator"} for _ in endpoints]
+
+    def offer(self, answer):
+        """Keep what answers."""
+        self.answers[self.name] = answer
+        return lambda: self.answers.pop(self.name)
+
+    def connect(self, node):
+        """Return a call if the node answers."""
+        return Call(self.answers, node) if node in self.answers else None
 
 
-class Proxy:
-    """Calls a handler of the network."""
+class Call(LockstepCall):
+    """Calls what answers for a node."""
 
-    def __init__(self, handlers, name):
-        self._handlers, self._name = handlers, name
+    def __init__(self, answers, name):
+        self._answers, self._name = answers, name
 
-    def __call__(self, request):
-        if self._name not in self._handlers:
-            raise rospy.ServiceException("no answer")
-        return self._handlers[self._name](request)
+    def __call__(self, tick):
+        if self._name not in self._answers:
+            raise MiddlewareError("no answer")
+        return self._answers[self._name](tick)
 
     def close(self):
         """Nothing is open."""
@@ -143,11 +152,11 @@ class Proxy:
 class FollowingNode:
     """A node `/arm` that follows: receives `joint_states`, publishes `desired` once in each cycle."""
 
-    def __init__(self, alive):
+    def __init__(self, alive, network):
         self.received, self.sent = {}, [0]
-        clock = StepClock(alive.is_set)
+        clock = StepClock(alive.is_set, lambda time: None)
         self.follower = LockstepClient(
-            "/arm",
+            network.of("/arm"),
             clock,
             [reader("/joint_states", self.received), writer("/desired", self.sent)],
             lambda: [],
@@ -167,17 +176,20 @@ class FollowingNode:
 
 
 @pytest.fixture
-def network(monkeypatch):
-    return Network(monkeypatch)
+def network():
+    return Network()
 
 
 @pytest.fixture
 def pair(alive, network):
     """Make a node that follows, and the server of a simulator that has published its joints and receives `desired`."""
-    node, received, published = FollowingNode(alive), {}, [1]
+    node, received, published = FollowingNode(alive, network), {}, [1]
     node.received["/simulator"] = 1
     made = LockstepServer(
-        ["/arm"], "/simulator", [writer("/joint_states", published), reader("/desired", received)], alive.is_set
+        ["/arm"],
+        network.of("/simulator"),
+        [writer("/joint_states", published), reader("/desired", received)],
+        alive.is_set,
     )
     yield SimpleNamespace(node=node, conductor=made, received=received, published=published)
     made.close()
@@ -237,15 +249,15 @@ def test_a_message_that_does_not_arrive_is_named(pair, monkeypatch):
 
 def test_a_gone_node_is_named_and_may_return(pair, network, caplog):
     join(pair)
-    handler = network.handlers.pop("/arm/lockstep/tick")
+    handler = network.answers.pop("/arm")
     pair.conductor.follow(0.0, lambda: None)
     assert "/arm is gone: no answer" in caplog.text and not pair.conductor.present()
     assert "time stands still until /arm is there" in caplog.text
-    network.handlers["/arm/lockstep/tick"] = handler
+    network.answers["/arm"] = handler
     assert pair.conductor.present()
 
 
-def test_a_restarted_simulator_goes_on_with_the_node(pair, alive):
+def test_a_restarted_simulator_goes_on_with_the_node(pair, alive, network):
     """Its counters start at zero while the node's do not: the lock-step must neither hang nor skip a cycle."""
     join(pair)
     pair.received["/arm"] = 1
@@ -256,7 +268,10 @@ def test_a_restarted_simulator_goes_on_with_the_node(pair, alive):
     pair.conductor.close()
     pair.published[0], pair.node.received["/simulator"] = 1, 1
     pair.conductor = LockstepServer(
-        ["/arm"], "/simulator", [writer("/joint_states", pair.published), reader("/desired", received)], alive.is_set
+        ["/arm"],
+        network.of("/simulator"),
+        [writer("/joint_states", pair.published), reader("/desired", received)],
+        alive.is_set,
     )
     join(pair)
     pair.conductor.follow(0.0, lambda: None)

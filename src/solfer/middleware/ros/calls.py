@@ -12,8 +12,8 @@ import rospy
 
 from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
 from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.node.waiting import CHECK_PERIOD, wait_for
 from solfer.transport.threaded_calls import as_fields, in_thread
+from solfer.transport.waiting import CHECK_PERIOD, wait_for
 
 
 def provider(resolved: str) -> str | None:

@@ -22,10 +22,8 @@ from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.transport import Writer
 from solfer.transport.arrivals import Arrival, ArrivalQueue, ArrivalReader, Arrivals
 from solfer.transport.backlog import SENDERS
+from solfer.transport.lockstep.client import LOCKSTEP_TIMEOUT
 from solfer.transport.messages import Message
-
-LOCKSTEP_TIMEOUT = 5.0
-"""Longest time that an answer, a message or a connection takes in lock-step [s]."""
 
 
 class Subscription(Arrivals):

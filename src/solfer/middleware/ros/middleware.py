@@ -18,22 +18,23 @@ from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.codecs.packed_message import present, set_epoch
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
-from solfer.middleware.ros.lockstep.client import LockstepClient, followers
-from solfer.middleware.ros.lockstep.server import LockstepServer
-from solfer.middleware.ros.lockstep.step_clock import StepClock
+from solfer.middleware.ros.lockstep import RosLockstep, followers
 from solfer.middleware.ros.node.master import lives
 from solfer.middleware.ros.node.node import RosNode
-from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.reconfigure import ReconfigureServer, first_values
 from solfer.middleware.ros.services import RosService
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
 from solfer.transport.endpoints import JointOrder
 from solfer.transport.health import Health
+from solfer.transport.lockstep.client import LockstepClient
+from solfer.transport.lockstep.server import LockstepServer
+from solfer.transport.lockstep.step_clock import StepClock
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
 from solfer.transport.threaded_calls import in_thread
 from solfer.transport.topics import Topics
+from solfer.transport.waiting import wait_for
 
 logger = logging.getLogger(__name__)
 
@@ -59,7 +60,7 @@ class RosMiddleware(Middleware):
         self._follower: LockstepClient | None = None
         if isinstance(node.clock, StepClock):
             self._follower = LockstepClient(
-                node.name, node.clock, self._endpoints, requests=self._open_requests, running=node.running
+                RosLockstep(node.name), node.clock, self._endpoints, requests=self._open_requests, running=node.running
             )
 
     def now(self) -> float:
@@ -98,7 +99,7 @@ class RosMiddleware(Middleware):
             ConfigError: The parameter that names the nodes is wrong.
         """
         names = followers()
-        return LockstepServer(names, self.name, self._endpoints, running=self.running) if names else None
+        return LockstepServer(names, RosLockstep(self.name), self._endpoints, running=self.running) if names else None
 
     def running(self) -> bool:
         """See `Middleware.running`."""

@@ -58,6 +58,9 @@ class Ros2Subscription(Arrivals):
         now: Clock of the reader [s].
         largest: Bytes of a message; a larger one is dropped undecoded. None: any size.
 
+    Attributes:
+        store: Gets the messages.
+
     Raises:
         MiddlewareError: There can be no such topic.
     """
@@ -75,6 +78,8 @@ class Ros2Subscription(Arrivals):
         super().__init__(codec(message), now, largest=largest)
         self._node = node
         self._names: dict[bytes, str] = {}
+        self._numbers: dict[str, int] = {}
+        self.store: Callable[[Arrival], None] = ignore
         self._newest = -math.inf
         self._unnamed: deque[tuple[bytes, dict[str, Any]]] = deque()
         try:
@@ -89,7 +94,7 @@ class Ros2Subscription(Arrivals):
         self._depth = quality.depth
         self._take = self._subscription.handle.take_message
 
-    def poll(self, store: Callable[[Arrival], None]) -> None:
+    def poll(self) -> None:
         """Hand what has come since the last call to `store`, at most as many messages as may wait."""
         self._time = self.now()
         self._wall = time.time_ns()
@@ -98,7 +103,7 @@ class Ros2Subscription(Arrivals):
             if arrival is None:
                 break
             self._unnamed.popleft()
-            store(arrival)
+            self.store(arrival)
         for _ in range(self._depth):
             taken = self._take(self.codec.ros_class, True)
             if taken is None:
@@ -109,7 +114,7 @@ class Ros2Subscription(Arrivals):
                 continue
             arrival = None if self._unnamed else self._arrival(packed, info)
             if arrival is not None:
-                store(arrival)
+                self.store(arrival)
             elif len(self._unnamed) < self._depth:
                 self._unnamed.append((packed, info))
 
@@ -119,6 +124,9 @@ class Ros2Subscription(Arrivals):
         sender = self._sender(info, late)
         if sender is None:
             return None
+        if sender not in self._numbers and len(self._numbers) >= SENDERS:
+            self._numbers.pop(next(iter(self._numbers)))
+        self._numbers[sender] = info["publication_sequence_number"]
         self._newest = max(self._newest, self._time - late)  # threads of the middleware may pass each other
         return Arrival(packed, sender, self._newest)
 
@@ -138,13 +146,31 @@ class Ros2Subscription(Arrivals):
         self._names[gid] = name = name or gid.hex()
         return name
 
-    def senders(self) -> int:
-        """Return how many publishers are connected."""
-        return self._subscription.handle.get_publisher_count()
+    def number(self, sender: str, before: int = 0) -> int:
+        """Return the number of a sender's newest message, zero before the first; those of before count, too.
+
+        To be called while no other thread reads the topic.
+        """
+        self.poll()
+        return self._numbers.get(sender, 0)
+
+    def others(self) -> set[str]:
+        """Return the names of the nodes that publish."""
+        return _names(self._node.get_publishers_info_by_topic(self.topic))
+
+    def senders(self) -> set[str]:
+        """Return the names of the nodes that are connected; none before all are."""
+        known = self._node.get_publishers_info_by_topic(self.topic)
+        return _names(known) if self._subscription.handle.get_publisher_count() >= len(known) else set()
 
     def close(self) -> None:
         """Unsubscribe."""
         self._node.destroy_subscription(self._subscription)
+
+
+def _names(ends: Sequence[Any]) -> set[str]:
+    """Return the full names of the nodes of ends of a topic."""
+    return {f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in ends}
 
 
 def ignore(_: Any) -> None:
@@ -161,6 +187,7 @@ class Ros2Reader(ArrivalReader):
         now: Clock in which its age counts [s].
         kept: See `Middleware.reader`.
         latched: Whether the newest message of before counts.
+        reliable: Whether no message may be lost, and their publishers have to be reliable.
     """
 
     receives = True
@@ -175,27 +202,29 @@ class Ros2Reader(ArrivalReader):
         *,
         kept: int = 0,
         latched: bool = False,
+        reliable: bool = False,
     ):
         super().__init__(now, kept)
-        self.requires = quality(max(4 * kept, DEPTH), reliable=latched, latched=latched)
+        self.requires = quality(max(4 * kept, DEPTH), reliable=reliable or latched, latched=latched)
         self.subscription = Ros2Subscription(node, topic, message, self.requires, now=now)
+        self.subscription.store = self._store
         self.topic = self.subscription.topic
         self.carries = message
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
-        self.subscription.poll(self._store)
+        self.subscription.poll()
         return super().read()
 
     def update(self) -> Sequence[Publisher]:
         """See `Reader.update`."""
-        self.subscription.poll(self._store)
+        self.subscription.poll()
         return self.publishers
 
     def read_next(self) -> ArrivalPublisher | None:
         """See `Reader.read_next`."""
         if not self._waiting:
-            self.subscription.poll(self._store)
+            self.subscription.poll()
         return super().read_next()
 
 
@@ -209,16 +238,17 @@ class Ros2Queue(ArrivalQueue):
         super().__init__(size)
         self.requires = quality(max(4 * size, DEPTH), reliable=True)
         self.subscription = Ros2Subscription(node, topic, message, self.requires, largest=largest)
+        self.subscription.store = self._store
         self.topic = self.subscription.topic
 
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""
-        self.subscription.poll(self._store)
+        self.subscription.poll()
         return super().drain()
 
     def take(self, first: Container[str], most: int, others: int) -> list[Message]:
         """See `Queue.take`."""
-        self.subscription.poll(self._store)
+        self.subscription.poll()
         return super().take(first, most, others)
 
 
@@ -249,15 +279,27 @@ class Ros2Writer(Writer):
                 f"topic '{topic}' cannot be written as {message}: {error}", expected="the name of a topic"
             ) from error
         self.topic = self._publisher.topic_name
+        self.topic_publisher = self  # as on ROS 1, where several writers share one
+        self._sent = 0
 
-    def receivers(self) -> int:
-        """Return how many nodes' subscriptions are connected."""
-        return self._publisher.get_subscription_count()
+    def number(self) -> int:
+        """Return the number of the newest message that was sent by which its subscribers know it, or zero."""
+        return self._sent
+
+    def others(self) -> set[str]:
+        """Return the names of the nodes that subscribe."""
+        return _names(self._node.get_subscriptions_info_by_topic(self.topic))
+
+    def receivers(self) -> set[str]:
+        """Return the names of the nodes that are connected; none before all are."""
+        known = self._node.get_subscriptions_info_by_topic(self.topic)
+        return _names(known) if self._publisher.get_subscription_count() >= len(known) else set()
 
     def write(self, message: Message) -> None:
         """See `Writer.write`."""
-        if self.receivers():
+        if self._publisher.get_subscription_count():
             self._publisher.publish(self._codec.encode(message))
+            self._sent += 1
 
     def close(self) -> None:
         """End the topic."""

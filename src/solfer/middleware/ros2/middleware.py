@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, wait
+from functools import partial
 from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -13,12 +14,16 @@ from solfer.interfaces.declaration import Action, Service
 from solfer.middleware.ros2.actions import Ros2Action
 from solfer.middleware.ros2.codecs import require_fields, to_time
 from solfer.middleware.ros2.endpoints import Ros2Queue, Ros2Reader, Ros2Writer
+from solfer.middleware.ros2.lockstep import Ros2Lockstep
 from solfer.middleware.ros2.node import Ros2Node
 from solfer.middleware.ros2.parameters import NativeParameters
 from solfer.middleware.ros2.quality import MismatchWatch, quality
 from solfer.middleware.ros2.services import Ros2Service, call, replied
 from solfer.transport.endpoints import NEW, JointOrder
 from solfer.transport.health import Health
+from solfer.transport.lockstep.client import LockstepClient
+from solfer.transport.lockstep.server import LockstepServer
+from solfer.transport.lockstep.step_clock import StepClock
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
 from solfer.transport.threaded_calls import in_thread
@@ -57,8 +62,12 @@ class Ros2Middleware(Middleware):
         self._provided: list[Any] = []
         self._diagnostics = self._ros.create_publisher(DiagnosticArray, "/diagnostics", quality(10, reliable=True))
         self._last: dict[str, tuple[float, Health]] = {}
-        self._reports: dict[str, HealthReport] = {}
-        self._watches = False
+        self._reports: dict[str, HealthReport] | None = None
+        self._follower: LockstepClient | None = None
+        if isinstance(node.clock, StepClock):
+            self._follower = LockstepClient(
+                Ros2Lockstep(node.ros), node.clock, self._endpoints, requests=self._open_requests, running=node.running
+            )
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -76,7 +85,7 @@ class Ros2Middleware(Middleware):
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`."""
-        self.node.clock.sleep_until(deadline)
+        (self._follower or self.node.clock).sleep_until(deadline)
 
     def publish_time(self, simulated: float) -> None:
         """See `Middleware.publish_time`."""
@@ -122,8 +131,10 @@ class Ros2Middleware(Middleware):
         """
         self.node.clock.epoch = self.stamp_time() - now
 
-    def lockstep_server(self) -> None:
-        """Return None: no node follows a simulation in lock-step here."""
+    def lockstep_server(self) -> LockstepServer | None:
+        """Make what lets nodes follow a simulation in this node in lock-step; None if no node is to follow."""
+        names = self.node.followers
+        return LockstepServer(names, Ros2Lockstep(self._ros), self._endpoints, running=self.running) if names else None
 
     def provide(self, name: str, text: str, original: str = "") -> None:
         """Publish a text for all nodes that read the parameter `name`, as long as this node lives.
@@ -148,7 +159,8 @@ class Ros2Middleware(Middleware):
 
     def reader(self, topic: str, message: str, kept: int = 0) -> Ros2Reader:
         """See `Middleware.reader`."""
-        return self._keep(Ros2Reader(self._ros, topic, message, self.now, kept=kept))
+        reliable = bool(self.node.followers)
+        return self._keep(Ros2Reader(self._ros, topic, message, self.now, kept=kept, reliable=reliable))
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Ros2Queue:
         """See `Middleware.queue`."""
@@ -189,7 +201,7 @@ class Ros2Middleware(Middleware):
         answer = in_thread(
             lambda: replied(call(self._ros, name, interface, request, timeout=timeout, running=lambda: True), reply)
         )
-        self._requests = [*(each for each in self._requests if not each.done()), answer]
+        self._requests = [*self._open_requests(), answer]
         return answer
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
@@ -247,26 +259,32 @@ class Ros2Middleware(Middleware):
 
     def reports(self) -> Mapping[str, HealthReport]:
         """See `Middleware.reports`."""
-        if not self._watches:
-            self._watches = True
-            self._ros.create_subscription(DiagnosticArray, "/diagnostics", self._on_report, quality(64, reliable=True))
+        if self._reports is None:
+            self._reports = {}
+            keep = partial(self._keep_reports, self._reports)
+            self._ros.create_subscription(DiagnosticArray, "/diagnostics", keep, quality(64, reliable=True))
         return self._reports
 
-    def _on_report(self, message: Any) -> None:
+    @staticmethod
+    def _keep_reports(reports: dict[str, HealthReport], message: Any) -> None:
         for status in message.status:
             level = Health(min(status.level[0], Health.ERROR))  # stale is no level of ours
             values = {pair.key: pair.value for pair in status.values}
-            self._reports[status.name.rpartition(": ")[2]] = HealthReport(level, status.message, values)
+            reports[status.name.rpartition(": ")[2]] = HealthReport(level, status.message, values)
 
     def close(self) -> None:
         """See `Middleware.close`."""
         wait(self._requests, timeout=1.0)
-        for part in (*self._services, *self._endpoints, *self._texts.values()):
+        for part in (*filter(None, (self._follower,)), *self._services, *self._endpoints, *self._texts.values()):
             part.close()
         self._services.clear()
         self._endpoints.clear()
         self._texts.clear()
         self.node.close()
+
+    def _open_requests(self) -> list[Future[Any]]:
+        """Drop the requests that are answered and return the others."""
+        return [each for each in self._requests if not each.done()]
 
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)

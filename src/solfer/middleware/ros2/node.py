@@ -24,6 +24,8 @@ from solfer.errors import ConfigError, MiddlewareError
 from solfer.middleware.ros2.endpoints import Polled, ignore
 from solfer.middleware.ros2.quality import quality
 from solfer.process import ProcessEnd, run_process
+from solfer.transport.lockstep.client import follower_names
+from solfer.transport.lockstep.step_clock import StepClock
 
 logger = logging.getLogger(__name__)
 
@@ -210,6 +212,25 @@ class Ros2SubscribingClock(Ros2Clock):
         waits.wait(round(1e9 * POLL_PERIOD))
 
 
+class Ros2StepClock(StepClock, Ros2Clock):
+    """Stands still between two cycles of a lock-step; ROS time is that of the cycle.
+
+    Args:
+        running: False as soon as the end was requested.
+    """
+
+    def __init__(self, running: Callable[[], bool]):
+        super().__init__(running, self._set_present)
+        self._present = 0
+
+    def present(self) -> int:
+        """Return ROS time [ns]."""
+        return self._present
+
+    def _set_present(self, simulated: float) -> None:
+        self._present = round(1e9 * simulated)
+
+
 class Ros2Node:
     """A started node with a context of its own, so that a process may have several.
 
@@ -225,6 +246,7 @@ class Ros2Node:
         name: Resolved name.
         ros: The node of rclpy.
         clock: Clock of the node.
+        followers: Nodes in lock-step with the simulation, by the parameter `lockstep`; of ROS 2 each node has its own.
 
     Raises:
         ConfigError: The name or the arguments are wrong.
@@ -261,7 +283,15 @@ class Ros2Node:
         self._thread = threading.Thread(target=self._spin, name="ros2", daemon=True)
         self._thread.start()
         try:
-            if not follows:
+            self.clock: Ros2Clock
+            self.followers = follower_names(
+                self.ros.get_parameter_or("lockstep", Parameter("lockstep", value="")).value,
+                resolve=lambda each: f"/{each.lstrip('/')}",
+                where="parameter lockstep",
+            )
+            if self.name in self.followers:
+                self.clock = Ros2StepClock(self.running)
+            elif not follows:
                 self.clock = Ros2Clock()
             elif publishes_time:
                 self.clock = Ros2PublishingClock(self.ros)

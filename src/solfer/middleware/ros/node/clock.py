@@ -16,8 +16,8 @@ from rospy.rostime import _set_rostime as set_ros_time
 from solfer.errors import MiddlewareError
 from solfer.middleware.ros.codecs.packed_message import TIME, PackedMessage
 from solfer.middleware.ros.node.master import refuse_second
-from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.topic_publisher import TopicPublisher
+from solfer.transport.waiting import wait_for
 
 POLL_PERIOD = 0.1
 """Time between two checks for a requested end, while simulated time stands still [s]."""

@@ -14,14 +14,14 @@ import rospy
 from rospy.names import _set_caller_id as set_caller
 
 from solfer.errors import ConfigError, MiddlewareError, SolferError
-from solfer.middleware.ros.lockstep.client import followers
-from solfer.middleware.ros.lockstep.step_clock import StepClock
+from solfer.middleware.ros.lockstep import followers, show
 from solfer.middleware.ros.node.clock import make_clock
 from solfer.middleware.ros.node.master import CALL_TIMEOUT, knows, refuse_twin, require_master
 from solfer.middleware.ros.node.master_watch import MasterWatch
 from solfer.middleware.ros.node.ports import bound_ports
-from solfer.middleware.ros.node.waiting import ShutdownRequested
 from solfer.process import ProcessEnd
+from solfer.transport.lockstep.step_clock import StepClock
+from solfer.transport.waiting import ShutdownRequested
 
 logger = logging.getLogger(__name__)
 
@@ -82,7 +82,7 @@ class RosNode:
         try:
             self._watch = MasterWatch(self._on_loss, known=lambda: knows(self.name, rospy.get_node_uri()))
             follows = self.name in followers()
-            self.clock = StepClock(self.running) if follows else make_clock(self.running, publishes_time)
+            self.clock = StepClock(self.running, show) if follows else make_clock(self.running, publishes_time)
         except BaseException:
             self.close()
             raise

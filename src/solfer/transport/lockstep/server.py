@@ -5,22 +5,19 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 
-import rospy
-
 from solfer.errors import MiddlewareError
-from solfer.middleware.ros.calls import alive, provider
-from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.lockstep.client import (
-    SERVICE,
-    TICK,
+from solfer.throttle import Throttle
+from solfer.transport.lockstep.client import (
     Endpoint,
+    LockstepCall,
+    LockstepNetwork,
     Numbers,
+    Tick,
     published_counts,
     wait_for_connections,
     wait_for_messages,
 )
-from solfer.middleware.ros.lockstep.step_clock import TIME_TOLERANCE
-from solfer.throttle import Throttle
+from solfer.transport.lockstep.step_clock import TIME_TOLERANCE
 
 logger = logging.getLogger(__name__)
 
@@ -30,6 +27,7 @@ class LockstepMember:
 
     Args:
         name: Full name of the node.
+        network: Middleware of the simulation.
 
     Attributes:
         name: Full name of the node.
@@ -37,28 +35,24 @@ class LockstepMember:
         before: Numbers of the messages that were sent before it was there; it need not have received them.
     """
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, network: LockstepNetwork):
         self.name = name
         self.due = 0.0
         self.before: Numbers = {}
-        self._service = f"{name}/{SERVICE}"
-        self._proxy: rospy.ServiceProxy | None = None
+        self._network = network
+        self._call: LockstepCall | None = None
         self._thread = ThreadPoolExecutor(1)
 
     @property
     def there(self) -> bool:
         """Whether the node follows at present."""
-        return self._proxy is not None
+        return self._call is not None
 
     def join(self, numbers: Numbers) -> bool:
         """Connect to the node if it is there; returns whether it is."""
-        try:
-            uri = provider(self._service)
-        except MiddlewareError:  # the master may be away for a moment
+        self._call = self._network.connect(self.name)
+        if self._call is None:
             return False
-        if uri is None or not alive(self._service, uri):
-            return False
-        self._proxy = rospy.ServiceProxy(self._service, service_class(TICK), True)
         self.due = 0.0
         self.before = numbers
         return True
@@ -73,14 +67,14 @@ class LockstepMember:
             running: False when there is no reason to wait any more.
         """
         received = {key: number for key, number in numbers.items() if number != self.before.get(key, 0)}
-        request = service_class(TICK)._request_class(
+        tick = Tick(
             now,
             [topic for topic, _ in received],
             [sender for _, sender in received],
             list(received.values()),
             [self.before.get(key, 0) for key in received],
         )
-        answer = self._thread.submit(self._proxy, request)
+        answer = self._thread.submit(self._call, tick)
         warning_period = 2.0  # [s]
         next_warning = time.monotonic() + warning_period
         while not wait((answer,), 1e-3).done and running():
@@ -92,7 +86,7 @@ class LockstepMember:
             return {}
         try:
             reply = answer.result()
-        except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+        except MiddlewareError as error:
             logger.warning("lock-step: %s is gone: %s", self.name, error)
             self._leave()
             return {}
@@ -105,9 +99,9 @@ class LockstepMember:
         self._thread.shutdown(wait=False)
 
     def _leave(self) -> None:
-        if self._proxy is not None:
-            self._proxy.close()
-            self._proxy = None
+        if self._call is not None:
+            self._call.close()
+            self._call = None
 
 
 class LockstepServer:
@@ -115,14 +109,20 @@ class LockstepServer:
 
     Args:
         names: Full names of the nodes, in the order of their cycles.
-        name: Name of the node that simulates.
+        network: Middleware of the node that simulates.
         endpoints: Its topics; a live list.
         running: False as soon as the end was requested.
     """
 
-    def __init__(self, names: Sequence[str], name: str, endpoints: Sequence[Endpoint], running: Callable[[], bool]):
-        self._members = [LockstepMember(each) for each in names]
-        self._name = name
+    def __init__(
+        self,
+        names: Sequence[str],
+        network: LockstepNetwork,
+        endpoints: Sequence[Endpoint],
+        running: Callable[[], bool],
+    ):
+        self._members = [LockstepMember(each, network) for each in names]
+        self._network = network
         self._endpoints = endpoints
         self._running = running
         self._numbers: Numbers = {}
@@ -133,7 +133,7 @@ class LockstepServer:
         missing = [member for member in self._members if not member.there]
         for member in missing:
             if member.join(dict(self._newest())):
-                wait_for_connections(self._endpoints, self._name, self._running)
+                wait_for_connections(self._endpoints, self._network, self._running)
                 logger.info("lock-step: %s is there", member.name)
         away = [member.name for member in missing if not member.there]
         if away:
@@ -165,5 +165,5 @@ class LockstepServer:
     def _newest(self) -> Numbers:
         """Return the numbers of the newest messages of all, those of this node included."""
         for topic, number in published_counts(self._endpoints).items():
-            self._numbers[topic, self._name] = number
+            self._numbers[topic, self._network.name] = number
         return self._numbers

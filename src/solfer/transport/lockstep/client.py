@@ -4,19 +4,17 @@ Each tick names the messages that the follower has to have received before, and 
 sent. So what a cycle reads depends on simulated time only, however long messages are in progress.
 """
 
+import abc
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, wait
+from dataclasses import dataclass
 from typing import Any
 
-import rosgraph
-import rospy
-
 from solfer.errors import ConfigError, MiddlewareError
-from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.endpoints import LOCKSTEP_TIMEOUT, RosQueue, RosReader, RosWriter
-from solfer.middleware.ros.lockstep.step_clock import StepClock
-from solfer.middleware.ros.node.waiting import ShutdownRequested, wait_for
+from solfer.transport.endpoints import Writer
+from solfer.transport.lockstep.step_clock import StepClock
+from solfer.transport.waiting import ShutdownRequested, wait_for
 
 logger = logging.getLogger(__name__)
 
@@ -26,35 +24,104 @@ TICK = "solfer/Tick"
 SERVICE = "lockstep/tick"
 """Its name, behind the node's."""
 
-Endpoint = RosReader | RosQueue | RosWriter
+LOCKSTEP_TIMEOUT = 5.0
+"""Longest time that an answer, a message or a connection takes in lock-step [s]."""
+
+Endpoint = Any
+"""A topic of a node. A `Writer` has a `topic_publisher` with `number()` and `receivers()`, all others have a
+`subscription` with `number(sender, before)` and `senders()`."""
+
 Numbers = dict[tuple[str, str], int]
 """Number of the newest message on a topic by a sender."""
 
 NO_NUMBERS: Numbers = {}
 
 
-def followers() -> tuple[str, ...]:
-    """Read the full names of the nodes that follow the simulation; empty: there is no lock-step.
+@dataclass(frozen=True)
+class Tick:
+    """Request of the service, see srv/Tick.srv."""
 
-    The parameter `/lockstep` names them in the order of their cycles: 'upper_body, lower_body'.
+    time: float
+    topics: Sequence[str]
+    senders: Sequence[str]
+    numbers: Sequence[int]
+    before: Sequence[int]
+
+
+@dataclass(frozen=True)
+class Ticked:
+    """Its reply."""
+
+    next: float
+    topics: Sequence[str]
+    numbers: Sequence[int]
+
+
+class LockstepNetwork(abc.ABC):
+    """What a node in lock-step needs of its middleware.
+
+    Attributes:
+        name: Full name of the node.
+    """
+
+    name: str
+
+    @abc.abstractmethod
+    def others(self, endpoints: Iterable[Endpoint]) -> list[set[str]]:
+        """Return for each endpoint the nodes that write what it reads, or read what it writes."""
+
+    @abc.abstractmethod
+    def offer(self, answer: Callable[[Tick], Ticked]) -> Callable[[], None]:
+        """Offer the service; returns what withdraws it. An error of `answer` reaches the caller."""
+
+    @abc.abstractmethod
+    def connect(self, node: str) -> "LockstepCall | None":
+        """Connect to the service of a node; None: it is not there."""
+
+
+class LockstepCall(abc.ABC):
+    """A connection to a node that follows."""
+
+    @abc.abstractmethod
+    def __call__(self, tick: Tick) -> Ticked:
+        """Call the service.
+
+        Raises:
+            MiddlewareError: The node is gone.
+        """
+
+    @abc.abstractmethod
+    def close(self) -> None:
+        """End the connection."""
+
+
+def follower_names(value: object, resolve: Callable[[str], str], where: str) -> tuple[str, ...]:
+    """Return the full names of the nodes that follow, in the order of their cycles: 'upper_body, lower_body'.
+
+    Args:
+        value: Of the parameter that names them; empty: there is no lock-step.
+        resolve: Makes a full name.
+        where: Place of the parameter.
 
     Raises:
-        ConfigError: The parameter is not a list of names, or names a node twice.
+        ConfigError: It is not a list of names, or names a node twice.
     """
-    value = rospy.get_param("/lockstep", "")
     if not isinstance(value, str):
-        raise ConfigError(f"not a list of nodes: '{value}'", where="parameter /lockstep", expected="NAME, NAME, ...")
-    names = tuple(rosgraph.names.resolve_name(name.strip(), "/") for name in value.split(",") if name.strip())
+        raise ConfigError(f"not a list of nodes: '{value}'", where=where, expected="NAME, NAME, ...")
+    names = tuple(resolve(name.strip()) for name in value.split(",") if name.strip())
     if len(set(names)) < len(names):
-        raise ConfigError(f"a node twice in '{value}'", where="parameter /lockstep", expected="each node once")
+        raise ConfigError(f"a node twice in '{value}'", where=where, expected="each node once")
     return names
+
+
+def is_writer(endpoint: Endpoint) -> bool:
+    """Return whether a node writes a topic."""
+    return isinstance(endpoint, Writer)
 
 
 def published_counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
     """Return the number of the newest message on each topic that a node writes."""
-    return {
-        endpoint.topic: endpoint.topic_publisher.number() for endpoint in endpoints if isinstance(endpoint, RosWriter)
-    }
+    return {endpoint.topic: endpoint.topic_publisher.number() for endpoint in endpoints if is_writer(endpoint)}
 
 
 def wait_for_messages(
@@ -73,16 +140,14 @@ def wait_for_messages(
         ShutdownRequested: The node has to end.
     """
     for endpoint in endpoints:
-        if isinstance(endpoint, RosWriter):
+        if is_writer(endpoint):
             continue
         for (topic, sender), number in numbers.items():
             if topic == endpoint.topic:
                 _wait_for_message(endpoint, sender, number, running=running, before=before.get((topic, sender), 0))
 
 
-def _wait_for_message(
-    endpoint: RosReader | RosQueue, sender: str, number: int, running: Callable[[], bool], before: int
-) -> None:
+def _wait_for_message(endpoint: Endpoint, sender: str, number: int, running: Callable[[], bool], before: int) -> None:
     subscription = endpoint.subscription
     if not wait_for(lambda: subscription.number(sender, before) == number, LOCKSTEP_TIMEOUT, running, step=1e-4):
         raise MiddlewareError(
@@ -91,23 +156,16 @@ def _wait_for_message(
         )
 
 
-def wait_for_connections(endpoints: Iterable[Endpoint], name: str, running: Callable[[], bool]) -> None:
-    """Wait until all nodes that write what node `name` reads, or read what it writes, are connected to it.
+def wait_for_connections(endpoints: Sequence[Endpoint], network: LockstepNetwork, running: Callable[[], bool]) -> None:
+    """Wait until all nodes that write what this node reads, or read what it writes, are connected to it.
 
     Raises:
         ShutdownRequested: The node has to end.
     """
-    publishers, subscribers, _ = rosgraph.Master(name).getSystemState()
-    writing = dict(publishers)
-    reading = dict(subscribers)
-    for endpoint in endpoints:
-        if isinstance(endpoint, RosWriter):
-            nodes = reading.get(endpoint.topic, [])
-            connected = endpoint.topic_publisher.receivers
-        else:
-            nodes = writing.get(endpoint.topic, [])
-            connected = endpoint.subscription.senders
-        missing = _wait_for_nodes(set(nodes) - {name}, connected, running)
+    for endpoint, nodes in zip(endpoints, network.others(endpoints), strict=True):
+        writes = is_writer(endpoint)
+        connected = endpoint.topic_publisher.receivers if writes else endpoint.subscription.senders
+        missing = _wait_for_nodes(nodes - {network.name}, connected, running)
         if missing:
             logger.warning(
                 "topic %s: no connection to %s; it does not take part in the lock-step",
@@ -126,7 +184,7 @@ class LockstepClient:
     """Makes a node's cycles when the simulation requests them.
 
     Args:
-        name: Name of the node.
+        network: Its middleware.
         clock: Its clock.
         endpoints: Its topics; a live list.
         requests: Returns the requests to services that are not answered yet.
@@ -135,34 +193,34 @@ class LockstepClient:
 
     def __init__(
         self,
-        name: str,
+        network: LockstepNetwork,
         clock: StepClock,
         endpoints: Sequence[Endpoint],
         requests: Callable[[], Sequence[Future]],
         running: Callable[[], bool],
     ):
-        self._name = name
+        self._network = network
         self._clock = clock
         self._endpoints = endpoints
         self._requests = requests
         self._running = running
-        self._server: rospy.Service | None = None
+        self._withdraw: Callable[[], None] | None = None
         self._published: dict[str, int] = {}
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`; the first call joins the simulation."""
         wait(self._requests())
-        if self._server is None:
-            wait_for_connections(self._endpoints, self._name, self._running)
-            self._server = rospy.Service(f"{self._name}/{SERVICE}", service_class(TICK), self._answer)
+        if self._withdraw is None:
+            wait_for_connections(self._endpoints, self._network, self._running)
+            self._withdraw = self._network.offer(self._answer)
         self._clock.sleep_until(deadline)
 
     def close(self) -> None:
         """Stop following."""
-        if self._server is not None:
-            self._server.shutdown()
+        if self._withdraw is not None:
+            self._withdraw()
 
-    def _answer(self, tick: Any) -> Any:
+    def _answer(self, tick: Tick) -> Ticked:
         keys = tuple(zip(tick.topics, tick.senders, strict=True))
         numbers = dict(zip(keys, tick.numbers, strict=True))
         before = dict(zip(keys, tick.before, strict=True))
@@ -170,10 +228,10 @@ class LockstepClient:
             due = self._clock.grant(
                 tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running, before=before)
             )
-        except (ShutdownRequested, MiddlewareError) as error:
-            raise rospy.ServiceException(str(error)) from error
+        except ShutdownRequested as error:
+            raise MiddlewareError(str(error)) from error
         # a simulator that was started again cannot wait for messages that the one before received
         newest = published_counts(self._endpoints)
         news = {topic: number for topic, number in newest.items() if self._published.get(topic, 0) != number}
         self._published |= news
-        return service_class(TICK)._response_class(due, list(news), list(news.values()))
+        return Ticked(due, list(news), list(news.values()))

@@ -3,16 +3,16 @@
 import threading
 from collections.abc import Callable
 
-from rospy.rostime import _set_rostime as set_ros_time
+from solfer.transport.waiting import ShutdownRequested
 
-from solfer.middleware.ros.node.clock import POLL_PERIOD, RosClock, ros_time
-from solfer.middleware.ros.node.waiting import ShutdownRequested
+POLL_PERIOD = 0.1
+"""Time between two checks for a requested end [s]."""
 
 TIME_TOLERANCE = 1e-9
 """Times that differ by less are the same [s]."""
 
 
-class StepClock(RosClock):
+class StepClock:
     """Goes on when it is granted a cycle, and returns when the loop has made it and sleeps again.
 
     Like every clock it never goes back: when the simulation does, no time has passed.
@@ -21,10 +21,16 @@ class StepClock(RosClock):
 
     Args:
         running: False as soon as the end was requested.
+        show: Shows the simulated time [s] of a cycle to all that asks for the time of ROS.
+
+    Attributes:
+        rewinds: How often the simulated time has gone back.
     """
 
-    def __init__(self, running: Callable[[], bool]):
-        super().__init__(running)
+    def __init__(self, running: Callable[[], bool], show: Callable[[float], None]):
+        self.rewinds = 0
+        self._running = running
+        self._show = show
         self._time = 0.0
         self._granted = False
         self._published = 0.0
@@ -48,6 +54,9 @@ class StepClock(RosClock):
             self._granted = False
             self._deadline = None
 
+    def publish(self, simulated: float) -> None:
+        """See `Middleware.publish_time`; no effect here."""
+
     def grant(self, time: float, prepare: Callable[[], None]) -> float:
         """Let the loop make the cycle at `time` [s] if it is due; returns, after it, the time of the next one.
 
@@ -65,7 +74,7 @@ class StepClock(RosClock):
                 self._ahead += self._published - time
             self._published = time
             if time + self._ahead >= deadline - TIME_TOLERANCE:
-                set_ros_time(ros_time(time))
+                self._show(time)
                 self._time = time + self._ahead
                 prepare()
                 self._granted = True
