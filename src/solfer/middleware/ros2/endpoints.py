@@ -283,7 +283,7 @@ class Ros2Writer(Writer):
         self._sent = 0
 
     def number(self) -> int:
-        """Return the number of the newest message that was sent by which its subscribers know it, or zero."""
+        """Return how many messages were sent: the number of the newest one, which DDS counts in the same way."""
         return self._sent
 
     def others(self) -> set[str]:

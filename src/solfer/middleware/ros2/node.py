@@ -12,6 +12,7 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -316,7 +317,11 @@ class Ros2Node:
             self._end.close()
 
     def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            pass
+        while True:
+            try:
+                self._executor.spin()
+            except ExternalShutdownException:
+                pass
+            except InvalidHandle:  # a thread destroyed an endpoint while this one looked at it
+                continue
+            return
