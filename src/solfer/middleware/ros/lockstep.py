@@ -89,7 +89,7 @@ class RosLockstepCall(LockstepCall):
         try:
             reply: Ticked = replied(self._proxy(service_class(TICK)._request_class(**as_fields(tick))), Ticked)
         except (rospy.ServiceException, rospy.ROSException, OSError) as error:
-            raise MiddlewareError(str(error)) from error
+            raise MiddlewareError(str(error), expected="a node that follows") from error
         return reply
 
     def close(self) -> None:

@@ -283,7 +283,7 @@ class Ros2Writer(Writer):
         self._sent = 0
 
     def number(self) -> int:
-        """Return how many messages were sent: the number of the newest one, which DDS counts in the same way."""
+        """Return how many messages were sent; subscribers get that number with the newest."""
         return self._sent
 
     def others(self) -> set[str]:

@@ -103,10 +103,10 @@ class Ros2LockstepCall(LockstepCall):
         answer.add_done_callback(lambda _: answered.set())
         while not answered.wait(PRESENCE_PERIOD):
             if self._node.count_services(self._service) != 1:  # none any more, or a second one in its place
-                raise MiddlewareError("no answer")
+                raise MiddlewareError("no answer", expected="a node that follows")
         reply: Ticked = replied(answer.result(), Ticked)
         if math.isnan(reply.next):
-            raise MiddlewareError("it refuses the cycle, see its log")
+            raise MiddlewareError("it refuses the cycle", expected="the cause is in its log")
         return reply
 
     def close(self) -> None:

@@ -229,7 +229,7 @@ class LockstepClient:
                 tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running, before=before)
             )
         except ShutdownRequested as error:
-            raise MiddlewareError(str(error)) from error
+            raise MiddlewareError(str(error), expected="a node that goes on") from error
         # a simulator that was started again cannot wait for messages that the one before received
         newest = published_counts(self._endpoints)
         news = {topic: number for topic, number in newest.items() if self._published.get(topic, 0) != number}
