@@ -156,9 +156,7 @@ class Ros2Wire(Wire):
         ends = [end.subscription for end in self.middleware._endpoints if end.topic == writer.topic]
         senders = self.middleware._ros.count_publishers
         self.until(lambda: writer._publisher.get_subscription_count() == len(ends))  # each end finds the other one
-        self.until(
-            lambda: all(end._subscription.handle.get_publisher_count() == senders(writer.topic) for end in ends)
-        )
+        self.until(lambda: all(end._subscription.handle.get_publisher_count() == senders(writer.topic) for end in ends))
         for message in messages:
             writer.write(message)
 
