@@ -137,5 +137,5 @@ def test_time_waits_for_both_plugins(tmp_path, observer):
     found = np.array([[observer.commands[stamp][joint] for joint in JOINTS] for stamp in stamps])
     begin = int(np.argmax(np.any(np.diff(found, axis=0) != 0.0, axis=1))) + 1
     expected = in_memory((stamps[0] - 1_000_000) // PERIOD, begin, len(found))
-    assert len(found) > 500 and np.ptp(expected, axis=0).min() > 0.15
+    assert len(found) > 450 and np.ptp(expected, axis=0).min() > 0.15
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
